@@ -1,0 +1,5 @@
+"""The ten inertial parameters of a rigid body, their forms and laws, and closed-form solids."""
+
+from steelyard.inertia.parameters import InertialParameters, ValidityReport
+
+__all__ = ["InertialParameters", "ValidityReport"]

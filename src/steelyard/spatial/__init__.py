@@ -1,0 +1,6 @@
+"""Rotations, poses and six-vectors: batch-first, angular part first, SI units."""
+
+from steelyard.spatial.pose import Pose, Rotation
+from steelyard.spatial.vectors import Acceleration, Twist, Wrench, cross_matrix
+
+__all__ = ["Acceleration", "Pose", "Rotation", "Twist", "Wrench", "cross_matrix"]

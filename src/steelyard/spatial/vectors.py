@@ -1,0 +1,114 @@
+"""Twist, Acceleration and Wrench: six-vectors with the angular part first, batch-first."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Self
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+
+
+def cross_matrix(vector: ArrayLike) -> Array:
+    """Return [v]x of shape (..., 3, 3), so that [v]x u = v x u."""
+    v = np.asarray(vector, dtype=np.float64)
+    out = np.zeros((*v.shape[:-1], 3, 3))
+    out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
+    out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class _SixVector:
+    """Two three-vectors of one batch shape."""
+
+    _first: Array
+    _second: Array
+
+    def __post_init__(self) -> None:
+        name = type(self).__name__.lower()
+        first, second = check.vectors(f"{name} (angular)", self._first), check.vectors(f"{name} (linear)", self._second)
+        if first.shape != second.shape:
+            raise BadValue(f"{name}: both parts must have one shape; got {first.shape} and {second.shape}.")
+        object.__setattr__(self, "_first", first)
+        object.__setattr__(self, "_second", second)
+
+    @classmethod
+    def from_array(cls, array: ArrayLike) -> Self:
+        """Return the value from (..., 6), angular part first."""
+        a = check.vectors(cls.__name__.lower(), array, 6)
+        return cls(a[..., :3], a[..., 3:])
+
+    def array(self) -> Array:
+        """Return (..., 6), angular part first."""
+        return np.concatenate([self._first, self._second], axis=-1)
+
+    def __add__(self, other: Self) -> Self:
+        return type(self)(self._first + other._first, self._second + other._second)
+
+    def __neg__(self) -> Self:
+        return type(self)(-self._first, -self._second)
+
+    def __getitem__(self, index: Any) -> Self:
+        return type(self)(self._first[index], self._second[index])
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """The batch shape."""
+        return self._first.shape[:-1]
+
+
+class Twist(_SixVector):
+    """Angular velocity [rad/s] and velocity of the frame origin [m/s], each (..., 3)."""
+
+    @property
+    def angular(self) -> Array:
+        """Angular velocity (..., 3) [rad/s]."""
+        return self._first
+
+    @property
+    def linear(self) -> Array:
+        """Velocity of the frame origin (..., 3) [m/s]."""
+        return self._second
+
+
+class Acceleration(_SixVector):
+    """Angular acceleration [rad/s^2] and classical acceleration of the frame origin, gravity not included [m/s^2]."""
+
+    @property
+    def angular(self) -> Array:
+        """Angular acceleration (..., 3) [rad/s^2]."""
+        return self._first
+
+    @property
+    def linear(self) -> Array:
+        """Classical acceleration of the frame origin (..., 3) [m/s^2]."""
+        return self._second
+
+    @classmethod
+    def from_twist_derivative(cls, derivative: ArrayLike, twist: Twist) -> Acceleration:
+        """Return the classical acceleration from the component-wise derivative (..., 6) of a body twist.
+
+        a = dv/dt + omega x v, both in body axes.
+        Source: "Cooperative Payload Estimation", IV-B differentiates components; Newton-Euler needs the classical one.
+        """
+        d = check.vectors("twist derivative", derivative, 6)
+        return cls(d[..., :3], d[..., 3:] + np.cross(twist.angular, twist.linear))
+
+
+class Wrench(_SixVector):
+    """Moment about the frame origin [N m] and force [N] that the robot applies to the object, each (..., 3)."""
+
+    @property
+    def torque(self) -> Array:
+        """Moment about the frame origin (..., 3) [N m]."""
+        return self._first
+
+    @property
+    def force(self) -> Array:
+        """Force (..., 3) [N]."""
+        return self._second
