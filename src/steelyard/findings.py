@@ -1,0 +1,48 @@
+"""Finding: there is an answer, and you must know this about it.
+
+One table gives every code its remedy; `docs/findings.md` has an entry for each. The message carries the numbers.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+REMEDIES: dict[str, str] = {
+    "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] (or "on-object" if it says "on-sensor" now).',
+    "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
+    "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
+    "force-unit": "Check the force and torque units of the wrench stream.",
+    "length-in-mm": 'Set unit = "mm" for positions, or unit = "N*mm" for torques.',
+    "quaternion-order": "Swap form between quaternion-wxyz and quaternion-xyzw.",
+    "base-tilted": "Level the base, or correct [log] gravity to the direction found.",
+    "stream-delayed": "Give delay = { value = .., unit = 'ms' } for this stream so that it is not estimated anew.",
+    "imu-rotated": "Give mount = { rotation = .. } for this stream so that it is not estimated anew.",
+    "clock-missing": "Record a time column, or give time = { rate = .. }, so that delay and noise can be judged.",
+    "rows-duplicated": "Log each sensor sample once; repeated rows were left out.",
+    "channel-stuck": "Check the cable and the driver of this channel.",
+    "channel-saturated": "Lower the load or widen the sensor's range; clipped rows were left out.",
+    "bias-drift": "Warm the sensor up, tare just before the run, or record shorter runs.",
+    "outliers": "Nothing to do if knocks were expected; the rows were left out.",
+    "contact": "Keep people and fixtures off the object, then record again; the touched time was left out.",
+    "load-changed": "Record one run per load: cut the log where the load changed.",
+    "too-few-poses": "Add still poses whose gravity directions in S differ by more than 30 degrees.",
+    "nearly-planar": "Turn the object about a second axis as well, so that gravity visits all axes of S.",
+    "inertia-not-identified": "Turn the object faster about the weak axes, or add its shape with --scan.",
+    "prior-dominated": "Add faster rotation or the object's shape; the number shown is mostly the assumed prior.",
+    "noise-level-off": "Correct [noise], or leave it out so that it is estimated.",
+    "tool-included": "Give --tool (a result or a tool-only log) if you want the object alone.",
+}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """A code of `formats`, one sentence with the numbers, and what to do."""
+
+    code: str
+    message: str
+    remedy: str
+
+    @classmethod
+    def of(cls, code: str, message: str) -> Finding:
+        """Return the finding with the remedy of its code."""
+        return cls(code, message, REMEDIES[code])

@@ -1,0 +1,1 @@
+"""Estimators of the ten parameters and the one result type."""

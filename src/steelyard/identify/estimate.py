@@ -1,0 +1,101 @@
+"""Estimate: the one result type, with its error bars, evidence and findings."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.inertia import InertialParameters, forms
+
+
+@dataclass(frozen=True, eq=False)
+class Evidence:
+    """What the data had to say.
+
+    rank, condition     of the column-scaled regressor with the bias columns projected out
+    samples, still_samples   rows used, and those at rest
+    residual_force_N, residual_torque_Nm   rms per axis
+    chi2_per_dof        1 when the noise model fits; None without one
+    holdout_force_N, holdout_torque_Nm     rms error of predicting poses left out of the fit
+    spread              (10,) how far each parameter could move at equal fit: two standard deviations of the data alone
+    jackknife           (10,) leave-one-pose-out (or block) standard deviation of the parameters; None where too few
+    jackknife_people    (10,) the same for mass, com, inertia about the CoM
+    """
+
+    rank: int
+    condition: float
+    samples: int
+    still_samples: int
+    residual_force_N: float
+    residual_torque_Nm: float
+    chi2_per_dof: float | None = None
+    holdout_force_N: float | None = None
+    holdout_torque_Nm: float | None = None
+    spread: Array | None = None
+    jackknife: Array | None = None
+    jackknife_people: Array | None = None
+
+
+@dataclass(frozen=True, eq=False)
+class Estimate:
+    """Parameters (10,) about the origin of `frame`, with covariance (10, 10) and everything said about them.
+
+    identified   (10,) of mass, com x y z, inertia about the CoM xx xy xz yy yz zz
+    wrench_bias  (6,) [tau, f] in the recording's own sign and axes: what to subtract from the raw channels
+    wrench_bias_std  (6,) of the same
+    """
+
+    parameters: InertialParameters
+    covariance: Array
+    method: str
+    evidence: Evidence
+    identified: np.ndarray[Any, np.dtype[np.bool_]]
+    wrench_bias: Array = field(default_factory=lambda: np.zeros(6))
+    wrench_bias_std: Array = field(default_factory=lambda: np.zeros(6))
+    frame: str = "S"
+    delays_s: Mapping[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()
+
+    @cached_property
+    def people_covariance(self) -> Array:
+        """Covariance (10, 10) of mass, com, inertia about the CoM (first order)."""
+        jacobian = np.zeros((10, 10))
+        jacobian[0, 0] = 1
+        jacobian[1:] = forms.com_jacobian(self.parameters.vector)
+        return np.asarray(jacobian @ self.covariance @ jacobian.T)
+
+    @cached_property
+    def std(self) -> Array:
+        """Standard deviations (10,) of mass [kg], com [m], inertia about the CoM [kg m^2]."""
+        return np.sqrt(np.maximum(np.diag(self.people_covariance), 0))
+
+    @property
+    def mass(self) -> float:
+        """Mass [kg]."""
+        return float(self.parameters.mass)
+
+    @property
+    def com(self) -> Array:
+        """Centre of mass (3,) in `frame` [m]."""
+        return self.parameters.com
+
+    @property
+    def inertia_com(self) -> Array | None:
+        """Inertia about the centre of mass (3, 3) [kg m^2], None where the data do not fix all of it."""
+        return self.parameters.inertia_com if bool(self.identified[4:].all()) else None
+
+    def with_findings(self, *findings: Finding) -> Estimate:
+        """Return the estimate with more findings, one of each code and message."""
+        seen = {(f.code, f.message): f for f in (*self.findings, *findings)}
+        return replace(self, findings=tuple(seen.values()))
+
+    def codes(self) -> set[str]:
+        """Return the codes of all findings."""
+        return {f.code for f in self.findings}

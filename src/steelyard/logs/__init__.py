@@ -1,0 +1,1 @@
+"""Logs: raw streams on their own clocks, one aligned log, and its sufficient statistic."""

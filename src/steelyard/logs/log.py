@@ -1,0 +1,145 @@
+"""MotionLog: one body, one clock, everything in the sensor frame S; and the noise its channels carry."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.spatial import Pose, cross_matrix
+
+
+@dataclass(frozen=True, eq=False)
+class Noise:
+    """Variances of one class of rows, per axis of S.
+
+    acceleration  (6,) of [alpha (rad/s^2)^2, a (m/s^2)^2]
+    wrench        (6,) of [tau (N m)^2, f N^2]
+    """
+
+    acceleration: Array
+    wrench: Array
+
+    def __post_init__(self) -> None:
+        for name in ("acceleration", "wrench"):
+            value = check.vectors(f"{name} variance", getattr(self, name), 6)
+            if (value < 0).any():
+                raise BadValue(f"{name} variances must not be negative; got {value}.")
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def of_std(
+        cls, angular_acceleration: float, acceleration: float, force: float, torque: float
+    ) -> Noise:
+        """Return equal noise on the three axes from standard deviations (rad/s^2, m/s^2, N, N m)."""
+        pair = [[angular_acceleration, acceleration], [torque, force]]
+        return cls(*(np.repeat(np.square(p), 3) for p in pair))
+
+
+@dataclass(frozen=True, eq=False)
+class MotionLog:
+    """Aligned samples of one body held at S.
+
+    wrench                (N, 6) [tau, f] that the robot applies to the object, biased as the sensor reads it
+    gravity               (N, 3) [m/s^2] in S
+    acceleration          (N, 3) [m/s^2] classical, of the S origin, gravity not included
+    angular_velocity      (N, 3) [rad/s]
+    angular_acceleration  (N, 3) [rad/s^2]
+    time                  (N,) [s] or None: rows then have no order and no neighbours
+    still                 (N,) rows known to be at rest
+    pose                  (N,) number of the still pose or time block a row belongs to (for hold-out and jackknife);
+                          -1 = none
+    noise_class           (N,) index into `noise`
+    noise                 one Noise per class; None = not known yet
+    """
+
+    wrench: Array
+    gravity: Array
+    acceleration: Array
+    angular_velocity: Array
+    angular_acceleration: Array
+    time: Array | None = None
+    still: np.ndarray[Any, np.dtype[np.bool_]] | None = None
+    pose: np.ndarray[Any, np.dtype[np.int64]] | None = None
+    noise_class: np.ndarray[Any, np.dtype[np.int64]] | None = None
+    noise: tuple[Noise, ...] | None = None
+
+    def __post_init__(self) -> None:
+        rows = len(self.wrench)
+        object.__setattr__(self, "wrench", check.vectors("wrench", self.wrench, 6))
+        for name in ("gravity", "acceleration", "angular_velocity", "angular_acceleration"):
+            object.__setattr__(self, name, check.vectors(name, getattr(self, name), 3))
+        if self.time is not None:
+            object.__setattr__(self, "time", check.vectors("time", self.time, rows))
+        defaults = {"still": (np.bool_, False), "pose": (np.int64, -1), "noise_class": (np.int64, 0)}
+        for name, (kind, default) in defaults.items():
+            given = getattr(self, name)
+            value = np.full(rows, default, kind) if given is None else np.asarray(given, kind)
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+        self._check_lengths(rows)
+
+    def _check_lengths(self, rows: int) -> None:
+        for name in self._row_fields():
+            value = getattr(self, name)
+            if value is not None and len(value) != rows:
+                raise BadValue(f"{name} has {len(value)} rows, wrench has {rows}; they must agree.")
+
+    @staticmethod
+    def _row_fields() -> tuple[str, ...]:
+        return (
+            "wrench", "gravity", "acceleration", "angular_velocity", "angular_acceleration",
+            "time", "still", "pose", "noise_class",
+        )  # fmt: skip
+
+    def __len__(self) -> int:
+        return len(self.wrench)
+
+    def rows(self, index: Any) -> MotionLog:
+        """Return the chosen rows (mask, slice or indices)."""
+        chosen = {n: getattr(self, n)[index] for n in self._row_fields() if getattr(self, n) is not None}
+        return replace(self, **chosen)
+
+    def in_frame(self, X_AS: Pose) -> MotionLog:
+        """Return the same log as a sensor at frame A, fixed to S, would have recorded it (noise is dropped)."""
+        R, p = X_AS.rotation, X_AS.position
+        omega, alpha = R.apply(self.angular_velocity), R.apply(self.angular_acceleration)
+        lever = np.cross(alpha, p) + np.cross(omega, np.cross(omega, p))
+        force = R.apply(self.wrench[:, 3:])
+        torque = R.apply(self.wrench[:, :3]) + np.cross(p, force)
+        return replace(
+            self,
+            wrench=np.concatenate([torque, force], 1),
+            gravity=R.apply(self.gravity),
+            acceleration=R.apply(self.acceleration) - lever,
+            angular_velocity=omega,
+            angular_acceleration=alpha,
+            noise=None,
+        )
+
+    @classmethod
+    def of_poses(cls, wrench: Array, gravity: Array) -> MotionLog:
+        """Return the log of still poses: wrench (N, 6), gravity in S (N, 3); each row is its own pose."""
+        zero = np.zeros((len(wrench), 3))
+        rows = len(wrench)
+        return cls(
+            wrench, gravity, zero, zero, zero, still=np.ones(rows, np.bool_), pose=np.arange(rows, dtype=np.int64)
+        )
+
+    def predicted(self, phi: Array) -> Array:
+        """Return the wrench (N, 6) that a body phi (10,) needs for this motion, without bias."""
+        m, h = phi[0], phi[1:4]
+        inertia = phi[[[4, 5, 6], [5, 7, 8], [6, 8, 9]]]
+        a = self.acceleration - self.gravity
+        omega, alpha = self.angular_velocity, self.angular_acceleration
+        H = cross_matrix(h)
+        turn = np.cross(omega, np.cross(omega, h))
+        force = m * a - alpha @ H.T + turn
+        torque = a @ H.T + alpha @ inertia + np.cross(omega, omega @ inertia)
+        return np.concatenate([torque, force], 1)
+
+

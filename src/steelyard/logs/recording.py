@@ -1,0 +1,83 @@
+"""Recording: what was read from files, before anything is aligned. Streams keep their own clocks and frames; units are SI."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from steelyard.check import Array
+from steelyard.inertia import InertialParameters
+from steelyard.spatial import Pose, Rotation
+
+STANDARD_GRAVITY = 9.80665
+
+# Quantity -> number of columns (rotation is stored as matrices).
+QUANTITIES: dict[str, int] = {
+    "force": 3,
+    "torque": 3,
+    "rotation": 9,
+    "position": 3,
+    "linear_velocity": 3,
+    "angular_velocity": 3,
+    "linear_acceleration": 3,
+    "angular_acceleration": 3,
+    "specific_force": 3,
+    "gravity": 3,
+}
+
+
+@dataclass(frozen=True)
+class Mount:
+    """Pose of a stream's own frame in S; `rotation` or `position` (m) is None where it was not given."""
+
+    rotation: Rotation | None = None
+    position: Array | None = None
+
+
+@dataclass(frozen=True)
+class Stream:
+    """One file or topic, one clock.
+
+    name      the path as the description writes it: the key of `delays_s` and of messages
+    time      (N,) [s] on the stream's own clock, strictly rising; None without a clock
+    channels  quantity -> (N, 3), or (N, 3, 3) for rotation (S to W); SI units
+    frames    quantity -> "S" (default) or "W" for vectors that may be given in base axes
+    delay     [s] its stamps are late by this much; None = not given, so to be estimated
+    mount     pose of the stream's own frame in S; None = S itself (for an accelerometer: to be estimated)
+    poses     a table of still poses without time: rows of such streams belong together
+    """
+
+    name: str
+    channels: Mapping[str, Array]
+    time: Array | None = None
+    frames: Mapping[str, str] = field(default_factory=dict)
+    delay: float | None = None
+    mount: Mount | None = None
+    poses: bool = False
+
+    def __len__(self) -> int:
+        return len(next(iter(self.channels.values())))
+
+
+@dataclass(frozen=True)
+class Recording:
+    """Everything one description names.
+
+    gravity       (3,) [m/s^2] in W
+    wrench_sign   +1: the wrench is what the robot applies to the object; -1: the reaction (on-sensor)
+    noise         declared standard deviations: force [N], torque [N m], acceleration [m/s^2],
+                  angular_acceleration [rad/s^2]; missing ones are estimated
+    tool          a known body to subtract, in S
+    tool_result   the path of the result `tool` came from, for messages
+    object_pose   pose of the scan's frame O in S, with its uncertainty (m, rad)
+    """
+
+    streams: tuple[Stream, ...]
+    gravity: Array
+    wrench_sign: int = 1
+    noise: Mapping[str, float] = field(default_factory=dict)
+    tool: InertialParameters | None = None
+    tool_result: str | None = None
+    object_pose: Pose | None = None
+    object_pose_std: tuple[float, float] | None = None
+    name: str = "log"
