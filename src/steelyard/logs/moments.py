@@ -1,0 +1,201 @@
+"""Moments: the sufficient statistic of a log, one 19 x 19 scatter matrix per group of rows.
+
+With z = [alpha (3), a - g (3), omega omega^T (xx xy xz yy yz zz), tau (3), f (3), 1] a group keeps sum z z^T. Ordinary,
+weighted and noise-aware least squares, part masses and a constant bias need nothing else, whatever the length of the
+log. A group is one noise class within one time block or still pose. Groups of logs of one body add; a stream forgets by scaling.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadValue
+from steelyard.logs.log import MotionLog, Noise
+
+SIZE = 19
+ALPHA, ACCEL, OMEGA2, TORQUE, FORCE, ONE = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 15), slice(15, 18), 18
+MOTION, WRENCH = slice(0, 12), slice(12, 18)
+
+_CHUNK = 128
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+
+@numba.njit(cache=True, fastmath=True, nogil=True)
+def _features(
+    alpha: Array, accel: Array, gravity: Array, omega: Array, wrench: Array, start: int, rows: int, out: Array
+) -> None:
+    """Write z of rows start..start+rows into out (19, chunk), features first so that products run along memory."""
+    for k in range(rows):
+        i = start + k
+        for j in range(3):
+            out[j, k] = alpha[i, j]
+            out[3 + j, k] = accel[i, j] - gravity[i, j]
+        x, y, z = omega[i, 0], omega[i, 1], omega[i, 2]
+        out[6, k], out[7, k], out[8, k] = x * x, x * y, x * z
+        out[9, k], out[10, k], out[11, k] = y * y, y * z, z * z
+        for j in range(6):
+            out[12 + j, k] = wrench[i, j]
+        out[18, k] = 1.0
+
+
+@numba.njit(cache=True, fastmath=True, nogil=True)
+def _scatter_pass(
+    alpha: Array, accel: Array, gravity: Array, omega: Array, wrench: Array, bounds: Integers, out: Array
+) -> None:
+    """Add z z^T of the rows bounds[g]..bounds[g+1] to out[g], in one pass over memory."""
+    buffer = np.empty((SIZE, _CHUNK))
+    for group in range(len(bounds) - 1):
+        for start in range(bounds[group], bounds[group + 1], _CHUNK):
+            rows = min(_CHUNK, bounds[group + 1] - start)
+            _features(alpha, accel, gravity, omega, wrench, start, rows, buffer)
+            for i in range(SIZE):
+                for j in range(i, SIZE):
+                    total = 0.0
+                    for k in range(rows):
+                        total += buffer[i, k] * buffer[j, k]
+                    out[group, i, j] += total
+        for i in range(SIZE):
+            for j in range(i):
+                out[group, i, j] = out[group, j, i]
+
+
+@dataclass(frozen=True, eq=False)
+class Moments:
+    """Scatter matrices (G, 19, 19) of G groups of rows.
+
+    noise_class  (G,) index into `noise`
+    block        (G,) still pose or time block, -1 where there is none
+    still        (G,) whether the rows are at rest
+    noise        one Noise per class, or None where it is not known
+    """
+
+    scatter: Array
+    noise_class: Integers
+    block: Integers
+    still: np.ndarray[Any, np.dtype[np.bool_]]
+    noise: tuple[Noise, ...] | None = None
+
+    @classmethod
+    def of_log(cls, log: MotionLog, by_block: bool = True) -> Moments:
+        """Return the statistic of a log, grouped by noise class, stillness and (by default) block."""
+        groups, label = _groups(log, by_block)
+        if (label[1:] < label[:-1]).any():
+            order = np.argsort(label, kind="stable")
+            log, label = log.rows(order), label[order]
+        bounds = np.searchsorted(label, np.arange(len(groups) + 1)).astype(np.int64)
+        out = np.zeros((len(groups), SIZE, SIZE))
+        _scatter_pass(
+            log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench, bounds, out
+        )
+        return cls(out, groups[:, 0], groups[:, 1], groups[:, 2].astype(np.bool_), log.noise)
+
+    @classmethod
+    def total(cls, parts: Iterable[Moments]) -> Moments:
+        """Return the statistic of several logs of one body taken together."""
+        return sum_of(list(parts))
+
+    def __add__(self, other: Moments) -> Moments:
+        return sum_of([self, other])
+
+    def scaled(self, factor: float) -> Moments:
+        """Return the statistic with every row weighted by `factor` (forgetting)."""
+        return Moments(self.scatter * factor, self.noise_class, self.block, self.still, self.noise)
+
+    def where(self, keep: np.ndarray[Any, np.dtype[np.bool_]]) -> Moments:
+        """Return the statistic of the groups where `keep` (G,) is true."""
+        return Moments(self.scatter[keep], self.noise_class[keep], self.block[keep], self.still[keep], self.noise)
+
+    def by_class(self) -> Moments:
+        """Return the statistic with blocks added up: one group per noise class and stillness."""
+        keys = np.stack([self.noise_class, self.still.astype(np.int64)], 1)
+        groups, label = np.unique(keys, axis=0, return_inverse=True)
+        out = np.zeros((len(groups), SIZE, SIZE))
+        np.add.at(out, label, self.scatter)
+        return Moments(out, groups[:, 0], np.full(len(groups), -1), groups[:, 1].astype(np.bool_), self.noise)
+
+    @cached_property
+    def sum(self) -> Array:
+        """The scatter matrix (19, 19) of all rows."""
+        return np.asarray(self.scatter.sum(0))
+
+    @property
+    def counts(self) -> Array:
+        """Rows per group (G,)."""
+        return self.scatter[:, ONE, ONE]
+
+    @property
+    def samples(self) -> float:
+        """Rows in all."""
+        return float(self.counts.sum())
+
+    def save(self, path: Path) -> None:
+        """Write the statistic as NPZ."""
+        noise = self.noise or ()
+        with open(path, "wb") as file:
+            np.savez(
+                file,
+                scatter=self.scatter,
+                noise_class=self.noise_class,
+                block=self.block,
+                still=self.still,
+                acceleration_variance=np.array([n.acceleration for n in noise]).reshape(-1, 6),
+                wrench_variance=np.array([n.wrench for n in noise]).reshape(-1, 6),
+            )
+
+    @classmethod
+    def load(cls, path: Path) -> Moments:
+        """Read what `save` wrote."""
+        try:
+            with np.load(path, allow_pickle=False) as data:
+                pairs = zip(data["acceleration_variance"], data["wrench_variance"], strict=True)
+                noise = tuple(Noise(a, w) for a, w in pairs)
+                scatter = check.matrices("scatter", data["scatter"], SIZE, SIZE)
+                return cls(scatter, data["noise_class"], data["block"], data["still"], noise or None)
+        except (OSError, KeyError, ValueError) as error:
+            raise BadFile(f"{path} does not hold saved moments ({error}). Write one with Moments.save.") from None
+
+
+def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:
+    """Return the groups present (G, 3: class, block, still) and the group of every row, by counting (no sort)."""
+    if not len(log):
+        return np.zeros((0, 3), np.int64), np.zeros(0, np.int64)
+    block = log.pose if by_block else np.full(1, -1)
+    blocks = int(block.max()) + 2
+    key = (2 * log.noise_class + log.still) * blocks + (block + 1)
+    present = np.flatnonzero(np.bincount(key))
+    rank = np.zeros(int(present[-1]) + 1, np.int64)
+    rank[present] = np.arange(len(present))
+    kind, position = np.divmod(present, blocks)
+    return np.stack([kind // 2, position - 1, kind % 2], 1), rank[key]
+
+
+def sum_of(parts: list[Moments]) -> Moments:
+    """Return the statistic of several logs; groups with the same class, stillness and block are added."""
+    if not parts:
+        raise BadValue("There must be at least one statistic to add; got none.")
+    noise = parts[0].noise
+    if any(_differ(noise, p.noise) for p in parts[1:]):
+        raise BadValue("Statistics can be added only where their noise classes are the same; these differ.")
+    keys = np.concatenate([np.stack([p.noise_class, p.still, p.block], 1).astype(np.int64) for p in parts])
+    groups, label = np.unique(keys, axis=0, return_inverse=True)
+    out = np.zeros((len(groups), SIZE, SIZE))
+    np.add.at(out, label, np.concatenate([p.scatter for p in parts]))
+    return Moments(out, groups[:, 0], groups[:, 2], groups[:, 1].astype(np.bool_), noise)
+
+
+def _differ(one: tuple[Noise, ...] | None, other: tuple[Noise, ...] | None) -> bool:
+    if one is None or other is None:
+        return one is not other
+    return len(one) != len(other) or any(
+        not (np.array_equal(a.acceleration, b.acceleration) and np.array_equal(a.wrench, b.wrench))
+        for a, b in zip(one, other, strict=True)
+    )
