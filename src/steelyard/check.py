@@ -10,11 +10,12 @@ from numpy.typing import ArrayLike, NDArray
 from steelyard.errors import BadValue
 
 Array = NDArray[np.float64]
+_IDENTITY = np.eye(3)
 
 
 def frozen(values: Any) -> Array:
-    """Return a read-only, contiguous float64 array; a read-only float64 array passes through uncopied."""
-    array = np.ascontiguousarray(values, dtype=np.float64)
+    """Return a read-only, contiguous float64 array of the same shape; a read-only one passes through uncopied."""
+    array = np.asarray(values, dtype=np.float64, order="C")
     if array.flags.writeable:
         if array is values or array.base is not None:
             array = array.copy()
@@ -28,10 +29,11 @@ def finite(name: str, values: ArrayLike) -> Array:
         array = frozen(values)
     except (TypeError, ValueError) as error:
         raise BadValue(f"{name} must be numbers; got {type(values).__name__} ({error}).") from None
-    bad = ~np.isfinite(array)
-    if bad.any():
-        where = tuple(int(i) for i in np.argwhere(bad)[0])
-        raise BadValue(f"{name} must be finite; {int(bad.sum())} entries are not, the first at index {where}.")
+    good = np.isfinite(array)
+    if not good.all():
+        bad = np.argwhere(~good)
+        where = tuple(int(i) for i in bad[0])
+        raise BadValue(f"{name} must be finite; {len(bad)} entries are not, the first at index {where}.")
     return array
 
 
@@ -53,22 +55,25 @@ def matrices(name: str, values: ArrayLike, rows: int = 3, columns: int = 3) -> A
 
 def positive(name: str, value: float) -> float:
     """Return `value` as a float above zero."""
-    number = float(value)
-    if not (np.isfinite(number) and number > 0):
-        raise BadValue(f"{name} must be a finite number above zero; got {number}.")
+    try:
+        number = float(value)
+    except (TypeError, ValueError):
+        raise BadValue(f"{name} must be a number; got {value!r}.") from None
+    if not 0 < number < float("inf"):
+        raise BadValue(f"{name} must be a finite number above zero; got {number:g}.")
     return number
 
 
 def rotations(name: str, values: ArrayLike, tolerance: float = 1e-6) -> Array:
     """Return `values` as rotation matrices (..., 3, 3), or name the worst one and how far off it is."""
     array = matrices(name, values)
-    error = np.abs(np.einsum("...ji,...jk->...ik", array, array) - np.eye(3)).max(axis=(-1, -2))
-    if error.size and float(error.max()) > tolerance:
-        worst = np.unravel_index(int(np.argmax(error)), error.shape) if error.ndim else ()
+    error = np.abs(np.swapaxes(array, -1, -2) @ array - _IDENTITY)
+    if error.size and error.max() > tolerance:
+        worst = tuple(int(i) for i in np.unravel_index(int(error.argmax()), error.shape)[:-2])
         raise BadValue(
-            f"{name} must be orthonormal; entry {tuple(int(i) for i in worst)} is off by {float(error.max()):.2g} "
+            f"{name} must be orthonormal; {f'entry {worst}' if worst else 'it'} is off by {error.max():.2g} "
             f"in R^T R (tolerance {tolerance:g})."
         )
-    if array.size and float(np.linalg.det(array).min()) < 0:
+    if array.size and np.linalg.det(array).min() < 0:
         raise BadValue(f"{name} must be right-handed; at least one has determinant -1 (a mirror image).")
     return array
