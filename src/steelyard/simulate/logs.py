@@ -1,0 +1,123 @@
+"""Logs of a known body: exact Newton-Euler wrenches along an exact motion, then noise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.inertia import InertialParameters
+from steelyard.logs.log import MotionLog, Noise
+from steelyard.simulate import scenarios
+from steelyard.simulate.motions import Kinematics, Motion
+from steelyard.simulate.noise import Spectrum, unit_noise
+
+
+def bounds(object_name: str) -> Array:
+    """Return the lower and upper corner (2, 3) [m] of the bench object's true bounding box in S."""
+    return scenarios.body(object_name).bounds()
+
+
+def simulate_log(
+    object_name: str,
+    motion_name: str,
+    noise_name: str,
+    seed: int,
+    *,
+    shuffled: bool = True,
+    spectrum: Spectrum = "white",
+    bias: ArrayLike | None = None,
+    repeats: int = 1,
+) -> tuple[MotionLog, InertialParameters]:
+    """Return the log of a bench object and its true parameters.
+
+    The noise of every (seed, object, motion, level) is its own draw. `bias` (6,) [tau N m, f N] is added to
+    the wrench. `shuffled` rows come in a seeded random order without time and pose numbers; ordered rows keep
+    both (still rows carry the number of their pose, moving rows -1). `repeats` plays the motion again and
+    again, each time with new noise. The log declares its true noise; the level "none" declares nothing.
+
+    Source: `rules` of the embedded bench.
+    """
+    names = (scenarios.object_names(), scenarios.motion_names(), scenarios.noise_names())
+    body, motion, std = (
+        scenarios.body(object_name),
+        scenarios.motion(motion_name),
+        scenarios.noise_std(noise_name),
+    )
+    chosen = (object_name, motion_name, noise_name)
+    rng = np.random.default_rng([seed, *(group.index(n) for group, n in zip(names, chosen, strict=True))])
+    bench = scenarios.bench()
+    log = log_of(
+        body.parameters(),
+        motion,
+        std,
+        rng,
+        samples=int(bench["samples"]),
+        rate=float(bench["rate_hz"]),
+        gravity=np.array(bench["gravity_world"], float),
+        spectrum=spectrum,
+        bias=bias,
+        repeats=repeats,
+    )
+    return (_shuffled(log, rng) if shuffled else log), body.parameters()
+
+
+def log_of(
+    body: InertialParameters,
+    motion: Motion,
+    std: tuple[float, float, float, float],
+    rng: np.random.Generator,
+    *,
+    samples: int = 1000,
+    rate: float = 100.0,
+    gravity: ArrayLike = (0.0, 0.0, -9.81),
+    spectrum: Spectrum = "white",
+    bias: ArrayLike | None = None,
+    repeats: int = 1,
+) -> MotionLog:
+    """Return the ordered log of `body` (in S) along `motion`, sampled at `rate` [Hz] from time zero.
+
+    `std` of angular acceleration, acceleration, force, torque (rad/s^2, m/s^2, N, N m), independent per axis;
+    `gravity` (3,) [m/s^2] in W, seen from S, and angular velocity stay exact. `bias` (6,) [tau, f] is added
+    to the wrench.
+    """
+    seen = motion.at(np.arange(samples) / rate)
+    exact = _exact(body, seen, check.vectors("gravity", gravity))
+    rows = samples * repeats
+    angular, linear, force, torque = std
+    noise = unit_noise(rng, rows, 12, spectrum, rate) * np.repeat([angular, linear, torque, force], 3)
+    offset = np.zeros(6) if bias is None else check.vectors("bias", bias, 6)
+    return MotionLog(
+        wrench=np.tile(exact.wrench, (repeats, 1)) + noise[:, 6:] + offset,
+        gravity=np.tile(exact.gravity, (repeats, 1)),
+        acceleration=np.tile(exact.acceleration, (repeats, 1)) + noise[:, 3:6],
+        angular_velocity=np.tile(exact.angular_velocity, (repeats, 1)),
+        angular_acceleration=np.tile(exact.angular_acceleration, (repeats, 1)) + noise[:, :3],
+        time=np.arange(rows) / rate,
+        still=None if exact.still is None else np.tile(exact.still, repeats),
+        pose=None if exact.pose is None else np.tile(exact.pose, repeats),
+        noise=(Noise.of_std(*std),) if all(std) else None,
+    )
+
+
+def _exact(body: InertialParameters, seen: Kinematics, gravity: Array) -> MotionLog:
+    """Return the log without noise."""
+    still = seen.at_rest(scenarios.STILL_SPEED, scenarios.STILL_ANGULAR_SPEED)
+    motion = MotionLog(
+        wrench=np.zeros((len(seen.time), 6)),
+        gravity=seen.rotation.inverse().apply(gravity),
+        acceleration=seen.acceleration,
+        angular_velocity=seen.angular_velocity,
+        angular_acceleration=seen.angular_acceleration,
+        still=still,
+        pose=np.where(still, seen.pose, -1),
+    )
+    return replace(motion, wrench=motion.predicted(body.vector))
+
+
+def _shuffled(log: MotionLog, rng: np.random.Generator) -> MotionLog:
+    """Return the rows in random order, stripped of time and pose number."""
+    return replace(log.rows(rng.permutation(len(log))), time=None, pose=None)
