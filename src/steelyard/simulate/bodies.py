@@ -38,9 +38,7 @@ class BoxUnion:
         total = InertialParameters(np.zeros(10))
         for size, centre, density in zip(self.size, self.centre, self.density, strict=True):
             box = solids.box(float(size[0]), float(size[1]), float(size[2]), float(density))
-            total = total + solids.box(float(size[0]), float(size[1]), float(size[2]), density).in_frame(
-                Pose(Rotation.identity(), centre)
-            )
+            total = total + box.in_frame(Pose(Rotation.identity(), centre))
         return total
 
     def bounds(self) -> Array:
