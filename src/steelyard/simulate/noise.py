@@ -20,8 +20,8 @@ def unit_noise(rng: np.random.Generator, rows: int, columns: int, spectrum: Spec
     """Return noise (rows, columns) of standard deviation 1, columns independent, sampled at `rate` [Hz].
 
     "white": independent rows. "2hz": white noise through a digital second-order Butterworth low-pass
-    (bilinear) with its -3 dB point at 2 Hz, divided by the filter's own gain for white noise, after 5 s of settling
-    from rest (the transient is then below 1e-19): stationary from the first row.
+    (bilinear) with its -3 dB point at 2 Hz, divided by the filter's own gain for white noise, after 5 s of
+    settling from rest (the transient is then below 1e-19): stationary from the first row.
     """
     if spectrum == "white":
         return rng.standard_normal((rows, columns))
