@@ -1,7 +1,8 @@
 """Linear and nonlinear forms of the ten parameters, as functions of plain arrays.
 
-The order is m, h_x, h_y, h_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz: mass [kg], first moment [kg m] and the rotational
-inertia about the frame origin [kg m^2] with tensor off-diagonals (I_xy = -sum m x y).
+The order is m, h_x, h_y, h_z, I_xx, I_xy, I_xz, I_yy, I_yz, I_zz: mass [kg], first moment [kg m] and the
+rotational inertia about the frame origin [kg m^2] with tensor off-diagonals (I_xy = -sum m x y). Nothing is
+checked here: these run inside the estimators' loops.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ import numpy as np
 from steelyard.check import Array
 
 UPPER = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
+_SHEAR = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))  # places in U of s12, s23, s13, t1, t2, t3
 
 
 def inertia_matrix(phi: Array) -> Array:
@@ -21,6 +23,23 @@ def inertia_matrix(phi: Array) -> Array:
 def upper(matrix: Array) -> Array:
     """Return the entries xx xy xz yy yz zz (..., 6) of symmetric (..., 3, 3)."""
     return np.asarray(matrix[..., [0, 0, 0, 1, 1, 2], [0, 1, 2, 1, 2, 2]])
+
+
+def point_inertia(point: Array) -> Array:
+    """Return |c|^2 1 - c c^T (..., 3, 3), the inertia of 1 kg at `point` (..., 3) about the origin [m^2]."""
+    square = (point * point).sum(-1)[..., None, None]
+    return np.asarray(square * np.eye(3) - point[..., :, None] * point[..., None, :])
+
+
+def com(phi: Array) -> Array:
+    """Return the centre of mass (..., 3) [m] from (..., 10); NaN where the mass is zero."""
+    mass = phi[..., :1]
+    return np.asarray(phi[..., 1:4] / np.where(mass == 0, np.nan, mass))
+
+
+def inertia_com(phi: Array) -> Array:
+    """Return the inertia about the centre of mass (..., 3, 3) [kg m^2]; NaN where the mass is zero."""
+    return np.asarray(inertia_matrix(phi) - phi[..., 0, None, None] * point_inertia(com(phi)))
 
 
 def pseudo_inertia(phi: Array) -> Array:
@@ -45,7 +64,7 @@ def from_pseudo_inertia(pseudo: Array) -> Array:
 
 
 def log_cholesky(pseudo: Array) -> Array:
-    """Return theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] (..., 10) of positive definite P (..., 4, 4).
+    """Return theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3] (..., 10) of P (..., 4, 4), P > 0.
 
     P = U U^T with U = e^alpha [[e^d1, s12, s13, t1], [0, e^d2, s23, t2], [0, 0, e^d3, t3], [0, 0, 0, 1]].
     Source: Rucker and Wensing 2022, eq. 8-9.
@@ -55,7 +74,7 @@ def log_cholesky(pseudo: Array) -> Array:
     unit = u / u[..., 3:, 3:]
     theta = [np.log(u[..., 3, 3])]
     theta += [np.log(unit[..., i, i]) for i in range(3)]
-    theta += [unit[..., i, j] for i, j in ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))]
+    theta += [unit[..., i, j] for i, j in _SHEAR]
     return np.stack(theta, axis=-1)
 
 
@@ -64,7 +83,7 @@ def log_cholesky_factor(theta: Array) -> Array:
     u = np.zeros((*theta.shape[:-1], 4, 4))
     for i in range(3):
         u[..., i, i] = np.exp(theta[..., 1 + i])
-    for k, (i, j) in enumerate(((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))):
+    for k, (i, j) in enumerate(_SHEAR):
         u[..., i, j] = theta[..., 4 + k]
     u[..., 3, 3] = 1
     return np.asarray(np.exp(theta[..., 0])[..., None, None] * u)
@@ -88,7 +107,7 @@ def log_cholesky_jacobian(theta: Array) -> Array:
         elif k <= 3:
             du[..., k - 1, k - 1] = u[..., k - 1, k - 1]
         else:
-            i, j = ((0, 1), (1, 2), (0, 2), (0, 3), (1, 3), (2, 3))[k - 4]
+            i, j = _SHEAR[k - 4]
             du[..., i, j] = scale
         half = du @ np.swapaxes(u, -1, -2)
         columns.append(from_pseudo_inertia(half + np.swapaxes(half, -1, -2)))

@@ -11,30 +11,16 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.inertia import forms
-from steelyard.spatial import Pose, Rotation, cross_matrix
-
-
-@dataclass(frozen=True)
-class ValidityReport:
-    """Which laws of rigid bodies hold; `problems` names each broken one with its numbers."""
-
-    problems: tuple[str, ...]
-
-    @property
-    def consistent(self) -> bool:
-        """Whether a body with positive mass everywhere can have these parameters."""
-        return not self.problems
-
-    def __str__(self) -> str:
-        return "physically consistent" if self.consistent else "; ".join(self.problems)
+from steelyard.inertia import forms, validity
+from steelyard.inertia.validity import ValidityReport
+from steelyard.spatial import Pose, Rotation
 
 
 @dataclass(frozen=True, eq=False)
 class InertialParameters:
-    """Ten parameters (..., 10) about the frame origin: m, h (3), I xx xy xz yy yz zz.
+    """Ten parameters (..., 10) about the frame origin: m, h (3), I xx xy xz yy yz zz (see `forms`).
 
-    Any finite numbers are accepted, consistent or not: `validity()` judges them, `require_consistent()` refuses.
+    Any finite numbers are accepted: `validity()` judges them, `require_consistent()` refuses bad ones.
     """
 
     vector: Array
@@ -44,21 +30,31 @@ class InertialParameters:
 
     @classmethod
     def from_com(cls, mass: ArrayLike, com: ArrayLike, inertia_com: ArrayLike) -> InertialParameters:
-        """Return the body of `mass` (...) [kg], `com` (..., 3) [m], inertia about the CoM (..., 3, 3) [kg m^2]."""
+        """Return the body with the values people read; the batch shapes broadcast.
+
+        mass         (...) [kg]
+        com          (..., 3) centre of mass in the frame [m]
+        inertia_com  (..., 3, 3) about the centre of mass in the frame's axes [kg m^2], symmetric
+        """
         m = check.finite("mass", mass)[..., None]
         c = check.vectors("centre of mass", com)
-        central = check.matrices("inertia about the centre of mass", inertia_com)
-        asymmetry = float(np.abs(central - np.swapaxes(central, -1, -2)).max(initial=0.0))
-        if asymmetry > 1e-9 * float(np.abs(central).max(initial=0.0)) + 1e-15:
-            raise BadValue(f"inertia must be symmetric; it differs from its transpose by {asymmetry:.3g} kg m^2.")
-        k = cross_matrix(c)
-        inertia = central - m[..., None] * (k @ k)
-        return cls(np.concatenate([m, m * c, forms.upper(inertia)], axis=-1))
+        central = _symmetric("inertia about the centre of mass", inertia_com)
+        try:
+            batch = np.broadcast_shapes(m.shape[:-1], c.shape[:-1], central.shape[:-2])
+        except ValueError:
+            raise BadValue(
+                "mass, centre of mass and inertia must have batch shapes that broadcast; "
+                f"got {m.shape[:-1]}, {c.shape[:-1]} and {central.shape[:-2]}."
+            ) from None
+        phi = np.empty((*batch, 10))
+        phi[..., :1], phi[..., 1:4] = m, m * c
+        phi[..., 4:] = forms.upper(central) + m * forms.upper(forms.point_inertia(c))
+        return cls(phi)
 
     @classmethod
     def from_pseudo_inertia(cls, pseudo: ArrayLike) -> InertialParameters:
-        """Return the body of the pseudo-inertia (..., 4, 4)."""
-        return cls(forms.from_pseudo_inertia(check.matrices("pseudo-inertia", pseudo, 4, 4)))
+        """Return the body of the symmetric pseudo-inertia (..., 4, 4) [kg m^2, kg m, kg]."""
+        return cls(forms.from_pseudo_inertia(_symmetric("pseudo-inertia", pseudo, 4)))
 
     @classmethod
     def from_log_cholesky(cls, theta: ArrayLike) -> InertialParameters:
@@ -67,10 +63,14 @@ class InertialParameters:
 
     @classmethod
     def from_point_masses(cls, masses: ArrayLike, points: ArrayLike) -> InertialParameters:
-        """Return the body of point masses (n,) [kg] at points (n, 3) [m]."""
-        m, p = check.vectors("masses", masses, np.size(masses)), check.vectors("points", points)
+        """Return the body of point masses (n,) [kg] at points (n, 3) [m] in the frame."""
+        m, p = check.finite("masses", masses), check.vectors("points", points)
+        if m.ndim != 1 or p.shape != (*m.shape, 3):
+            raise BadValue(
+                f"masses and points must have shapes (n,) and (n, 3); got {m.shape} and {p.shape}."
+            )
         homogeneous = np.column_stack([p, np.ones(len(p))])
-        return cls.from_pseudo_inertia(np.einsum("n,ni,nj->ij", m, homogeneous, homogeneous))
+        return cls(forms.from_pseudo_inertia((m * homogeneous.T) @ homogeneous))
 
     @property
     def mass(self) -> Array:
@@ -84,9 +84,8 @@ class InertialParameters:
 
     @property
     def com(self) -> Array:
-        """Centre of mass (..., 3) [m]; NaN where the mass is zero."""
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.asarray(self.first_moment / self.mass[..., None])
+        """Centre of mass (..., 3) in the frame [m]; NaN where the mass is zero."""
+        return forms.com(self.vector)
 
     @property
     def inertia(self) -> Array:
@@ -95,9 +94,8 @@ class InertialParameters:
 
     @property
     def inertia_com(self) -> Array:
-        """Inertia about the centre of mass in the axes of the frame (..., 3, 3) [kg m^2]."""
-        k = cross_matrix(self.com)
-        return np.asarray(self.inertia + self.mass[..., None, None] * (k @ k))
+        """Inertia about the centre of mass (..., 3, 3) [kg m^2] in the frame's axes; NaN for mass zero."""
+        return forms.inertia_com(self.vector)
 
     @property
     def pseudo_inertia(self) -> Array:
@@ -107,14 +105,24 @@ class InertialParameters:
     def log_cholesky(self) -> Array:
         """Return log-Cholesky coordinates (..., 10); raises BadValue where the body is not consistent."""
         self.require_consistent()
-        return forms.log_cholesky(self.pseudo_inertia)
+        try:
+            return forms.log_cholesky(self.pseudo_inertia)
+        except np.linalg.LinAlgError:
+            raise BadValue(
+                "This body is flat to the last digit: its pseudo-inertia is not positive definite, "
+                "so it has no log-Cholesky coordinates."
+            ) from None
 
     def principal(self) -> tuple[Array, Pose]:
-        """Return principal moments (..., 3), rising [kg m^2], and the pose of the principal frame.
+        """Return principal moments (..., 3), rising [kg m^2], and the principal frame's pose in this one.
 
-        The frame sits at the centre of mass, is right-handed, and each axis has its largest component positive where
-        handedness allows, so that the answer does not jump between runs.
+        The frame sits at the centre of mass, is right-handed, and each axis has its largest component
+        positive where handedness allows, so that the answer does not jump between runs. Axes of equal moments
+        are arbitrary.
+        Raises BadValue where the mass is zero.
         """
+        if (self.mass == 0).any():
+            raise BadValue("A body of mass zero has no centre of mass and so no principal frame.")
         moments, axes = np.linalg.eigh(self.inertia_com)
         biggest = np.take_along_axis(axes, np.abs(axes).argmax(-2)[..., None, :], -2)
         axes = axes * np.where(biggest < 0, -1.0, 1.0)
@@ -122,10 +130,9 @@ class InertialParameters:
         return moments, Pose(Rotation(axes), self.com)
 
     def in_frame(self, X_AB: Pose) -> InertialParameters:
-        """Return the same body, given in B, seen from frame A."""
-        return InertialParameters.from_pseudo_inertia(
-            X_AB.matrix() @ self.pseudo_inertia @ np.swapaxes(X_AB.matrix(), -1, -2)
-        )
+        """Return the same body, given in B, seen from frame A: P_A = X P_B X^T."""
+        X = X_AB.matrix()
+        return InertialParameters(forms.from_pseudo_inertia(X @ self.pseudo_inertia @ np.swapaxes(X, -1, -2)))
 
     def __add__(self, other: InertialParameters) -> InertialParameters:
         """Join two bodies given in one frame (gripper + object)."""
@@ -139,9 +146,8 @@ class InertialParameters:
         return InertialParameters(self.vector[index])
 
     def validity(self) -> ValidityReport:
-        """Say which laws of rigid bodies are broken, with the numbers (of the worst one in a batch)."""
-        worst = min((self[i] for i in np.ndindex(*self.vector.shape[:-1])), key=_margin, default=self)
-        return ValidityReport(tuple(_problems(worst)))
+        """Say which law of rigid bodies is broken, with the numbers (of the worst body in a batch)."""
+        return validity.report(self.vector)
 
     def require_consistent(self) -> InertialParameters:
         """Return self, or raise BadValue with the validity report."""
@@ -151,24 +157,10 @@ class InertialParameters:
         return self
 
 
-def _margin(body: InertialParameters) -> float:
-    """Return the least eigenvalue of the pseudo-inertia relative to its largest."""
-    values = np.linalg.eigvalsh(body.pseudo_inertia)
-    return float(values[0] / max(abs(values[-1]), 1e-300))
-
-
-def _problems(body: InertialParameters) -> list[str]:
-    """List the laws that one body breaks."""
-    mass = float(body.mass)
-    if mass <= 0:
-        return [f"mass must be above zero, it is {mass:.6g} kg"]
-    moments = np.linalg.eigvalsh(body.inertia_com)
-    shown = ", ".join(f"{m:.6g}" for m in moments)
-    if moments[0] <= 0:
-        return [f"principal moments must be above zero, they are {shown} kg m^2"]
-    if moments[0] + moments[1] <= moments[2]:
-        return [
-            "the triangle inequality is broken: the largest principal moment must be below the sum of the "
-            f"other two, they are {shown} kg m^2 ({moments[2]:.6g} >= {moments[0] + moments[1]:.6g})"
-        ]
-    return []
+def _symmetric(name: str, matrix: ArrayLike, size: int = 3) -> Array:
+    """Return symmetric matrices (..., size, size), or say by how much they differ from their transpose."""
+    array = check.matrices(name, matrix, size, size)
+    asymmetry = np.abs(array - np.swapaxes(array, -1, -2)).max(initial=0.0)
+    if asymmetry > 1e-9 * np.abs(array).max(initial=0.0):
+        raise BadValue(f"{name} must be symmetric; it differs from its transpose by {asymmetry:.3g}.")
+    return array

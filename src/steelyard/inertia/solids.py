@@ -1,15 +1,16 @@
 """Closed-form homogeneous solids, each about its own centroid with its own axes.
 
-Every function takes sizes in metres and `density` in kg/m^3 and returns InertialParameters. Place a solid elsewhere
-with `in_frame`, join solids with `+`, cut a hollow with `-`.
+Every function takes sizes in metres and `density` in kg/m^3, all above zero (BadValue otherwise), and returns
+InertialParameters. Place a solid elsewhere with `in_frame`, join solids with `+`, cut a hollow with `-`.
 """
 
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.errors import BadValue
 from steelyard.inertia.parameters import InertialParameters
 
 
@@ -46,6 +47,8 @@ def cylinder(radius: float, length: float, density: float) -> InertialParameters
 
 def tube(outer: float, inner: float, length: float, density: float) -> InertialParameters:
     """Return a tube with its axis along z, between the radii `inner` < `outer`."""
+    if not inner < outer:
+        raise BadValue(f"inner radius must be below the outer one; got {inner:g} and {outer:g} m.")
     return cylinder(outer, length, density) - cylinder(inner, length, density)
 
 
@@ -57,8 +60,9 @@ def cone(radius: float, height: float, density: float) -> InertialParameters:
 
 
 def capsule(radius: float, length: float, density: float) -> InertialParameters:
-    """Return a cylinder of `length` along z with half balls on both ends."""
+    """Return a cylinder of `length` along z with half balls on both ends (2 * radius longer in all)."""
     r, length = check.positive("radius", radius), check.positive("length", length)
+    density = check.positive("density", density)
     tube_mass, ball_mass = np.pi * r * r * length * density, 4 / 3 * np.pi * r**3 * density
     across = tube_mass * r * r / 4 + ball_mass * r * r / 5
     # A half ball's second moment about its flat centre is that of the ball; its centroid is 3r/8 above it.
@@ -67,12 +71,17 @@ def capsule(radius: float, length: float, density: float) -> InertialParameters:
     return _from_second_moment(mass, (across / mass, across / mass, along / mass))
 
 
-def tetrahedron(vertices: Array, density: float) -> InertialParameters:
-    """Return the tetrahedron with `vertices` (4, 3) [m] in their own frame (not moved to its centroid)."""
+def tetrahedron(vertices: ArrayLike, density: float) -> InertialParameters:
+    """Return the tetrahedron with `vertices` (4, 3) [m] in any order, in the frame of these numbers.
+
+    The second moment of mass is m/20 (sum v v^T + s s^T) with s the sum of the four vertices.
+    """
     v = check.matrices("vertices", vertices, 4, 3)
+    if v.ndim != 2:
+        raise BadValue(f"vertices must have shape (4, 3); got {v.shape}.")
     volume = abs(float(np.linalg.det(v[1:] - v[0]))) / 6
     mass = check.positive("density", density) * check.positive("tetrahedron volume", volume)
     total = v.sum(0)
     second = mass / 20 * (v.T @ v + np.outer(total, total))
-    pseudo = np.block([[second, mass * total[:, None] / 4], [mass * total[None, :] / 4, np.array([[mass]])]])
-    return InertialParameters.from_pseudo_inertia(pseudo)
+    first = mass / 4 * total[:, None]
+    return InertialParameters.from_pseudo_inertia(np.block([[second, first], [first.T, np.array([[mass]])]]))
