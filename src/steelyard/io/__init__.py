@@ -1,0 +1,14 @@
+"""Readers and writers: log descriptions and data files become a Recording; results become JSON and come back."""
+
+from steelyard.io.log_files import read_recording
+from steelyard.io.pendant import read_pendant
+from steelyard.io.result_files import read_result, read_result_parameters, result_dict, write_result
+
+__all__ = [
+    "read_pendant",
+    "read_recording",
+    "read_result",
+    "read_result_parameters",
+    "result_dict",
+    "write_result",
+]

@@ -1,0 +1,101 @@
+"""NPZ files as tables. A key with shape (N,) is a column; (N, k) or (N, a, b) is k columns, all of them by its name."""
+
+from __future__ import annotations
+
+import zipfile
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.lib import format as npy
+
+from steelyard.errors import BadFile
+from steelyard.io.tables import Columns, Header
+
+_WIDEST = 4096
+
+
+@dataclass(frozen=True)
+class ArrayTable:
+    """An NPZ file; nothing in it is ever unpickled."""
+
+    path: Path
+    header: Header
+    sources: tuple[tuple[str, int], ...]  # per column: array key and the column inside it
+
+    @classmethod
+    def open(cls, path: Path) -> ArrayTable:
+        """Read the array headers only; raises BadFile."""
+        names: list[str] = []
+        sources: list[tuple[str, int]] = []
+        groups: dict[str, tuple[int, ...]] = {}
+        for key, shape in _shapes(path).items():
+            if len(shape) == 1:
+                names.append(key)
+                sources.append((key, 0))
+            elif len(shape) > 1 and (width := int(np.prod(shape[1:]))) <= _WIDEST:
+                groups[key] = tuple(range(len(names), len(names) + width))
+                names += [f"{key}[{i}]" for i in range(width)]
+                sources += [(key, i) for i in range(width)]
+        if not names:
+            raise BadFile(
+                f"{path}: no array with rows is in this NPZ. Save one array per quantity, rows first."
+            )
+        return cls(path, Header(tuple(names), len(names), groups), tuple(sources))
+
+    def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
+        """Return columns by number; raises BadFile where an array is not of numbers."""
+        out: Columns = {}
+        arrays: dict[str, np.ndarray[Any, np.dtype[Any]]] = {}
+        with np.load(self.path, allow_pickle=False) as archive:
+            for number in columns:
+                key, inner = self.sources[number]
+                if key not in arrays:
+                    arrays[key] = _numeric(self.path, key, archive)
+                column = arrays[key].reshape(len(arrays[key]), -1)[:, inner]
+                keep = number in exact and column.dtype.kind in "iu"
+                out[number] = column.astype(np.int64 if keep else np.float64)
+        return out
+
+
+def _numeric(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
+    try:
+        array: np.ndarray[Any, np.dtype[Any]] = archive[key]
+    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+        raise BadFile(f'{path}: array "{key}" is damaged ({error}). Save the file again.') from None
+    if array.dtype.kind not in "fiub":
+        raise BadFile(f'{path}: array "{key}" must hold real numbers; it holds {array.dtype}.')
+    return array
+
+
+def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
+    """Return the shape of every array, refusing pickles by their header."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            members = [name for name in archive.namelist() if name.endswith(".npy")]
+            return {name.removesuffix(".npy"): _shape(path, archive, name) for name in members}
+    except zipfile.BadZipFile:
+        raise BadFile(
+            f"{path}: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."
+        ) from None
+
+
+def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
+    key = name.removesuffix(".npy")
+    with archive.open(name) as member:
+        try:
+            version = npy.read_magic(member)
+            read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
+            shape, _, dtype = read(member)
+        except (ValueError, EOFError):
+            raise BadFile(
+                f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.'
+            ) from None
+    if dtype.hasobject:
+        raise BadFile(
+            f'{path}: array "{key}" holds pickled Python objects, which can run code when opened, so it was not opened. '
+            "Save it as plain numbers (float64)."
+        )
+    return tuple(shape)

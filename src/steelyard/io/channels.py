@@ -1,0 +1,67 @@
+"""Columns of numbers become the channels of a stream: checked, in SI, read-only."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.io.rotations import rotation_of
+from steelyard.io.stream_entries import QuantitySpec
+from steelyard.io.units import ANGLE, factor
+
+_SHOWN = 5
+
+
+def channel(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Array:
+    """Return a quantity as (N, 3) in SI, or (N, 3, 3) for rotation, from its columns, each (N,).
+
+    `gravity` (3,) [m/s^2] says what one g is. Raises BadValue naming the rows that are wrong.
+    """
+    _require_one_length(spec, columns)
+    values = np.stack(columns, -1)
+    require_finite(values, spec.where)
+    if spec.form is None:
+        return check.frozen(values * factor(spec.name, spec.unit, gravity))
+    try:
+        return rotation_of(values, spec.form, ANGLE[spec.unit]).matrix
+    except BadValue as error:
+        raise BadValue(f"{spec.where}: {error}") from None
+
+
+def require_finite(values: Array, where: str) -> None:
+    """Raise BadValue saying how many rows of (N, k) or (N,) hold NaN or infinity, and which."""
+    good = np.isfinite(values)
+    rows = np.flatnonzero(~(good if good.ndim == 1 else good.all(-1)))
+    if len(rows):
+        raise BadValue(
+            f"{where}: {len(rows)} of {len(values)} rows are NaN or infinite: {rows_text(rows)}. "
+            "Delete those rows, or record again."
+        )
+
+
+def rows_text(rows: np.ndarray[Any, np.dtype[np.int64]]) -> str:
+    """Return 'row 3' or 'rows 3, 7, 9, ..', counted from 1 without the header."""
+    shown = ", ".join(str(row + 1) for row in rows[:_SHOWN])
+    return f"row{'s' if len(rows) > 1 else ''} {shown}{', ..' if len(rows) > _SHOWN else ''}"
+
+
+def _require_one_length(spec: QuantitySpec, columns: Sequence[Array]) -> None:
+    lengths = {len(column) for column in columns}
+    if len(lengths) > 1:
+        raise BadValue(
+            f"{spec.where}: its columns have different lengths: {', '.join(map(str, sorted(lengths)))} rows."
+        )
+
+
+def require_one_length(lengths: Mapping[str, int], where: str) -> None:
+    """Raise BadValue where the quantities of one stream have different numbers of rows."""
+    if len(set(lengths.values())) > 1:
+        shown = ", ".join(f"{name} {length}" for name, length in lengths.items())
+        raise BadValue(
+            f"{where}: the lengths differ: {shown} rows. All quantities of a stream must have one row per sample."
+        )

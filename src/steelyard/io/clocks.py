@@ -1,0 +1,63 @@
+"""Stamps of all streams become seconds after one common origin, without losing the digits of large stamps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.io.channels import require_finite
+
+_LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them to a nanosecond
+
+
+@dataclass(frozen=True, eq=False)
+class Clock:
+    """Stamps as the file holds them (N,), int64 or float64; `per_second` of them make a second."""
+
+    stamps: np.ndarray[Any, np.dtype[Any]]
+    per_second: int
+    where: str
+
+    def __post_init__(self) -> None:
+        if self.stamps.dtype.kind != "i":
+            require_finite(self.stamps, self.where)
+        steps = np.diff(self.stamps)
+        falls = np.flatnonzero(steps < 0)
+        if len(falls):
+            i = int(falls[0])
+            times = f"{len(falls)} times, first" if len(falls) > 1 else "once,"
+            raise BadValue(
+                f"{self.where}: time must not go back; it does {times} from {self.stamps[i]} in row {i + 1} to "
+                f"{self.stamps[i + 1]} in row {i + 2}. Sort the rows, or cut the log there."
+            )
+        if len(steps) and not steps.any():
+            raise BadValue(
+                f"{self.where}: time stands still at {self.stamps[0]} in all {len(self.stamps)} rows. Name the column of "
+                "the clock, or give time = { rate = .. }."
+            )
+
+    def seconds_after(self, origin: int) -> Array:
+        """Return (N,) [s] after `origin` [s]; integers are subtracted as integers."""
+        return check.frozen((self.stamps - origin * self.per_second) / self.per_second)
+
+    @property
+    def first_second(self) -> int:
+        """The last whole second before the first stamp."""
+        return int(self.stamps[0] // self.per_second)
+
+
+def common_origin(clocks: Sequence[Clock]) -> int:
+    """Return the whole second to subtract from every clock: the earliest, or 0 where the stamps are small."""
+    earliest = min((clock.first_second for clock in clocks), default=0)
+    return earliest if abs(earliest) > _LARGE else 0
+
+
+def steady(rate: float, rows: int, start: float) -> Array:
+    """Return (rows,) [s] from `start` at `rate` [Hz]."""
+    return check.frozen(start + np.arange(rows) / rate)

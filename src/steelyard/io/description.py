@@ -1,0 +1,141 @@
+"""The log description (TOML) as checked values; no data file is opened here."""
+
+from __future__ import annotations
+
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription, BadFile
+from steelyard.io.entries import Entry
+from steelyard.io.stream_entries import StreamSpec, parse_pose, parse_stream
+from steelyard.logs.recording import STANDARD_GRAVITY
+from steelyard.spatial import Pose
+
+EXAMPLE = """\
+[log]
+gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
+wrench  = "on-sensor"        # or "on-object": what the robot applies to the object
+
+[[stream]]
+path     = "data.csv"
+time     = { columns = ["t"], unit = "s" }
+force    = { columns = ["fx", "fy", "fz"], unit = "N" }
+torque   = { columns = ["tx", "ty", "tz"], unit = "N*m" }
+rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }   # S to W
+"""
+
+_LARGEST_DESCRIPTION = 4_000_000
+_NOISE = ("force", "torque", "acceleration", "angular_acceleration")
+_SECTIONS = ("log", "noise", "object", "stream", "robot")
+
+
+def default_gravity() -> Array:
+    """Return standard gravity in W, z up (3,) [m/s^2]: what holds where a description does not say."""
+    return np.array([0.0, 0.0, -STANDARD_GRAVITY])
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """What a description says.
+
+    gravity      (3,) [m/s^2] in W
+    wrench_sign  +1 on-object, -1 on-sensor
+    noise        standard deviations, SI
+    tool         path of a result, as written
+    object_pose, object_pose_std   pose of O in S and its spread (m, rad)
+    """
+
+    streams: tuple[StreamSpec, ...]
+    gravity: Array = field(default_factory=default_gravity)
+    wrench_sign: int = 1
+    noise: Mapping[str, float] = field(default_factory=dict)
+    tool: str | None = None
+    object_pose: Pose | None = None
+    object_pose_std: tuple[float, float] | None = None
+
+
+def read_description(path: Path) -> Description:
+    """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
+    return parse_description(_load_toml(path), path.name)
+
+
+def _load_toml(path: Path) -> dict[str, Any]:
+    size = path.stat().st_size
+    if size > _LARGEST_DESCRIPTION:
+        raise BadFile(f"{path}: a log description is a small TOML text; this file has {size} bytes.")
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
+    except UnicodeDecodeError:
+        raise BadFile(f"{path}: expected a TOML text in UTF-8; found a binary file.") from None
+    except tomllib.TOMLDecodeError as error:
+        raise BadDescription(f"{path}: not valid TOML: {error}.") from None
+
+
+def parse_description(values: Mapping[str, Any], name: str) -> Description:
+    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription."""
+    top = Entry(values, name)
+    if "team" in top:
+        raise top.error("[team] makes this a team description. Use it with: steelyard team")
+    top.only(*_SECTIONS)
+    if "robot" in top:
+        raise top.error(
+            "[robot] is not supported yet: forward kinematics come later. "
+            "Give the orientation of the sensor instead, as rotation = { columns = [..], form = .. }."
+        )
+    log = _section(top, "log")
+    log.only("gravity", "wrench", "tool")
+    gravity = log.numbers("gravity", 3) if "gravity" in log else default_gravity()
+    if not gravity.any():
+        raise log.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
+    pose, spread = _object_pose(_section(top, "object"))
+    return Description(
+        streams=_streams(top),
+        gravity=gravity,
+        wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
+        noise=_noise(_section(top, "noise")),
+        tool=log.text("tool"),
+        object_pose=pose,
+        object_pose_std=spread,
+    )
+
+
+def _section(top: Entry, key: str) -> Entry:
+    value = top.values.get(key, {})
+    if not isinstance(value, Mapping):
+        raise top.error(f'"{key}" must be a section that starts with [{key}]; got {value!r}.')
+    return Entry(value, f"{top.where}, [{key}]")
+
+
+def _noise(entry: Entry) -> dict[str, float]:
+    entry.only(*_NOISE)
+    return {key: entry.positive(key) for key in _NOISE if key in entry}
+
+
+def _object_pose(entry: Entry) -> tuple[Pose | None, tuple[float, float] | None]:
+    entry.only("pose_in_sensor")
+    if "pose_in_sensor" not in entry:
+        return None, None
+    table = entry.table("pose_in_sensor")
+    rotation, position = parse_pose(table, "std_mm", "std_deg")
+    if rotation is None or position is None:
+        raise table.error('give both "rotation" and "position".')
+    spread = None
+    if "std_mm" in table or "std_deg" in table:
+        spread = (table.positive("std_mm") * 1e-3, float(np.radians(table.positive("std_deg"))))
+    return Pose(rotation, position), spread
+
+
+def _streams(top: Entry) -> tuple[StreamSpec, ...]:
+    value = top.values.get("stream", [])
+    if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
+        raise top.error("streams are written as sections that start with [[stream]].")
+    if not value:
+        raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
+    streams = [parse_stream(Entry(item, f"{top.where}, [[stream]] {i}")) for i, item in enumerate(value, 1)]
+    return tuple(streams)

@@ -1,0 +1,103 @@
+"""Entry: typed access to one table of a description, whose errors say where and what would have been right."""
+
+from __future__ import annotations
+
+import difflib
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription
+
+
+def listed(names: Sequence[object]) -> str:
+    """Return names for a message, separated by commas."""
+    return ", ".join(str(name) for name in names)
+
+
+def close_match(wrong: str, right: Sequence[str]) -> str:
+    """Return ' Did you mean "x"?' for the nearest of `right`, or nothing when none is near."""
+    folded = {name.lower(): name for name in reversed(right)}
+    near = difflib.get_close_matches(wrong.lower(), list(folded), n=1)
+    return f' Did you mean "{folded[near[0]]}"?' if near else ""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One table of a description: its values, and `where` it stands, for messages."""
+
+    values: Mapping[str, Any]
+    where: str
+
+    def __contains__(self, key: str) -> bool:
+        return key in self.values
+
+    def error(self, text: str) -> BadDescription:
+        """Return the error that says `text` about this place."""
+        return BadDescription(f"{self.where}: {text}")
+
+    def only(self, *allowed: str) -> None:
+        """Raise BadDescription at a key that is not allowed here, with the nearest one that is."""
+        for key in self.values:
+            if key not in allowed:
+                near = close_match(key, allowed)
+                raise self.error(f'unknown key "{key}".{near} Keys here: {listed(allowed)}.')
+
+    def require(self, key: str, example: str) -> Any:
+        """Return the value, or raise BadDescription with an example line."""
+        if key not in self.values:
+            raise self.error(f'"{key}" is missing. Example: {example}')
+        return self.values[key]
+
+    def table(self, key: str) -> Entry:
+        """Return the table under `key`; an empty one where it is left out."""
+        value = self.values.get(key, {})
+        if not isinstance(value, Mapping):
+            raise self.error(f'"{key}" must be a table such as {key} = {{ .. }}; got {value!r}.')
+        return Entry(value, f"{self.where}, {key}")
+
+    def text(self, key: str, default: str | None = None) -> str | None:
+        """Return a string, or the default where it is left out."""
+        value = self.values.get(key, default)
+        if value is not None and not isinstance(value, str):
+            raise self.error(f'"{key}" must be text in quotes; got {value!r}.')
+        return value
+
+    def choice(self, key: str, choices: Sequence[str], default: str) -> str:
+        """Return one of `choices`, or raise BadDescription listing them."""
+        value = self.values.get(key, default)
+        if value not in choices:
+            near = close_match(str(value), choices)
+            raise self.error(f'unknown {key} "{value}".{near} Possible here: {listed(choices)}.')
+        return str(value)
+
+    def number(self, key: str) -> float:
+        """Return one finite number."""
+        value = self.values.get(key)
+        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+            raise self.error(f'"{key}" must be a finite number; got {value!r}.')
+        return float(value)
+
+    def positive(self, key: str) -> float:
+        """Return one finite number above zero."""
+        value = self.number(key)
+        if value <= 0:
+            raise self.error(f'"{key}" must be above zero; got {value:g}.')
+        return value
+
+    def numbers(self, key: str, *counts: int) -> Array:
+        """Return finite numbers, as many as one of `counts`."""
+        value = self.values.get(key)
+        wanted = " or ".join(str(count) for count in counts)
+        good = isinstance(value, list) and len(value) in counts and all(map(_is_number, value))
+        if not good:
+            raise self.error(f'"{key}" must be a list of {wanted} finite numbers; got {value!r}.')
+        return np.array(value, dtype=np.float64)
+
+
+def _is_number(value: object) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)

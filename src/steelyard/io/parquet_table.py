@@ -1,0 +1,63 @@
+"""Parquet files as tables: the one module that imports pyarrow (extra `parquet`)."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.errors import BadFile, MissingDependency
+from steelyard.io.tables import Columns, Header
+
+
+def _pyarrow() -> tuple[Any, Any]:
+    try:
+        import pyarrow
+        import pyarrow.parquet
+    except ImportError:
+        raise MissingDependency.of("pyarrow", "parquet", "Reading .parquet files") from None
+    return pyarrow, pyarrow.parquet
+
+
+@dataclass(frozen=True)
+class ParquetTable:
+    """A Parquet file; stamps of a timestamp type count in that type's own unit since 1970."""
+
+    path: Path
+    header: Header
+
+    @classmethod
+    def open(cls, path: Path) -> ParquetTable:
+        """Read the schema only; raises BadFile or MissingDependency."""
+        arrow, parquet = _pyarrow()
+        try:
+            names = tuple(parquet.read_schema(path).names)
+        except (arrow.ArrowException, OSError):
+            raise BadFile(f"{path}: expected a Parquet file; found something else.") from None
+        return cls(path, Header(names, len(names), {}))
+
+    def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
+        """Return columns by number; nulls become NaN. Raises BadFile where a column is not of numbers."""
+        arrow, parquet = _pyarrow()
+        names = self.header.names or ()
+        try:
+            table = parquet.read_table(self.path, columns=sorted({names[n] for n in columns}))
+        except (arrow.ArrowException, OSError) as error:
+            raise BadFile(f"{self.path}: this Parquet file is damaged ({error}).") from None
+        return {n: self._column(arrow, table.column(names[n]), n, n in exact) for n in columns}
+
+    def _column(self, arrow: Any, column: Any, number: int, exact: bool) -> np.ndarray[Any, np.dtype[Any]]:
+        kind = column.type
+        if arrow.types.is_timestamp(kind):
+            column, kind = column.cast(arrow.int64()), arrow.int64()
+        if arrow.types.is_decimal(kind):
+            column, kind = column.cast(arrow.float64()), arrow.float64()
+        if not (arrow.types.is_integer(kind) or arrow.types.is_floating(kind)):
+            name = (self.header.names or ())[number]
+            raise BadFile(f'{self.path}: column "{name}" must hold numbers; it holds {kind}.')
+        if exact and arrow.types.is_integer(kind) and column.null_count == 0:
+            return np.asarray(column.to_numpy(), dtype=np.int64)
+        return np.asarray(column.to_numpy(), dtype=np.float64)

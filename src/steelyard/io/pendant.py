@@ -1,0 +1,56 @@
+"""Poses and readings typed from a teach pendant become a Recording."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.io.description import default_gravity
+from steelyard.io.rotations import rotation_of
+from steelyard.io.units import ANGLE
+from steelyard.logs.recording import Recording, Stream
+
+PENDANT_COLUMNS = "roll pitch yaw (deg, S to W), fx fy fz (N), tx ty tz (N*m)"
+
+
+def read_pendant(lines: Iterable[str], gravity: Array | None = None, on_sensor: bool = True) -> Recording:
+    """Return still poses typed one per line: roll pitch yaw [deg] of the sensor in the world, then fx fy fz tx ty tz.
+
+    lines      nine numbers each, separated by blanks, commas or semicolons; empty lines and # comments are skipped
+    gravity    (3,) [m/s^2] in W; standard gravity, z up, where left out
+    on_sensor  whether the readings are the reaction on the sensor (most are) or what the robot applies
+
+    Raises BadValue naming the line.
+    """
+    rows = [row for number, line in enumerate(lines, 1) if (row := _row(line, number))]
+    if not rows:
+        raise BadValue(f"no pose was typed. Each line holds nine numbers: {PENDANT_COLUMNS}.")
+    table = np.array(rows, dtype=np.float64)
+    channels = {
+        "rotation": rotation_of(table[:, :3], "rpy", ANGLE["deg"]).matrix,
+        "force": check.frozen(table[:, 3:6]),
+        "torque": check.frozen(table[:, 6:]),
+    }
+    down = check.vectors("gravity", default_gravity() if gravity is None else gravity)
+    stream = Stream("pendant", channels, poses=True)
+    return Recording((stream,), down, -1 if on_sensor else 1, name="pendant")
+
+
+def _row(line: str, number: int) -> list[float] | None:
+    words = re.split(r"[\s,;]+", line.split("#")[0].strip(" \t\r\n,;"))
+    if words == [""]:
+        return None
+    try:
+        row = [float(word) for word in words]
+    except ValueError as error:
+        raise BadValue(f"line {number}: {error}. Each line holds nine numbers: {PENDANT_COLUMNS}.") from None
+    if len(row) != 9 or not np.isfinite(row).all():
+        raise BadValue(
+            f"line {number}: got {len(row)} numbers. Each line holds nine finite numbers: {PENDANT_COLUMNS}."
+        )
+    return row

@@ -1,0 +1,182 @@
+"""Results as JSON (formats, section 5): written whole or not at all, read back with checks."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+import tempfile
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadInput
+from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.inertia import InertialParameters, forms
+
+_LARGEST = 64_000_000
+_NEEDED = ("mass_kg", "com_m", "inertia_com_kgm2", "frame", "covariance")
+
+
+def result_dict(estimate: Estimate) -> dict[str, Any]:
+    """Return the result as plain values for JSON; numbers that are not finite become None.
+
+    `inertia_com_kgm2` is about the centre of mass in the axes of `frame`, None where the data do not fix it;
+    `parameters` (10,) and `covariance` (10, 10) are m, h, I about the origin of `frame`.
+    """
+    torque_bias, force_bias = np.split(estimate.wrench_bias, 2)
+    torque_std, force_std = np.split(estimate.wrench_bias_std, 2)
+    identified = [bool(flag) for flag in estimate.identified]
+    values = {
+        "mass_kg": estimate.mass,
+        "com_m": estimate.com,
+        "inertia_com_kgm2": estimate.inertia_com,
+        "frame": estimate.frame,
+        "method": estimate.method,
+        "consistent": estimate.parameters.validity().consistent,
+        "std": {**_people(estimate.std), "force_bias_N": force_std, "torque_bias_Nm": torque_std},
+        "covariance": estimate.covariance,
+        "parameters": estimate.parameters.vector,
+        "identified": {"mass": identified[0], "com": identified[1:4], "inertia": identified[4:]},
+        "force_bias_N": force_bias,
+        "torque_bias_Nm": torque_bias,
+        "delays_s": dict(estimate.delays_s),
+        "evidence": _evidence(estimate.evidence),
+        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in estimate.findings],
+        "notes": list(estimate.notes),
+    }
+    return {key: _plain(value) for key, value in values.items()}
+
+
+def _people(values: Array) -> dict[str, Any]:
+    """Return (10,) of mass, com, inertia about the CoM under their names; the inertia as a matrix."""
+    return {
+        "mass_kg": float(values[0]),
+        "com_m": values[1:4],
+        "inertia_com_kgm2": forms.inertia_matrix(values),
+    }
+
+
+def _evidence(evidence: Evidence) -> dict[str, Any]:
+    jackknife = evidence.jackknife_people
+    return {
+        "rank": evidence.rank,
+        "condition": evidence.condition,
+        "samples": evidence.samples,
+        "still_samples": evidence.still_samples,
+        "residual_force_N": evidence.residual_force_N,
+        "residual_torque_Nm": evidence.residual_torque_Nm,
+        "chi2_per_dof": evidence.chi2_per_dof,
+        "holdout_force_N": evidence.holdout_force_N,
+        "holdout_torque_Nm": evidence.holdout_torque_Nm,
+        "spread": evidence.spread,
+        "jackknife_std": None if jackknife is None else _people(jackknife),
+    }
+
+
+def _plain(value: Any) -> Any:
+    """Return arrays as lists, numbers as int or float, and None for what JSON cannot hold."""
+    if isinstance(value, np.ndarray | np.generic):
+        value = value.tolist()
+    if isinstance(value, dict):
+        return {str(key): _plain(item) for key, item in value.items()}
+    if isinstance(value, list | tuple):
+        return [_plain(item) for item in value]
+    return None if isinstance(value, float) and not math.isfinite(value) else value
+
+
+def write_result(estimate: Estimate, path: Path | str) -> None:
+    """Write the result as JSON; the file appears complete or not at all. Raises BadFile."""
+    write_text(Path(path), json.dumps(result_dict(estimate), indent=1, allow_nan=False) + "\n")
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text file by way of a temporary one beside it; raises BadFile where the folder cannot be written."""
+    temporary = None
+    try:
+        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
+        with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
+            stream.write(text)
+        os.chmod(temporary, 0o666 & ~_umask())
+        os.replace(temporary, path)
+    except OSError as error:
+        if temporary is not None:
+            Path(temporary).unlink(missing_ok=True)
+        raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
+
+
+def _umask() -> int:
+    mask = os.umask(0)
+    os.umask(mask)
+    return mask
+
+
+def read_result(path: Path | str) -> tuple[InertialParameters, Array, dict[str, Any]]:
+    """Return parameters, covariance (10, 10) and the whole result; raises BadFile.
+
+    Where the inertia was not fixed by the data, the parameters hold the best guess that the result carries.
+    """
+    path = Path(path)
+    values = _load_json(path)
+    for key in _NEEDED:
+        if key not in values:
+            raise BadFile(
+                f'{path}: not a Steelyard result: "{key}" is missing. Write one with: steelyard identify -o FILE.'
+            )
+    covariance = _numbers(path, values, "covariance", (10, 10))
+    if "parameters" in values:
+        return InertialParameters(_numbers(path, values, "parameters", (10,))), covariance, values
+    return _from_people(path, values), covariance, values
+
+
+def read_result_parameters(path: Path | str) -> InertialParameters:
+    """Return the body of a result, in S, to be subtracted as a tool; raises BadFile."""
+    parameters, _, values = read_result(path)
+    if values["frame"] != "S":
+        raise BadFile(
+            f'{path}: a tool must be given in the sensor frame "S"; this result is in "{values["frame"]}".'
+        )
+    return parameters
+
+
+def _from_people(path: Path, values: dict[str, Any]) -> InertialParameters:
+    mass = float(_numbers(path, values, "mass_kg", ()))
+    com = _numbers(path, values, "com_m", (3,))
+    known = values["inertia_com_kgm2"] is not None
+    inertia = _numbers(path, values, "inertia_com_kgm2", (3, 3)) if known else np.zeros((3, 3))
+    try:
+        return InertialParameters.from_com(mass, com, inertia)
+    except BadInput as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def _load_json(path: Path) -> dict[str, Any]:
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST:
+            raise BadFile(f"{path}: a result is a small JSON text; this file has {size} bytes.")
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
+    except UnicodeDecodeError:
+        raise BadFile(f"{path}: expected a JSON result; found a binary file.") from None
+    except json.JSONDecodeError as error:
+        raise BadFile(f"{path}: not valid JSON: {error}.") from None
+    if not isinstance(values, dict):
+        raise BadFile(
+            f"{path}: not a Steelyard result: expected one JSON object. Write one with: steelyard identify -o FILE."
+        )
+    return values
+
+
+def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
+    try:
+        array = np.array(values[key], dtype=np.float64)
+    except (TypeError, ValueError):
+        array = np.empty(0)
+    if array.shape != shape or not np.isfinite(array).all():
+        wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "one finite number"
+        raise BadFile(f'{path}: "{key}" must be {wanted}; found something else.')
+    return array

@@ -1,0 +1,68 @@
+"""Rotations as files write them: nine matrix entries row by row, quaternions in both orders, roll pitch yaw."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.spatial import Rotation
+
+FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4, "rpy": 3}
+
+ROUNDING = 5e-3  # how far R^T R may be from 1: a matrix written with three digits after the point
+NORM = 0.05  # how far the length of a quaternion may be from 1
+
+
+def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
+    """Return the rotations (...) that `values` (..., k) write in `form`; `angle` turns rpy into rad.
+
+    Written digits are rounded, so a matrix within `ROUNDING` of a rotation becomes the nearest one.
+    Raises BadValue naming the worst row.
+    """
+    if form == "rpy":
+        return Rotation.from_rpy(values * angle)
+    if form == "matrix":
+        return _of_matrix(values.reshape(*values.shape[:-1], 3, 3))
+    _check_norm(values)
+    return Rotation.from_quaternion_wxyz(np.roll(values, 1, -1) if form == "quaternion-xyzw" else values)
+
+
+def _of_matrix(matrix: Array) -> Rotation:
+    error = np.abs(_excess(matrix)).max((-1, -2))
+    if error.size and float(error.max()) > ROUNDING:
+        raise BadValue(
+            f"the rotation is not orthonormal: {int((error > ROUNDING).sum())} of {error.size} rows are not, the worst "
+            f"is row {int(error.argmax()) + 1}, where R^T R is off by {float(error.max()):.3g} (allowed {ROUNDING:g}). "
+            "Check the order and the number of digits of the nine columns."
+        )
+    mirrored = np.linalg.det(matrix) < 0
+    if mirrored.any():
+        raise BadValue(
+            f"the rotation is a mirror image (determinant -1) in {int(mirrored.sum())} of {mirrored.size} rows, first "
+            f"in row {int(mirrored.argmax()) + 1}. Check the order and the signs of the nine columns."
+        )
+    for _ in range(3):  # Newton-Schulz: squares the error and keeps the polar factor, much faster than an SVD
+        matrix = matrix - 0.5 * matrix @ _excess(matrix)
+    return Rotation(matrix)
+
+
+def _excess(matrix: Array) -> Array:
+    """Return R^T R - 1 (..., 3, 3)."""
+    return np.asarray(np.swapaxes(matrix, -1, -2) @ matrix - np.eye(3))
+
+
+def _check_norm(quaternion: Array) -> None:
+    norm = np.linalg.norm(quaternion, axis=-1)
+    zero = norm < 1e-12
+    if zero.any():
+        raise BadValue(
+            f"the quaternion has norm zero in {int(zero.sum())} of {zero.size} rows, first in row "
+            f"{int(zero.argmax()) + 1}. Delete the rows where the pose was not known."
+        )
+    error = np.abs(norm - 1)
+    if error.size and float(error.max()) > NORM:
+        raise BadValue(
+            f"the quaternion must have norm 1; it is off in {int((error > NORM).sum())} of {error.size} rows, most in "
+            f"row {int(error.argmax()) + 1} with norm {float(norm.flat[int(error.argmax())]):.4g}. Check the four columns."
+        )

@@ -1,0 +1,207 @@
+"""One [[stream]] of a description as checked values: which columns hold which quantity, in which unit and frame."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.io.entries import Entry
+from steelyard.io.rotations import FORMS, rotation_of
+from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS
+from steelyard.logs.recording import QUANTITIES, Mount
+from steelyard.spatial import Rotation
+
+Column = str | int
+
+FRAMED = (
+    "force",
+    "torque",
+    "linear_velocity",
+    "angular_velocity",
+    "linear_acceleration",
+    "angular_acceleration",
+)
+
+_JOINT = ("joint_position", "joint_torque")
+_KEYS = ("path", "topic", "kind", "time", "delay", "mount", *QUANTITIES, *_JOINT)
+
+
+@dataclass(frozen=True)
+class QuantitySpec:
+    """Which columns hold a quantity; `form` says how a rotation is written."""
+
+    name: str
+    columns: tuple[Column, ...]
+    unit: str
+    where: str
+    form: str | None = None
+    frame: str = "S"
+
+
+@dataclass(frozen=True)
+class TimeSpec:
+    """A time column with its unit, or (column None) a steady `rate` [Hz]."""
+
+    column: Column | None
+    unit: str
+    rate: float
+    where: str
+
+
+@dataclass(frozen=True)
+class StreamSpec:
+    """One stream as its description tells it; `delay` [s], `mount` in SI."""
+
+    path: str
+    quantities: tuple[QuantitySpec, ...]
+    where: str
+    time: TimeSpec | None = None
+    poses: bool = False
+    zero_torque: bool = False
+    delay: float | None = None
+    mount: Mount | None = None
+    topic: str | None = None
+    names: frozenset[str] = field(init=False)
+
+    def __post_init__(self) -> None:
+        zero = {"torque"} if self.zero_torque else set()
+        object.__setattr__(self, "names", frozenset(q.name for q in self.quantities) | zero)
+
+
+def parse_stream(entry: Entry) -> StreamSpec:
+    """Check one [[stream]] table; raises BadDescription."""
+    entry.only(*_KEYS)
+    entry.require("path", 'path = "log.csv"')
+    path = str(entry.text("path"))
+    entry = Entry(entry.values, f'{entry.where} ("{path}")')
+    _refuse_joints(entry)
+    zero = entry.values.get("torque") == "zero"
+    quantities = tuple(
+        _quantity(entry, name) for name in QUANTITIES if name in entry and not (zero and name == "torque")
+    )
+    if not quantities:
+        raise entry.error(
+            'no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }'
+        )
+    kind = entry.text("kind")
+    if kind not in (None, "poses"):
+        raise entry.error(
+            f'unknown kind "{kind}". Leave it out, or write kind = "poses" for a table of still poses.'
+        )
+    if kind == "poses" and "time" in entry:
+        raise entry.error(
+            'kind = "poses" is a table of still poses without time; leave out "time" or "kind".'
+        )
+    return StreamSpec(
+        path,
+        quantities,
+        entry.where,
+        _time(entry),
+        kind == "poses",
+        zero,
+        _delay(entry),
+        _mount(entry),
+        entry.text("topic"),
+    )
+
+
+def _refuse_joints(entry: Entry) -> None:
+    for key in _JOINT:
+        if key in entry:
+            raise entry.error(
+                f'"{key}" is not supported yet: robot kinematics come later. '
+                "Give the orientation of the sensor instead, as rotation = { columns = [..], form = .. }."
+            )
+
+
+def _quantity(stream: Entry, name: str) -> QuantitySpec:
+    entry = stream.table(name)
+    if name == "rotation":
+        return _rotation(entry)
+    framed = name in FRAMED
+    entry.only("columns", "unit", *(("frame",) if framed else ()))
+    units = list(UNITS[name])
+    unit = entry.choice("unit", units, units[0])
+    frame = entry.choice("frame", ("S", "W"), "S") if framed else "W" if name == "position" else "S"
+    return QuantitySpec(name, _columns(entry, QUANTITIES[name]), unit, entry.where, frame=frame)
+
+
+def _rotation(entry: Entry) -> QuantitySpec:
+    entry.only("columns", "form", "unit")
+    entry.require("columns", 'rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }')
+    entry.require("form", f'form = "matrix"; one of {", ".join(FORMS)}')
+    form = entry.choice("form", list(FORMS), "")
+    if form != "rpy" and "unit" in entry:
+        raise entry.error(f'"unit" belongs to form = "rpy"; a {form} has none.')
+    unit = entry.choice("unit", list(ANGLE), "rad")
+    return QuantitySpec("rotation", _columns(entry, FORMS[form]), unit, entry.where, form=form)
+
+
+def _columns(entry: Entry, count: int) -> tuple[Column, ...]:
+    """Return `count` column names or numbers; one alone may name an array of an NPZ that holds all of them."""
+    value = entry.require("columns", f"columns = [..] with {count} names")
+    good = isinstance(value, list) and all(
+        isinstance(c, str | int) and not isinstance(c, bool) for c in value
+    )
+    if not good or any(isinstance(c, int) and c < 0 for c in value):
+        raise entry.error(f'"columns" must be a list of names or of numbers from 0; got {value!r}.')
+    if len(value) not in (1, count):
+        raise entry.error(f'"columns" must have {count} entries; got {len(value)}: {value!r}.')
+    if len(set(value)) != len(value):
+        raise entry.error(f'"columns" names a column twice: {value!r}.')
+    return tuple(value)
+
+
+def _time(stream: Entry) -> TimeSpec | None:
+    if "time" not in stream:
+        return None
+    entry = stream.table("time")
+    if "rate" in entry:
+        entry.only("rate", "unit")
+        scale = {"Hz": 1.0, "kHz": 1e3}[entry.choice("unit", ("Hz", "kHz"), "Hz")]
+        return TimeSpec(None, "s", entry.positive("rate") * scale, entry.where)
+    entry.only("columns", "unit", "rate")
+    entry.require("columns", 'time = { columns = ["t"], unit = "s" }, or time = { rate = 1000, unit = "Hz" }')
+    column = _columns(entry, 1)[0]
+    return TimeSpec(column, entry.choice("unit", list(TIME), "s"), 0.0, entry.where)
+
+
+def _delay(stream: Entry) -> float | None:
+    if "delay" not in stream:
+        return None
+    entry = stream.table("delay")
+    entry.only("value", "unit")
+    return entry.number("value") / TIME[entry.choice("unit", list(TIME), "s")]
+
+
+def _mount(stream: Entry) -> Mount | None:
+    if "mount" not in stream:
+        return None
+    entry = stream.table("mount")
+    rotation, position = parse_pose(entry)
+    if rotation is None and position is None:
+        raise entry.error('give "rotation", "position" or both.')
+    return Mount(rotation, position)
+
+
+def parse_pose(entry: Entry, *more: str) -> tuple[Rotation | None, Array | None]:
+    """Return rotation and position [m] of a pose table, None where left out.
+
+    `unit` is that of the position, `angle_unit` that of rotation where form = "rpy". Raises BadDescription.
+    """
+    entry.only("rotation", "form", "angle_unit", "position", "unit", *more)
+    position = None
+    if "position" in entry:
+        position = entry.numbers("position", 3) * LENGTH[entry.choice("unit", list(LENGTH), "m")]
+    return (_fixed_rotation(entry) if "rotation" in entry else None), position
+
+
+def _fixed_rotation(entry: Entry) -> Rotation:
+    form = entry.choice("form", list(FORMS), "matrix")
+    values = entry.numbers("rotation", FORMS[form])
+    angle = ANGLE[entry.choice("angle_unit", list(ANGLE), "rad")]
+    try:
+        return rotation_of(values, form, angle)
+    except BadValue as error:
+        raise entry.error(str(error)) from None

@@ -1,0 +1,125 @@
+"""Data files as named columns: finding the file, choosing its reader, choosing its columns."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+import numpy as np
+
+from steelyard.errors import BadDescription, BadFile
+from steelyard.io.entries import close_match, listed
+
+Column = str | int
+Columns = dict[int, np.ndarray[Any, np.dtype[Any]]]
+
+TEXT = (".csv", ".tsv", ".txt")
+BAGS = (".mcap", ".bag", ".db3")
+KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a table holds before its rows are read.
+
+    names   one per column; None where a text file has no header
+    count   number of columns
+    groups  arrays with several columns (NPZ): name -> its column numbers
+    """
+
+    names: tuple[str, ...] | None
+    count: int
+    groups: dict[str, tuple[int, ...]]
+
+
+class Table(Protocol):
+    """A data file that is open for reading columns."""
+
+    path: Path
+    header: Header
+
+    def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
+        """Return the columns by number, float64; those in `exact` stay int64 where the file writes integers."""
+
+
+def open_table(path: Path) -> Table:
+    """Look at the head of a data file and return its table; raises BadFile."""
+    from steelyard.io import array_table, parquet_table, text_table
+
+    suffix = data_suffix(path)
+    if suffix in BAGS or path.is_dir():
+        raise BadFile(
+            f"{path}: bags are not supported yet. Export the topics to CSV (one file per topic, with its stamps) "
+            "and name those files in the description."
+        )
+    if suffix not in (*TEXT, ".npz", ".parquet"):
+        raise BadFile(f'{path}: unknown kind of data file "{suffix or path.name}". Readable are {KINDS}.')
+    if path.stat().st_size == 0:
+        raise BadFile(f"{path}: the file is empty (0 bytes). Record again, or correct the path.")
+    if suffix == ".npz":
+        return array_table.ArrayTable.open(path)
+    if suffix == ".parquet":
+        return parquet_table.ParquetTable.open(path)
+    return text_table.TextTable.open(path)
+
+
+def data_suffix(path: Path) -> str:
+    """Return the suffix that decides the reader, lower case and without .gz."""
+    return (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
+
+
+def find_file(name: str, folder: Path, data: Path | None) -> Path:
+    """Return the file `name`, sought in `data`, then $STEELYARD_DATA, then `folder`; raises BadFile naming all three."""
+    if Path(name).is_absolute():
+        if Path(name).exists():
+            return Path(name)
+        raise BadFile(f"{name}: no such file.")
+    environment = os.environ.get("STEELYARD_DATA")
+    folders = [data] if data else []
+    folders += [Path(environment)] if environment else []
+    folders.append(folder)
+    for each in folders:
+        if (each / name).exists():
+            return each / name
+    raise BadFile(
+        f'"{name}" was not found. Searched: {listed(folders)}. '
+        "Correct the path, or give the folder of the data with --data DIR or STEELYARD_DATA."
+    )
+
+
+def choose_columns(header: Header, wanted: Sequence[Column], count: int, where: str) -> tuple[int, ...]:
+    """Return the numbers of the `count` columns that `wanted` names; raises BadDescription listing what there is."""
+    numbers = [n for column in wanted for n in _find(header, column, where)]
+    if len(numbers) != count:
+        raise BadDescription(f"{where}: {count} columns are needed; {list(wanted)} gives {len(numbers)}.")
+    return tuple(numbers)
+
+
+def _find(header: Header, column: Column, where: str) -> tuple[int, ...]:
+    if isinstance(column, int):
+        if column >= header.count:
+            raise BadDescription(
+                f"{where}: there is no column {column}; the file has {header.count}, 0 to {header.count - 1}."
+            )
+        return (column,)
+    if header.names is None:
+        raise BadDescription(
+            f'{where}: there is no column "{column}", because the file has no header. '
+            f"Give column numbers from 0 to {header.count - 1}."
+        )
+    if column in header.groups:
+        return header.groups[column]
+    found = header.names.count(column)
+    if found == 1:
+        return (header.names.index(column),)
+    if found:
+        raise BadDescription(
+            f'{where}: the name "{column}" stands over {found} columns. Rename all but one, or give column numbers.'
+        )
+    there = (*header.groups, *(n for n in header.names if "[" not in n or not header.groups))
+    raise BadDescription(
+        f'{where}: there is no column "{column}".{close_match(column, there)} Columns here: {listed(there)}.'
+    )

@@ -1,0 +1,45 @@
+"""Units of the log description, each with its factor to SI. The first unit of a kind is SI and the default."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.recording import STANDARD_GRAVITY
+
+_POUND_FORCE = 4.4482216152605
+_INCH = 0.0254
+
+TIME: dict[str, int] = {"s": 1, "ms": 1000, "us": 1_000_000, "ns": 1_000_000_000}  # per second, exact
+
+LENGTH: dict[str, float] = {"m": 1.0, "mm": 1e-3}
+ANGLE: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180)}
+
+# Quantity -> unit -> factor to SI. The factor of "g" depends on the place: see `factors`.
+UNITS: dict[str, dict[str, float]] = {
+    "force": {"N": 1.0, "kN": 1e3, "kgf": STANDARD_GRAVITY, "lbf": _POUND_FORCE},
+    "torque": {"N*m": 1.0, "N*mm": 1e-3, "kgf*m": STANDARD_GRAVITY, "lbf*in": _POUND_FORCE * _INCH},
+    "position": LENGTH,
+    "linear_velocity": {"m/s": 1.0},
+    "angular_velocity": {"rad/s": 1.0, "deg/s": ANGLE["deg"]},
+    "linear_acceleration": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
+    "angular_acceleration": {"rad/s^2": 1.0},
+    "specific_force": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
+    "gravity": {"m/s^2": 1.0},
+}
+
+_EARTH = (9.76, 9.84)
+
+
+def local_g(gravity: Array) -> float:
+    """Return what one g is [m/s^2]: the length of `gravity` (3,) where that is found on Earth, else standard gravity.
+
+    An accelerometer that reads 1 g at rest shows the gravity of its place, not 9.80665 m/s^2.
+    """
+    size = float(np.linalg.norm(gravity))
+    return size if _EARTH[0] <= size <= _EARTH[1] else STANDARD_GRAVITY
+
+
+def factor(quantity: str, unit: str, gravity: Array) -> float:
+    """Return the factor from `unit` to SI; `gravity` (3,) [m/s^2] says what one g is."""
+    return local_g(gravity) if unit == "g" else UNITS[quantity][unit]
