@@ -164,6 +164,15 @@ class Moments:
             raise BadFile(f"{path} does not hold saved moments ({error}). Write one with Moments.save.") from None
 
 
+def features(log: MotionLog) -> Array:
+    """Return z (N, 19) of every row: for second passes; the statistic itself never stores them."""
+    out = np.empty((SIZE, len(log)))
+    _features(
+        log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench, 0, len(log), out
+    )
+    return out.T
+
+
 def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:
     """Return the groups present (G, 3: class, block, still) and the group of every row, by counting (no sort)."""
     if not len(log):

@@ -1,0 +1,180 @@
+"""From a solution to an Estimate: covariance, evidence and which numbers the data fix."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
+from steelyard.identify import noise_cost
+from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.identify.holdout import leave_one_out
+from steelyard.identify.problem import Problem
+from steelyard.identify.regressor import residual_map
+from steelyard.inertia import InertialParameters, forms
+
+# Identified means: the data alone, without prior, give one standard deviation below these shares of
+# the mass, of the radius of gyration, and of half the trace of the inertia about the centre of mass.
+MASS_SHARE, COM_SHARE, INERTIA_SHARE = 0.1, 0.2, 0.1
+SMALLEST_RADIUS = 0.02
+# A direction counts toward the rank when the data fix it to half its natural size.
+RANK_INFORMATION = 4.0
+UNSEEN = 1e-9
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Linear parameters [phi (10), bias (0 or 6)], d phi / d coordinates (10, 10), prior Hessian in them (10, 10)."""
+
+    linear: Array
+    jacobian: Array
+    prior: Array
+
+    @classmethod
+    def unconstrained(cls, linear: Array) -> Solution:
+        """Return a solution whose coordinates are the parameters themselves, without a prior."""
+        return cls(linear, np.eye(10), np.zeros((10, 10)))
+
+    @property
+    def bias(self) -> Array:
+        """The wrench bias (6,) [tau, f]; zero where it was not estimated."""
+        return self.linear[10:] if len(self.linear) > 10 else np.zeros(6)
+
+
+@numba.njit(cache=True)
+def _inverse_scaled(matrix: Array) -> Array:
+    """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal."""
+    size = matrix.shape[0]
+    scale = np.ones(size)
+    for i in range(size):
+        if matrix[i, i] > 0.0:
+            scale[i] = 1 / np.sqrt(matrix[i, i])
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    inverse = np.zeros(size)
+    for i in range(size):
+        if values[i] > 1e-12 * values[-1]:
+            inverse[i] = 1 / values[i]
+    return (vectors * inverse) @ vectors.T * np.outer(scale, scale)
+
+
+@numba.njit(cache=True)
+def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
+    """Return the covariance (p, p) of the linear parameters, the prior counted as data of its own strength."""
+    size = H.shape[0]
+    J = np.eye(size)
+    J[:10, :10] = jacobian
+    A, score = J.T @ H @ J, J.T @ V @ J
+    A[:10, :10] += prior
+    score[:10, :10] += prior
+    bread = J @ _inverse_scaled(A)
+    return bread @ score @ bread.T
+
+
+def conclude(problem: Problem, solution: Solution, method: str, score: Array | None = None) -> Estimate:
+    """Return the Estimate of a solution.
+
+    `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
+    Raises CannotAnswer where mass or centre of mass are not fixed.
+    """
+    K = residual_map(solution.linear[:10], solution.bias)
+    data = (K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
+    H, extra, _ = noise_cost.information(*data)
+    chi2 = noise_cost.value(*data[:1], *data[2:]) / max(6 * problem.samples - len(solution.linear), 1.0)
+    V = score if score is not None else max(chi2, 1.0) * (H + extra)
+    covariance = _sandwich(H, V, solution.jacobian, solution.prior)
+    body = InertialParameters(solution.linear[:10])
+    rank, condition, spread, identified = _seen(H, V, solution.linear[:10])
+    _require_answer(identified, problem)
+    estimate = Estimate(
+        body,
+        covariance[:10, :10],
+        method,
+        Evidence(rank, condition, int(problem.samples), int(problem.still_samples), *_residual(problem, K), chi2, spread=spread),
+        identified,
+        solution.bias,
+        np.sqrt(np.diag(covariance)[10:]) if problem.with_bias else np.zeros(6),
+    )  # fmt: skip
+    left_out = leave_one_out(problem, solution.linear, H, solution.jacobian, solution.prior)
+    return replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))
+
+
+def _residual(problem: Problem, K: Array) -> tuple[float, float]:
+    """Return the rms residual per axis: force [N], torque [N m]."""
+    square = np.einsum("ij,jk,ik->i", K, problem.scatter.sum(0), K) / problem.samples
+    return float(np.sqrt(max(square[3:].mean(), 0))), float(np.sqrt(max(square[:3].mean(), 0)))
+
+
+def _seen(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, np.ndarray[Any, np.dtype[np.bool_]]]:
+    """Return rank, condition, spread (10,) and what is identified (10,), by the data alone.
+
+    In natural units (mass m, length r, the radius of gyration) the information about phi, bias projected out, has an
+    eigenvalue 1 where the data fix a direction to its own size.
+    """
+    mass = max(abs(float(phi[0])), 1e-6)
+    trace = abs(float(phi[4] + phi[7] + phi[9]) / 2 - float(phi[1:4] @ phi[1:4]) / mass)
+    radius = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    natural = mass * np.repeat([1.0, radius, radius**2], [1, 3, 6])
+    F, G = _without_bias(H, V)
+    values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
+    floor = max(UNSEEN, UNSEEN * float(values[-1]))
+    bread = natural[:, None] * (vectors / np.maximum(values, floor)) @ vectors.T * natural
+    people = np.zeros((10, 10))
+    people[0, 0], people[1:] = 1, forms.com_jacobian(phi)
+    half = people @ bread
+    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", half, G, half), 0))
+    hidden = (np.abs(people @ (natural[:, None] * vectors[:, values < floor])) > 1e-4 * _scales(mass, radius, trace)[:, None]).any(1)
+    std[hidden] = np.inf
+    shares = np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6])
+    fixed = values > RANK_INFORMATION
+    condition = float(np.sqrt(values[-1] / values[fixed][0])) if fixed.any() else np.inf
+    return int(fixed.sum()), condition, 2 * std, std < shares * _scales(mass, radius, trace)
+
+
+def _scales(mass: float, radius: float, trace: float) -> Array:
+    """Return the natural sizes (10,) of mass, com and inertia about the CoM."""
+    inertia = max(trace, mass * SMALLEST_RADIUS**2)
+    return np.repeat([mass, radius, inertia], [1, 3, 6])
+
+
+def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
+    """Return information and score variance (10, 10) of phi with the bias projected out."""
+    if len(H) == 10:
+        return H, V
+    project = np.concatenate([np.eye(10), -H[:10, 10:] @ np.linalg.pinv(H[10:, 10:], hermitian=True)], 1)
+    return project @ H[:, :10], project @ V @ project.T
+
+
+def _require_answer(identified: np.ndarray[Any, np.dtype[np.bool_]], problem: Problem) -> None:
+    """Raise CannotAnswer where mass or centre of mass are not fixed, saying what to add."""
+    if identified[:4].all():
+        return
+    names = ("the mass", "the centre of mass along x", "the centre of mass along y", "the centre of mass along z")
+    lost = ", ".join(n for n, ok in zip(names, identified, strict=False) if not ok)
+    poses = len(np.unique(problem.block_number[problem.block_number >= 0]))
+    seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or blocks" if poses else "")
+    raise CannotAnswer(
+        f"The data do not fix {lost} ({seen}). Add still poses that turn gravity to other axes of the sensor: "
+        "at least three, tilted by more than 30 degrees about two different axes"
+        + (", or tare the sensor without load and declare it with --no-bias." if problem.with_bias else ".")
+    )
+
+
+def _findings(estimate: Estimate) -> list[Finding]:
+    """Return what the evidence alone has to say."""
+    out = []
+    spread = estimate.evidence.spread
+    lost = ~estimate.identified[4:]
+    if lost.any() and spread is not None:
+        names = [n for n, gone in zip(("xx", "xy", "xz", "yy", "yz", "zz"), lost, strict=True) if gone]
+        half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
+        share = 50 * float(np.min(spread[4:][lost])) / max(half_trace, 1e-12)
+        least = f"one standard deviation is at least {share:.0f} % of half its trace" if share < 1e3 else "no rotation shows it"
+        out.append(
+            Finding.of("inertia-not-identified", f"The data do not fix the inertia entries {', '.join(names)}: {least}.")
+        )
+    return out

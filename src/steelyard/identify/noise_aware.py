@@ -1,0 +1,102 @@
+"""NoiseAware: maximum likelihood with noise in the wrench and in the measured acceleration (errors in variables).
+
+At cobot speed the error of every plain least squares is dominated by noise in the regressor. Here the residual of a row
+has the covariance Sigma_w + M(phi) Sigma_a M(phi)^T; the cost sum r^T W r is minimised by Newton steps in log-Cholesky
+coordinates, so that every answer is a rigid body, from scatter matrices alone.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.identify import newton
+from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.correlated import score_variance
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.linear import reweighted
+from steelyard.identify.noise_levels import with_noise
+from steelyard.identify.problem import Problem
+from steelyard.identify.rest import at_rest
+from steelyard.inertia import forms
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import Moments
+
+# A body's radius of gyration per axis starts within these bounds [m]; the prior pulls it to that of a 5 cm ball.
+SMALLEST, LARGEST, NEUTRAL = 0.005, 0.2, 0.05 / np.sqrt(5)
+
+
+@dataclass(frozen=True)
+class NoiseAware:
+    """Options of the noise-aware estimator.
+
+    bias         "free": a constant force and torque bias is estimated; "none": the sensor is known to be tared
+    prior        weight of the pull toward the ball of the size that fits best: 1 counts like one sample per axis
+    size         radius of gyration per axis to which the size is pulled where the data are silent [m]
+    size_spread  how far off `size` may be, as a factor e^size_spread (one standard deviation)
+    iterations   Newton steps at most
+    """
+
+    bias: str = "free"
+    prior: float = 0.5
+    size: float = float(NEUTRAL)
+    size_spread: float = 1.0
+    iterations: int = 60
+
+    def identify(self, log: MotionLog) -> Estimate:
+        """Return the estimate of a log; noise that it does not declare is estimated, rest is verified.
+
+        Raises CannotAnswer where the data do not fix mass and centre of mass.
+        """
+        log = with_noise(log, self.bias == "free")
+        if log.still.any():
+            first = self._fit(Problem.of(Moments.of_log(log, by_block=False), self.bias == "free"))
+            log = at_rest(log, first.linear[:10], first.bias)
+        problem = Problem.of(Moments.of_log(log), self.bias == "free")
+        solution = self._fit(problem)
+        return conclude(problem, solution, "noise-aware", score_variance(log, problem, solution))
+
+    def solve(self, moments: Moments) -> Estimate:
+        """Return the estimate from a statistic that carries its noise."""
+        problem = Problem.of(moments, self.bias == "free")
+        return conclude(problem, self._fit(problem), "noise-aware")
+
+    def _fit(self, problem: Problem) -> Solution:
+        data = (problem.T, problem.scatter, problem.acceleration, problem.wrench)
+        options = (self.prior, float(np.log(self.size)), self.size_spread**-2)
+        linear = reweighted(*data, 3)
+        best = None
+        for start in self._starts(linear):
+            found = newton.minimise(start, *data, *options, self.iterations)
+            if best is None or found[1] < best[1]:
+                best = found
+            if found[2]:
+                break
+        if best is None or not np.isfinite(best[1]):
+            raise CannotAnswer("The noise-aware cost has no minimum on this log; check units and signs with `doctor`.")
+        u = best[0]
+        prior = newton.shape_prior(u[:10], *options)[2]
+        return Solution(newton.linear_of(u), newton.jacobian(u[:10], newton.factor(u[:10])), prior)
+
+    def _starts(self, linear: Array) -> list[Array]:
+        """Return starting points [theta, bias]: the linear solution made a body, then the neutral ball at its centre."""
+        mass = max(float(linear[0]), 1e-3)
+        com = linear[1:4] / mass
+        pseudo = forms.pseudo_inertia(linear[:10])
+        values, axes = np.linalg.eigh(pseudo[:3, :3] / mass - np.outer(com, com))
+        shape = (axes * np.clip(values, SMALLEST**2, LARGEST**2)) @ axes.T
+        return [
+            np.concatenate([forms.log_cholesky(_pseudo(mass, com, s)), linear[10:]])
+            for s in (shape, self.size**2 * np.eye(3))
+        ]
+
+
+def _pseudo(mass: float, com: Array, shape: Array) -> Array:
+    """Return P (4, 4) of a body with second moment per unit mass `shape` (3, 3) about its centre of mass."""
+    centre = np.append(com, 1.0)
+    out = np.outer(centre, centre)
+    out[:3, :3] += shape
+    return mass * out

@@ -1,0 +1,89 @@
+"""Noise levels that a log does not declare, estimated from the log itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.linear import reweighted
+from steelyard.identify.regressor import design, residual_map
+from steelyard.identify.rest import RIPPLE
+from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.moments import Moments
+
+# Below this many residuals per axis the three axes share one level.
+ROWS_PER_AXIS = 200
+# The wrench keeps at least this share of the residual variance that noise in the motion could also explain.
+LEAST_SHARE = 0.1
+# Start of the iteration: force in N and torque in N m of an everyday wrist sensor.
+FIRST_GUESS = np.repeat(np.square([0.02, 0.5]), 3)
+SMALLEST = np.repeat(np.square([1e-7, 1e-6]), 3)
+
+
+def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
+    """Return the log with every noise level filled in; levels that it declares are kept.
+
+    A declared wrench variance of zero means "not known". Acceleration noise comes from the readings of rows at rest,
+    else from fourth differences along time; wrench noise from the residuals, less what acceleration noise explains.
+    """
+    if log.noise is None:
+        log = _with_classes(log)
+    noise = log.noise or ()
+    unknown = np.stack([n.wrench for n in noise]) <= 0
+    if not unknown.any():
+        return log
+    levels = np.where(unknown, FIRST_GUESS, np.stack([n.wrench for n in noise]))
+    for _ in range(5):
+        log = replace(log, noise=tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True)))
+        levels = np.where(unknown, _wrench_levels(log, with_bias), levels)
+    return replace(log, noise=tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True)))
+
+
+def _with_classes(log: MotionLog) -> MotionLog:
+    """Return the log in two classes, moving and still, with estimated acceleration noise and unknown wrench noise."""
+    acceleration = _acceleration_levels(log)
+    noise = Noise(acceleration, np.zeros(6))
+    return replace(log, noise_class=log.still.astype(np.int64), noise=(noise, noise))
+
+
+def _acceleration_levels(log: MotionLog) -> Array:
+    """Return variances (6,) of the measured [alpha, a]."""
+    readings = np.concatenate([log.angular_acceleration, log.acceleration], 1)
+    if not readings.any():
+        return RIPPLE
+    if log.still.sum() >= 8:
+        return _pooled((readings[log.still] ** 2).mean(0), int(log.still.sum()))
+    if log.time is None or len(log) < 16:
+        return np.zeros(6)
+    # White noise leaves a variance of 70 in fourth differences, where a smooth motion leaves next to nothing.
+    differences = np.diff(readings, 4, axis=0)
+    return _pooled((differences**2).mean(0) / 70, len(log))
+
+
+def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
+    """Return wrench variances (C, 6) per class from the residuals of the current weighted solution."""
+    moments = Moments.of_log(log, by_block=False)
+    noise = log.noise or ()
+    out = np.tile(SMALLEST, (len(noise), 1))
+    T = design(with_bias)
+    acceleration = np.stack([noise[c].acceleration for c in moments.noise_class])
+    wrench = np.stack([noise[c].wrench for c in moments.noise_class])
+    linear = reweighted(T, moments.scatter, acceleration, wrench, 4)
+    K = residual_map(linear[:10], linear[10:] if with_bias else np.zeros(6))
+    # Parameters that the data fix take their share of the residual degrees of freedom away.
+    lost = min(len(T), 6 * moments.samples / 2) / (6 * moments.samples)
+    for group, c in enumerate(moments.noise_class):
+        rows = moments.counts[group]
+        miss = np.diag(K @ moments.scatter[group] @ K.T) / (rows * (1 - lost))
+        explained = (K[:, :6] ** 2) @ acceleration[group]
+        out[c] = np.maximum(_pooled(np.maximum(miss - explained, LEAST_SHARE * miss), int(rows)), SMALLEST)
+    return out
+
+
+def _pooled(variance: Array, rows: int) -> Array:
+    """Return the variances, with each triple of axes at its mean where the rows are few."""
+    if rows >= ROWS_PER_AXIS:
+        return variance
+    return np.repeat(variance.reshape(2, 3).mean(1), 3)

@@ -1,0 +1,51 @@
+"""Rows at rest: their acceleration is zero, unless the wrench says otherwise."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.log import MotionLog, Noise
+
+# What a robot that holds still does all the same: joint control ripple, rad/s^2 and m/s^2.
+RIPPLE = Noise.of_std(0.01, 0.002, 0.0, 0.0).acceleration
+# A row at rest leaves a chi-square of 6 degrees of freedom; one in a thousand lies above this.
+SURPRISE = 22.46
+
+
+def at_rest(log: MotionLog, phi: Array, bias: Array) -> MotionLog:
+    """Return the log with the acceleration of its resting rows fused with zero, in a noise class of their own.
+
+    A row flagged still may already start to move: one such row in fifty, taken as at rest, moves the centre of mass
+    more than all noise together. A flagged row stays at rest only if the wrench that phi (10,) and bias (6,) predict
+    without acceleration is within its noise; else it keeps its measured acceleration and its noise.
+    """
+    if log.noise is None or not log.still.any():
+        return log
+    variance = np.stack([n.acceleration for n in log.noise])[log.noise_class]
+    share = np.where(log.still[:, None], RIPPLE / np.maximum(RIPPLE + variance, 1e-300), 1.0)
+    quiet = replace(
+        log,
+        angular_acceleration=share[:, :3] * log.angular_acceleration,
+        acceleration=share[:, 3:] * log.acceleration,
+    )
+    wrench_variance = np.stack([n.wrench for n in log.noise])[log.noise_class]
+    miss = log.wrench - bias - quiet.predicted(phi)
+    resting = log.still & ((miss**2 / wrench_variance).sum(1) < SURPRISE)
+    classes = len(log.noise)
+    return replace(
+        quiet,
+        angular_acceleration=np.where(resting[:, None], quiet.angular_acceleration, log.angular_acceleration),
+        acceleration=np.where(resting[:, None], quiet.acceleration, log.acceleration),
+        still=resting,
+        noise_class=log.noise_class + classes * resting,
+        noise=log.noise + tuple(_resting(n) for n in log.noise),
+    )
+
+
+def _resting(noise: Noise) -> Noise:
+    """Return the noise of a reading fused with zero."""
+    fused = RIPPLE * noise.acceleration / np.maximum(RIPPLE + noise.acceleration, 1e-300)
+    return Noise(fused, noise.wrench)
