@@ -28,8 +28,8 @@ class ValidityReport:
 def report(phi: Array) -> ValidityReport:
     """Judge the parameters (..., 10) and word the worst offence of a batch.
 
-    The laws are m > 0 and, of the rising principal moments, J1 > 0 and J1 + J2 > J3. Together they say that the
-    pseudo-inertia is positive definite (Wensing, Kim, Slotine 2018).
+    The laws are m > 0 and, of the rising principal moments, J1 > 0 and J1 + J2 > J3. Together they say that
+    the pseudo-inertia is positive definite (Wensing, Kim, Slotine 2018).
     """
     bodies = phi.reshape(-1, 10)
     mass = bodies[:, 0]
