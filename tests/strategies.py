@@ -1,4 +1,4 @@
-"""Hypothesis strategies: rotations from every regime that has its own branch, poses, six-vectors and bodies."""
+"""Hypothesis strategies: rotations of every regime, poses, six-vectors and bodies."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Pose: the laws of SE(3), what it does to wrenches and twists, and accelerations against finite differences."""
+"""Pose: the laws of SE(3), wrenches and twists moved, and accelerations against finite differences."""
 
 from __future__ import annotations
 
@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import BATCHES, accelerations, numbers, poses, twists, wrenches
 
 from steelyard.errors import BadValue
 from steelyard.spatial import Acceleration, Pose, Rotation, Twist, Wrench
+from strategies import BATCHES, accelerations, numbers, poses, twists, wrenches
 
 TIGHT = 1e-12
 

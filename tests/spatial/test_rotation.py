@@ -8,10 +8,10 @@ import scipy.spatial.transform as scipy_transform
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose
-from strategies import BATCHES, angles, numbers, rotation_vectors, rotations
 
 from steelyard.errors import BadValue
 from steelyard.spatial import Rotation
+from strategies import BATCHES, angles, numbers, rotation_vectors, rotations
 
 TIGHT = 1e-13
 

@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from numpy.testing import assert_allclose, assert_array_equal
-from strategies import BATCHES, numbers
 
 from steelyard.errors import BadValue
 from steelyard.spatial import Acceleration, Twist, Wrench, cross, cross_matrix
+from strategies import BATCHES, numbers
 
 
 @pytest.mark.parametrize("batch", BATCHES)
