@@ -47,7 +47,7 @@ def score(found: InertialParameters, true: InertialParameters, bounds: ArrayLike
         com_pct=float(com_pct(found, true, edges)),
         inertia_pct=float(inertia_pct(found, true, edges)),
         riemannian=distance if np.isfinite(distance) else None,
-        consistent=bool(consistent(found)),
+        consistent=bool(consistent(found)) and bool(np.isfinite(distance)),
     )
 
 
