@@ -1,4 +1,4 @@
-"""Readers and writers: log descriptions and data files become a Recording; results become JSON and come back."""
+"""Readers and writers: files become a Recording; results become JSON and come back."""
 
 from steelyard.io.log_files import read_recording
 from steelyard.io.pendant import read_pendant

@@ -1,8 +1,14 @@
-"""NPZ files as tables. A key with shape (N,) is a column; (N, k) or (N, a, b) is k columns, all of them by its name."""
+"""NPZ files as tables.
+
+A key with shape (N,) is one column. A key with shape (N, k) or (N, a, b) is k or a*b columns: its name alone
+means all of them, in order, and "name[0]" one of them.
+"""
 
 from __future__ import annotations
 
+import math
 import zipfile
+import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -15,6 +21,7 @@ from steelyard.errors import BadFile
 from steelyard.io.tables import Columns, Header
 
 _WIDEST = 4096
+_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
@@ -63,7 +70,7 @@ class ArrayTable:
 def _numeric(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
     try:
         array: np.ndarray[Any, np.dtype[Any]] = archive[key]
-    except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
+    except _DAMAGED as error:
         raise BadFile(f'{path}: array "{key}" is damaged ({error}). Save the file again.') from None
     if array.dtype.kind not in "fiub":
         raise BadFile(f'{path}: array "{key}" must hold real numbers; it holds {array.dtype}.')
@@ -89,13 +96,18 @@ def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
             version = npy.read_magic(member)
             read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
             shape, _, dtype = read(member)
-        except (ValueError, EOFError):
+        except _DAMAGED:
             raise BadFile(
                 f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.'
             ) from None
+        size = archive.getinfo(name).file_size
     if dtype.hasobject:
         raise BadFile(
-            f'{path}: array "{key}" holds pickled Python objects, which can run code when opened, so it was not opened. '
-            "Save it as plain numbers (float64)."
+            f'{path}: array "{key}" holds pickled Python objects, which can run code when opened; '
+            "it was not opened. Save it as plain numbers (float64)."
+        )
+    if dtype.itemsize * math.prod(shape) > size:
+        raise BadFile(
+            f'{path}: array "{key}" is damaged (shorter than its header says). Save the file again.'
         )
     return tuple(shape)

@@ -32,14 +32,15 @@ class Clock:
         if len(falls):
             i = int(falls[0])
             times = f"{len(falls)} times, first" if len(falls) > 1 else "once,"
+            before, after = self.stamps[i], self.stamps[i + 1]
             raise BadValue(
-                f"{self.where}: time must not go back; it does {times} from {self.stamps[i]} in row {i + 1} to "
-                f"{self.stamps[i + 1]} in row {i + 2}. Sort the rows, or cut the log there."
+                f"{self.where}: time must not go back; it does {times} from {before} in row {i + 1} "
+                f"to {after} in row {i + 2}. Sort the rows, or cut the log there."
             )
         if len(steps) and not steps.any():
             raise BadValue(
-                f"{self.where}: time stands still at {self.stamps[0]} in all {len(self.stamps)} rows. Name the column of "
-                "the clock, or give time = { rate = .. }."
+                f"{self.where}: time stands still at {self.stamps[0]} in all {len(self.stamps)} rows. "
+                "Name the column of the clock, or give time = { rate = .. }."
             )
 
     def seconds_after(self, origin: int) -> Array:

@@ -73,7 +73,7 @@ def _load_toml(path: Path) -> dict[str, Any]:
         return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
     except UnicodeDecodeError:
         raise BadFile(f"{path}: expected a TOML text in UTF-8; found a binary file.") from None
-    except tomllib.TOMLDecodeError as error:
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise BadDescription(f"{path}: not valid TOML: {error}.") from None
 
 

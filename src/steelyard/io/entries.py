@@ -1,4 +1,4 @@
-"""Entry: typed access to one table of a description, whose errors say where and what would have been right."""
+"""Entry: typed access to one table of a description; its errors say where, and what would have been right."""
 
 from __future__ import annotations
 
@@ -13,10 +13,15 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription
 
+_MOST_LISTED = 60
+_LONGEST_NAME = 60
+_LARGEST_INTEGER = 10**300
+
 
 def listed(names: Sequence[object]) -> str:
-    """Return names for a message, separated by commas."""
-    return ", ".join(str(name) for name in names)
+    """Return names for a message, separated by commas; very many or very long ones are cut."""
+    shown = ", ".join(str(name)[:_LONGEST_NAME] for name in names[:_MOST_LISTED])
+    return f"{shown}, .. ({len(names)} in all)" if len(names) > _MOST_LISTED else shown
 
 
 def close_match(wrong: str, right: Sequence[str]) -> str:
@@ -77,8 +82,8 @@ class Entry:
 
     def number(self, key: str) -> float:
         """Return one finite number."""
-        value = self.values.get(key)
-        if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        value: Any = self.values.get(key)
+        if not _is_number(value):
             raise self.error(f'"{key}" must be a finite number; got {value!r}.')
         return float(value)
 
@@ -100,4 +105,6 @@ class Entry:
 
 
 def _is_number(value: object) -> bool:
-    return isinstance(value, int | float) and not isinstance(value, bool) and math.isfinite(value)
+    if isinstance(value, bool) or not isinstance(value, int | float):
+        return False
+    return math.isfinite(value) if isinstance(value, float) else abs(value) < _LARGEST_INTEGER

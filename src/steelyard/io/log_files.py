@@ -15,6 +15,7 @@ from steelyard.io import guess
 from steelyard.io.channels import channel, require_one_length
 from steelyard.io.clocks import Clock, common_origin, steady
 from steelyard.io.description import Description, read_description
+from steelyard.io.requirements import require_answerable, require_matched_rows
 from steelyard.io.result_files import read_result_parameters
 from steelyard.io.rotations import FORMS
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
@@ -28,8 +29,8 @@ Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 def read_recording(path: Path | str, data: Path | str | None = None) -> Recording:
     """Read a log.
 
-    path  a description (.toml), or a bare data file (.csv .tsv .txt, also .gz; .npz; .parquet) with usual column names
-    data  folder in which relative paths are sought first; then $STEELYARD_DATA, then the folder of the description
+    path  a description (.toml), or a bare data file (.csv .tsv .txt, .gz of these, .npz, .parquet)
+    data  folder in which relative paths are sought first; then $STEELYARD_DATA, then beside the description
 
     Returns the streams in SI, each on its own clock; all clocks count from one common origin.
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
@@ -52,7 +53,8 @@ def _open_all(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> l
     for spec in specs:
         if spec.topic is not None:
             raise BadFile(
-                f'{spec.where}: "topic" belongs to bags, which are not supported yet. Export the topic to CSV.'
+                f'{spec.where}: "topic" belongs to bags, which are not supported yet. '
+                "Export the topic to CSV."
             )
         if spec.path not in opened:
             opened[spec.path] = open_table(find_file(spec.path, folder, data))
@@ -110,14 +112,21 @@ def _recording(
         )
         for name, spec, values, time in zip(names, specs, channels, times, strict=True)
     )
-    _require_matched_rows(streams, path.name)
+    require_matched_rows(streams, path.name)
     tool = None
     if description.tool is not None:
         tool = read_result_parameters(find_file(description.tool, path.parent, data))
     return Recording(
-        streams, check.frozen(description.gravity), description.wrench_sign, description.noise, tool, description.tool,
-        description.object_pose, description.object_pose_std, path.stem,
-    )  # fmt: skip
+        streams,
+        gravity=check.frozen(description.gravity),
+        wrench_sign=description.wrench_sign,
+        noise=description.noise,
+        tool=tool,
+        tool_result=description.tool,
+        object_pose=description.object_pose,
+        object_pose_std=description.object_pose_std,
+        name=path.stem,
+    )
 
 
 def _channels(spec: StreamSpec, table: Table, cells: Cells, gravity: Array) -> dict[str, Array]:
@@ -130,7 +139,8 @@ def _channels(spec: StreamSpec, table: Table, cells: Cells, gravity: Array) -> d
             raise BadDescription(f'{spec.where}: torque = "zero" belongs in the stream that holds "force".')
         out["torque"] = check.frozen(np.zeros_like(out["force"]))
     lengths = {name: len(values) for name, values in out.items()}
-    require_one_length(lengths | {"time": len(cells[n]) for n in _time_column(spec, table)}, spec.where)
+    stamps = [len(cells[n]) for n in _time_column(spec, table)]
+    require_one_length(lengths | ({"time": stamps[0]} if stamps else {}), spec.where)
     if not next(iter(lengths.values())):
         raise BadValue(f"{spec.where}: the log is empty: it has no rows. Record again, or correct the path.")
     return out
@@ -139,7 +149,7 @@ def _channels(spec: StreamSpec, table: Table, cells: Cells, gravity: Array) -> d
 def _times(
     specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Cells], rows: Sequence[int]
 ) -> list[Array | None]:
-    """Return seconds after one common origin; a stream with only a rate starts where the earliest clock does."""
+    """Return seconds after one common origin; a stream with only a rate starts with the earliest clock."""
     clocks: dict[int, Clock] = {}
     for i, (spec, table, mine) in enumerate(zip(specs, tables, cells, strict=True)):
         for number in _time_column(spec, table):
@@ -163,43 +173,3 @@ def _names(specs: Sequence[StreamSpec]) -> list[str]:
         before = sum(other.path == spec.path for other in specs[:i])
         names.append(f"{spec.path}#{before + 1}" if before else spec.path)
     return names
-
-
-def require_answerable(specs: Sequence[StreamSpec], name: str) -> None:
-    """Raise BadDescription where quantities that every answer needs are missing, or one is given twice."""
-    given = [quantity for spec in specs for quantity in spec.names]
-    for quantity in given:
-        if given.count(quantity) > 1:
-            raise BadDescription(
-                f'{name}: "{quantity}" is given by {given.count(quantity)} streams. Give it in one.'
-            )
-    shown = ", ".join(quantity for quantity in QUANTITIES if quantity in given)
-    missing = [quantity for quantity in ("force", "torque") if quantity not in given]
-    if missing:
-        raise BadDescription(
-            f"{name}: no {' and no '.join(missing)} is given, only {shown}. An answer needs the wrench: force and torque "
-            '(torque = "zero" for a passive gimbal).'
-        )
-    if not {"rotation", "gravity", "specific_force"} & set(given):
-        raise BadDescription(
-            f"{name}: nothing says where gravity points in the sensor frame; given are {shown}. "
-            "Add rotation (S to W), gravity (in S) or specific_force (an accelerometer)."
-        )
-
-
-def _require_matched_rows(streams: Sequence[Stream], name: str) -> None:
-    """Raise where streams without a clock stand beside others that they cannot be matched with by row."""
-    still = [stream for stream in streams if stream.time is None]
-    if not still or len(streams) == 1:
-        return
-    if len(still) < len(streams):
-        timed = next(stream for stream in streams if stream.time is not None)
-        raise BadDescription(
-            f'{name}: stream "{still[0].name}" has no time and "{timed.name}" has one, so their rows cannot be matched. '
-            "Give time to all streams or to none."
-        )
-    if len({len(stream) for stream in streams}) > 1:
-        shown = ", ".join(f'"{stream.name}" {len(stream)}' for stream in streams)
-        raise BadValue(
-            f"{name}: streams without time are matched by row, but their lengths differ: {shown} rows."
-        )

@@ -19,9 +19,9 @@ PENDANT_COLUMNS = "roll pitch yaw (deg, S to W), fx fy fz (N), tx ty tz (N*m)"
 
 
 def read_pendant(lines: Iterable[str], gravity: Array | None = None, on_sensor: bool = True) -> Recording:
-    """Return still poses typed one per line: roll pitch yaw [deg] of the sensor in the world, then fx fy fz tx ty tz.
+    """Return still poses typed one per line: roll pitch yaw [deg] of S in W, fx fy fz [N], tx ty tz [N m].
 
-    lines      nine numbers each, separated by blanks, commas or semicolons; empty lines and # comments are skipped
+    lines      nine numbers each, between blanks, commas or semicolons; empty lines and # comments are skipped
     gravity    (3,) [m/s^2] in W; standard gravity, z up, where left out
     on_sensor  whether the readings are the reaction on the sensor (most are) or what the robot applies
 

@@ -2,10 +2,10 @@
 
 from __future__ import annotations
 
+import contextlib
 import json
 import math
 import os
-import tempfile
 from pathlib import Path
 from typing import Any
 
@@ -17,7 +17,7 @@ from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.inertia import InertialParameters, forms
 
 _LARGEST = 64_000_000
-_NEEDED = ("mass_kg", "com_m", "inertia_com_kgm2", "frame", "covariance")
+_WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
 
 
 def result_dict(estimate: Estimate) -> dict[str, Any]:
@@ -93,59 +93,50 @@ def write_result(estimate: Estimate, path: Path | str) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file by way of a temporary one beside it; raises BadFile where the folder cannot be written."""
-    temporary = None
+    """Write a text file by way of a temporary one beside it; raises BadFile where that is not possible."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        descriptor, temporary = tempfile.mkstemp(prefix=f".{path.name}.", dir=path.parent)
-        with os.fdopen(descriptor, "w", encoding="utf-8") as stream:
-            stream.write(text)
-        os.chmod(temporary, 0o666 & ~_umask())
-        os.replace(temporary, path)
+        temporary.write_text(text, encoding="utf-8")
+        temporary.replace(path)
     except OSError as error:
-        if temporary is not None:
-            Path(temporary).unlink(missing_ok=True)
         raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
-
-
-def _umask() -> int:
-    mask = os.umask(0)
-    os.umask(mask)
-    return mask
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
 
 
 def read_result(path: Path | str) -> tuple[InertialParameters, Array, dict[str, Any]]:
-    """Return parameters, covariance (10, 10) and the whole result; raises BadFile.
+    """Return the body, its covariance (10, 10) and the whole result as written; raises BadFile.
 
-    Where the inertia was not fixed by the data, the parameters hold the best guess that the result carries.
+    Where the result has no inertia (`inertia_com_kgm2` null), it is the best guess that
+    the result carries in `parameters`, or zero: look at `identified`.
     """
     path = Path(path)
     values = _load_json(path)
-    for key in _NEEDED:
-        if key not in values:
-            raise BadFile(
-                f'{path}: not a Steelyard result: "{key}" is missing. Write one with: steelyard identify -o FILE.'
-            )
-    covariance = _numbers(path, values, "covariance", (10, 10))
-    if "parameters" in values:
-        return InertialParameters(_numbers(path, values, "parameters", (10,))), covariance, values
-    return _from_people(path, values), covariance, values
+    return _body(path, values), _numbers(path, values, "covariance", (10, 10)), values
 
 
 def read_result_parameters(path: Path | str) -> InertialParameters:
-    """Return the body of a result, in S, to be subtracted as a tool; raises BadFile."""
-    parameters, _, values = read_result(path)
-    if values["frame"] != "S":
-        raise BadFile(
-            f'{path}: a tool must be given in the sensor frame "S"; this result is in "{values["frame"]}".'
-        )
-    return parameters
+    """Return the body of a result in the sensor frame, to be subtracted as a tool; raises BadFile.
+
+    Only `mass_kg`, `com_m` and `inertia_com_kgm2` are needed, so that a data sheet can be typed as a result.
+    """
+    path = Path(path)
+    values = _load_json(path)
+    body = _body(path, values)
+    if values.get("frame", "S") != "S":
+        raise BadFile(f'{path}: a tool must be given in the sensor frame "S"; found "{values["frame"]}".')
+    return body
 
 
-def _from_people(path: Path, values: dict[str, Any]) -> InertialParameters:
+def _body(path: Path, values: dict[str, Any]) -> InertialParameters:
     mass = float(_numbers(path, values, "mass_kg", ()))
     com = _numbers(path, values, "com_m", (3,))
-    known = values["inertia_com_kgm2"] is not None
-    inertia = _numbers(path, values, "inertia_com_kgm2", (3, 3)) if known else np.zeros((3, 3))
+    if values.get("inertia_com_kgm2") is None:
+        if "parameters" in values:
+            return InertialParameters(_numbers(path, values, "parameters", (10,)))
+        return InertialParameters.from_com(mass, com, np.zeros((3, 3)))
+    inertia = _numbers(path, values, "inertia_com_kgm2", (3, 3))
     try:
         return InertialParameters.from_com(mass, com, inertia)
     except BadInput as error:
@@ -157,24 +148,24 @@ def _load_json(path: Path) -> dict[str, Any]:
         size = path.stat().st_size
         if size > _LARGEST:
             raise BadFile(f"{path}: a result is a small JSON text; this file has {size} bytes.")
-        values = json.loads(path.read_text(encoding="utf-8"))
+        values = json.loads(path.read_text(encoding="utf-8-sig"))
     except OSError as error:
         raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
     except UnicodeDecodeError:
         raise BadFile(f"{path}: expected a JSON result; found a binary file.") from None
-    except json.JSONDecodeError as error:
+    except (json.JSONDecodeError, RecursionError) as error:
         raise BadFile(f"{path}: not valid JSON: {error}.") from None
     if not isinstance(values, dict):
-        raise BadFile(
-            f"{path}: not a Steelyard result: expected one JSON object. Write one with: steelyard identify -o FILE."
-        )
+        raise BadFile(f"{path}: not a Steelyard result: expected one JSON object. {_WRITE_ONE}")
     return values
 
 
 def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
+    if key not in values:
+        raise BadFile(f'{path}: not a Steelyard result: "{key}" is missing. {_WRITE_ONE}')
     try:
         array = np.array(values[key], dtype=np.float64)
-    except (TypeError, ValueError):
+    except (TypeError, ValueError, OverflowError):
         array = np.empty(0)
     if array.shape != shape or not np.isfinite(array).all():
         wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "one finite number"

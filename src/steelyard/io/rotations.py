@@ -1,6 +1,8 @@
-"""Rotations as files write them: nine matrix entries row by row, quaternions in both orders, roll pitch yaw."""
+"""Rotations as files write them: matrices row by row, quaternions in both orders, roll pitch yaw."""
 
 from __future__ import annotations
+
+from typing import Any
 
 import numpy as np
 
@@ -12,6 +14,7 @@ FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4
 
 ROUNDING = 5e-3  # how far R^T R may be from 1: a matrix written with three digits after the point
 NORM = 0.05  # how far the length of a quaternion may be from 1
+_ZERO = 1e-12
 
 
 def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
@@ -32,15 +35,16 @@ def _of_matrix(matrix: Array) -> Rotation:
     error = np.abs(_excess(matrix)).max((-1, -2))
     if error.size and float(error.max()) > ROUNDING:
         raise BadValue(
-            f"the rotation is not orthonormal: {int((error > ROUNDING).sum())} of {error.size} rows are not, the worst "
-            f"is row {int(error.argmax()) + 1}, where R^T R is off by {float(error.max()):.3g} (allowed {ROUNDING:g}). "
+            f"the rotation is not orthonormal: {_count(error > ROUNDING)}, the worst is row "
+            f"{int(error.argmax()) + 1}, where R^T R is off by {float(error.max()):.3g} "
+            f"(allowed {ROUNDING:g}). "
             "Check the order and the number of digits of the nine columns."
         )
     mirrored = np.linalg.det(matrix) < 0
     if mirrored.any():
         raise BadValue(
-            f"the rotation is a mirror image (determinant -1) in {int(mirrored.sum())} of {mirrored.size} rows, first "
-            f"in row {int(mirrored.argmax()) + 1}. Check the order and the signs of the nine columns."
+            f"the rotation is a mirror image (determinant -1): {_count(mirrored)}, first row "
+            f"{int(mirrored.argmax()) + 1}. Check the order and the signs of the nine columns."
         )
     for _ in range(3):  # Newton-Schulz: squares the error and keeps the polar factor, much faster than an SVD
         matrix = matrix - 0.5 * matrix @ _excess(matrix)
@@ -54,15 +58,20 @@ def _excess(matrix: Array) -> Array:
 
 def _check_norm(quaternion: Array) -> None:
     norm = np.linalg.norm(quaternion, axis=-1)
-    zero = norm < 1e-12
+    zero = norm < _ZERO
     if zero.any():
         raise BadValue(
-            f"the quaternion has norm zero in {int(zero.sum())} of {zero.size} rows, first in row "
-            f"{int(zero.argmax()) + 1}. Delete the rows where the pose was not known."
+            f"the quaternion has norm zero: {_count(zero)}, first row {int(zero.argmax()) + 1}. "
+            "Delete the rows where the pose was not known."
         )
     error = np.abs(norm - 1)
     if error.size and float(error.max()) > NORM:
+        worst = int(error.argmax())
         raise BadValue(
-            f"the quaternion must have norm 1; it is off in {int((error > NORM).sum())} of {error.size} rows, most in "
-            f"row {int(error.argmax()) + 1} with norm {float(norm.flat[int(error.argmax())]):.4g}. Check the four columns."
+            f"the quaternion must have norm 1: {_count(error > NORM)} are off, the worst is row {worst + 1} "
+            f"with norm {float(norm.flat[worst]):.4g}. Check the four columns."
         )
+
+
+def _count(bad: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
+    return f"{int(bad.sum())} of {bad.size} rows"

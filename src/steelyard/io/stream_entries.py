@@ -1,4 +1,4 @@
-"""One [[stream]] of a description as checked values: which columns hold which quantity, in which unit and frame."""
+"""One [[stream]] of a description as checked values: which columns hold what, in which unit and frame."""
 
 from __future__ import annotations
 
@@ -139,7 +139,7 @@ def _rotation(entry: Entry) -> QuantitySpec:
 
 
 def _columns(entry: Entry, count: int) -> tuple[Column, ...]:
-    """Return `count` column names or numbers; one alone may name an array of an NPZ that holds all of them."""
+    """Return `count` column names or numbers; one alone may name an NPZ array that holds all of them."""
     value = entry.require("columns", f"columns = [..] with {count} names")
     good = isinstance(value, list) and all(
         isinstance(c, str | int) and not isinstance(c, bool) for c in value

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Protocol
 
@@ -32,17 +32,27 @@ class Header:
 
     names: tuple[str, ...] | None
     count: int
-    groups: dict[str, tuple[int, ...]]
+    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
+
+    def shown(self) -> list[str]:
+        """Return the names to list in a message: arrays with several columns appear once."""
+        inner = {n for group in self.groups.values() for n in group}
+        return [*self.groups, *(name for n, name in enumerate(self.names or ()) if n not in inner)]
 
 
 class Table(Protocol):
     """A data file that is open for reading columns."""
 
-    path: Path
-    header: Header
+    @property
+    def path(self) -> Path:
+        """The file."""
+
+    @property
+    def header(self) -> Header:
+        """Its columns."""
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
-        """Return the columns by number, float64; those in `exact` stay int64 where the file writes integers."""
+        """Return columns by number, float64; those in `exact` stay int64 where the file writes integers."""
 
 
 def open_table(path: Path) -> Table:
@@ -50,9 +60,11 @@ def open_table(path: Path) -> Table:
     from steelyard.io import array_table, parquet_table, text_table
 
     suffix = data_suffix(path)
+    if path.is_dir() and not (path / "metadata.yaml").exists():
+        raise BadFile(f"{path}: this is a folder, not a file of data. Name the file in it.")
     if suffix in BAGS or path.is_dir():
         raise BadFile(
-            f"{path}: bags are not supported yet. Export the topics to CSV (one file per topic, with its stamps) "
+            f"{path}: bags are not supported yet. Export each topic to a CSV file with its stamps, "
             "and name those files in the description."
         )
     if suffix not in (*TEXT, ".npz", ".parquet"):
@@ -72,7 +84,7 @@ def data_suffix(path: Path) -> str:
 
 
 def find_file(name: str, folder: Path, data: Path | None) -> Path:
-    """Return the file `name`, sought in `data`, then $STEELYARD_DATA, then `folder`; raises BadFile naming all three."""
+    """Return the file `name`, sought in `data`, $STEELYARD_DATA, `folder`; raises BadFile naming them."""
     if Path(name).is_absolute():
         if Path(name).exists():
             return Path(name)
@@ -91,7 +103,7 @@ def find_file(name: str, folder: Path, data: Path | None) -> Path:
 
 
 def choose_columns(header: Header, wanted: Sequence[Column], count: int, where: str) -> tuple[int, ...]:
-    """Return the numbers of the `count` columns that `wanted` names; raises BadDescription listing what there is."""
+    """Return the numbers of the `count` columns that `wanted` names; raises BadDescription listing all."""
     numbers = [n for column in wanted for n in _find(header, column, where)]
     if len(numbers) != count:
         raise BadDescription(f"{where}: {count} columns are needed; {list(wanted)} gives {len(numbers)}.")
@@ -117,9 +129,10 @@ def _find(header: Header, column: Column, where: str) -> tuple[int, ...]:
         return (header.names.index(column),)
     if found:
         raise BadDescription(
-            f'{where}: the name "{column}" stands over {found} columns. Rename all but one, or give column numbers.'
+            f'{where}: the name "{column}" stands over {found} columns. '
+            "Rename all but one, or give column numbers."
         )
-    there = (*header.groups, *(n for n in header.names if "[" not in n or not header.groups))
+    there = header.shown()
     raise BadDescription(
         f'{where}: there is no column "{column}".{close_match(column, there)} Columns here: {listed(there)}.'
     )

@@ -1,4 +1,4 @@
-"""Units of the log description, each with its factor to SI. The first unit of a kind is SI and the default."""
+"""Units of the log description, each with its factor to SI. The first of a kind is SI and the default."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ TIME: dict[str, int] = {"s": 1, "ms": 1000, "us": 1_000_000, "ns": 1_000_000_000
 LENGTH: dict[str, float] = {"m": 1.0, "mm": 1e-3}
 ANGLE: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180)}
 
-# Quantity -> unit -> factor to SI. The factor of "g" depends on the place: see `factors`.
+# Quantity -> unit -> factor to SI. One "g" depends on the place: see `local_g`.
 UNITS: dict[str, dict[str, float]] = {
     "force": {"N": 1.0, "kN": 1e3, "kgf": STANDARD_GRAVITY, "lbf": _POUND_FORCE},
     "torque": {"N*m": 1.0, "N*mm": 1e-3, "kgf*m": STANDARD_GRAVITY, "lbf*in": _POUND_FORCE * _INCH},
@@ -32,7 +32,7 @@ _EARTH = (9.76, 9.84)
 
 
 def local_g(gravity: Array) -> float:
-    """Return what one g is [m/s^2]: the length of `gravity` (3,) where that is found on Earth, else standard gravity.
+    """Return one g [m/s^2]: the length of `gravity` (3,) where that is found on Earth, else standard gravity.
 
     An accelerometer that reads 1 g at rest shows the gravity of its place, not 9.80665 m/s^2.
     """

@@ -38,9 +38,12 @@ class Mount:
 class Stream:
     """One file or topic, one clock.
 
-    name      the path as the description writes it: the key of `delays_s` and of messages
-    time      (N,) [s] on the stream's own clock, strictly rising; None without a clock
-    channels  quantity -> (N, 3), or (N, 3, 3) for rotation (S to W); SI units
+    name      the path as the description writes it: the key of `delays_s` and of messages;
+              "path#2" for the second stream of one file
+    time      (N,) [s] on the stream's own clock, never falling (repeated stamps pass: sanity checks find them);
+              None without a clock
+    channels  quantity -> (N, 3), or (N, 3, 3) for rotation (S to W); SI units.
+              A torque that the description declares "zero" is exact zeros
     frames    quantity -> "S" (default) or "W" for vectors that may be given in base axes
     delay     [s] its stamps are late by this much; None = not given, so to be estimated
     mount     pose of the stream's own frame in S; None = S itself (for an accelerometer: to be estimated)

@@ -1,0 +1,82 @@
+"""A text table, also gzipped: its first lines, and its rows in blocks; what is not text is refused."""
+
+from __future__ import annotations
+
+import gzip
+import re
+import zlib
+from collections.abc import Iterator
+from pathlib import Path
+from typing import BinaryIO, cast
+
+from steelyard.errors import BadFile
+
+_HEAD = 1 << 16
+_BLOCK = 1 << 23
+_LONGEST_LINE = 1 << 20
+_BOM = b"\xef\xbb\xbf"
+_CONTROL = re.compile(rb"[\x01-\x08\x0e-\x1f\x7f]")
+
+
+def _open(path: Path) -> BinaryIO:
+    if path.suffix.lower() == ".gz":
+        return cast(BinaryIO, gzip.open(path, "rb"))
+    return path.open("rb")
+
+
+def _read(path: Path, stream: BinaryIO, size: int) -> bytes:
+    try:
+        return stream.read(size)
+    except (OSError, EOFError, zlib.error) as error:
+        raise BadFile(f"{path}: cannot be read ({error}).") from None
+
+
+def head_lines(path: Path) -> list[str]:
+    """Return the complete lines of the first 64 kB; raises BadFile when they are not text."""
+    with _open(path) as stream:
+        head = _read(path, stream, _HEAD)
+    _require_text(path, head)
+    text = head.removeprefix(_BOM).decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    if len(head) == _HEAD:
+        text = text[: text.rfind("\n") + 1]
+        if not text:
+            raise BadFile(
+                f"{path}: expected a table with one row per line; found no line end in the first 64 kB."
+            )
+    return text.split("\n")
+
+
+def _require_text(path: Path, block: bytes) -> None:
+    if block.startswith((b"\xff\xfe", b"\xfe\xff")):
+        raise BadFile(f"{path}: the text is in UTF-16. Save it in UTF-8.")
+    if b"\0" in block or _CONTROL.search(block, 0, _HEAD):
+        raise BadFile(
+            f"{path}: expected a text table; found binary data. Readable are text tables, .npz and .parquet."
+        )
+
+
+def blocks(path: Path, skip: int) -> Iterator[str]:
+    """Yield the text below the header, about 8 MB at a time, cut at line ends."""
+    with _open(path) as stream:
+        rest = _read(path, stream, _BLOCK)
+        rest = _below(rest.removeprefix(_BOM), skip)
+        while True:
+            more = _read(path, stream, _BLOCK)
+            block = rest + more
+            _require_text(path, block)
+            cut = block.rfind(b"\n") + 1 if more else len(block)
+            if more and len(block) - cut > _LONGEST_LINE:
+                raise BadFile(f"{path}: a line longer than {_LONGEST_LINE >> 20} MB is not a row of a table.")
+            if cut:
+                yield block[:cut].decode("latin-1").replace("\r\n", "\n").replace("\r", "\n")
+            rest = block[cut:]
+            if not more:
+                return
+
+
+def _below(block: bytes, skip: int) -> bytes:
+    for _ in range(skip):
+        newline, carriage = block.find(b"\n"), block.find(b"\r")
+        at = newline if newline >= 0 else carriage
+        block = block[at + 1 :] if at >= 0 else b""
+    return block
