@@ -22,6 +22,8 @@ from steelyard.inertia import InertialParameters, forms
 # the mass, of the radius of gyration, and of half the trace of the inertia about the centre of mass.
 MASS_SHARE, COM_SHARE, INERTIA_SHARE = 0.1, 0.2, 0.1
 SMALLEST_RADIUS = 0.02
+# There is no answer at all where mass or centre of mass are looser than these shares of the same sizes.
+LOST_MASS, LOST_COM = 0.5, 2.5
 # A direction counts toward the rank when the data fix it to half its natural size.
 RANK_INFORMATION = 4.0
 UNSEEN = 1e-9
@@ -88,14 +90,17 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
     V = score if score is not None else max(chi2, 1.0) * (H + extra)
     covariance = _sandwich(H, V, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
-    rank, condition, spread, identified = _seen(H, V, solution.linear[:10])
-    _require_answer(identified, problem)
+    sight = _sight(H, V, solution.linear[:10])
+    _require_answer(sight, problem)
     estimate = Estimate(
         body,
         covariance[:10, :10],
         method,
-        Evidence(rank, condition, int(problem.samples), int(problem.still_samples), *_residual(problem, K), chi2, spread=spread),
-        identified,
+        Evidence(
+            sight.rank, sight.condition, int(problem.samples), int(problem.still_samples), *_residual(problem, K), chi2,
+            spread=2 * sight.std,
+        ),
+        sight.identified,
         solution.bias,
         np.sqrt(np.diag(covariance)[10:]) if problem.with_bias else np.zeros(6),
     )  # fmt: skip
@@ -109,11 +114,25 @@ def _residual(problem: Problem, K: Array) -> tuple[float, float]:
     return float(np.sqrt(max(square[3:].mean(), 0))), float(np.sqrt(max(square[:3].mean(), 0)))
 
 
-def _seen(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, np.ndarray[Any, np.dtype[np.bool_]]]:
-    """Return rank, condition, spread (10,) and what is identified (10,), by the data alone.
+@dataclass(frozen=True, eq=False)
+class Sight:
+    """What the data alone see: rank, condition, std (10,) of mass, com, inertia about the CoM, and their natural sizes."""
 
-    In natural units (mass m, length r, the radius of gyration) the information about phi, bias projected out, has an
-    eigenvalue 1 where the data fix a direction to its own size.
+    rank: int
+    condition: float
+    std: Array
+    sizes: Array
+
+    @property
+    def identified(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+        """Which of the ten the data fix."""
+        return np.asarray(self.std < np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6]) * self.sizes)
+
+
+def _sight(H: Array, V: Array, phi: Array) -> Sight:
+    """Return what is seen from the information H and the score variance V (p, p), the bias projected out.
+
+    In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
     """
     mass = max(abs(float(phi[0])), 1e-6)
     trace = abs(float(phi[4] + phi[7] + phi[9]) / 2 - float(phi[1:4] @ phi[1:4]) / mass)
@@ -122,45 +141,40 @@ def _seen(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, np.ndarray
     F, G = _without_bias(H, V)
     values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
     floor = max(UNSEEN, UNSEEN * float(values[-1]))
-    bread = natural[:, None] * (vectors / np.maximum(values, floor)) @ vectors.T * natural
     people = np.zeros((10, 10))
     people[0, 0], people[1:] = 1, forms.com_jacobian(phi)
-    half = people @ bread
-    std = np.sqrt(np.maximum(np.einsum("ij,jk,ik->i", half, G, half), 0))
-    hidden = (np.abs(people @ (natural[:, None] * vectors[:, values < floor])) > 1e-4 * _scales(mass, radius, trace)[:, None]).any(1)
-    std[hidden] = np.inf
-    shares = np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6])
+    directions = people @ (natural[:, None] * vectors)
+    bread = (directions / np.maximum(values, floor)) @ vectors.T * natural
+    std = np.sqrt(np.maximum(((bread @ G) * bread).sum(1), 0))
+    sizes = np.repeat([mass, radius, max(trace, mass * SMALLEST_RADIUS**2)], [1, 3, 6])
+    hidden = np.abs(directions[:, values < floor]) > 1e-4 * sizes[:, None]
+    std[hidden.any(1)] = np.inf
     fixed = values > RANK_INFORMATION
     condition = float(np.sqrt(values[-1] / values[fixed][0])) if fixed.any() else np.inf
-    return int(fixed.sum()), condition, 2 * std, std < shares * _scales(mass, radius, trace)
-
-
-def _scales(mass: float, radius: float, trace: float) -> Array:
-    """Return the natural sizes (10,) of mass, com and inertia about the CoM."""
-    inertia = max(trace, mass * SMALLEST_RADIUS**2)
-    return np.repeat([mass, radius, inertia], [1, 3, 6])
+    return Sight(int(fixed.sum()), condition, std, sizes)
 
 
 def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
     """Return information and score variance (10, 10) of phi with the bias projected out."""
     if len(H) == 10:
         return H, V
-    project = np.concatenate([np.eye(10), -H[:10, 10:] @ np.linalg.pinv(H[10:, 10:], hermitian=True)], 1)
+    project = np.concatenate([np.eye(10), -H[:10, 10:] @ _inverse_scaled(H[10:, 10:])], 1)
     return project @ H[:, :10], project @ V @ project.T
 
 
-def _require_answer(identified: np.ndarray[Any, np.dtype[np.bool_]], problem: Problem) -> None:
-    """Raise CannotAnswer where mass or centre of mass are not fixed, saying what to add."""
-    if identified[:4].all():
+def _require_answer(sight: Sight, problem: Problem) -> None:
+    """Raise CannotAnswer where mass or centre of mass are lost, saying what to add."""
+    lost = sight.std[:4] > np.repeat([LOST_MASS, LOST_COM], [1, 3]) * sight.sizes[:4]
+    if not lost.any():
         return
     names = ("the mass", "the centre of mass along x", "the centre of mass along y", "the centre of mass along z")
-    lost = ", ".join(n for n, ok in zip(names, identified, strict=False) if not ok)
     poses = len(np.unique(problem.block_number[problem.block_number >= 0]))
-    seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or blocks" if poses else "")
+    seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or time blocks" if poses else "")
     raise CannotAnswer(
-        f"The data do not fix {lost} ({seen}). Add still poses that turn gravity to other axes of the sensor: "
-        "at least three, tilted by more than 30 degrees about two different axes"
-        + (", or tare the sensor without load and declare it with --no-bias." if problem.with_bias else ".")
+        f"The data do not fix {', '.join(n for n, gone in zip(names, lost, strict=True) if gone)} ({seen}). "
+        "Add still poses that turn gravity to other axes of the sensor: at least three, more than 30 degrees apart, "
+        "about two different axes"
+        + ("; or tare the sensor without a load and say --bias none." if problem.with_bias else ".")
     )
 
 

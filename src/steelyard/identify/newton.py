@@ -192,6 +192,39 @@ def cost_derivatives(
 
 
 @numba.njit(cache=True)
+def _downhill(gradient: Array, hessian: Array) -> Array:
+    """Return the Newton step, with negative curvatures turned round (saddle-free) where the Hessian has any."""
+    size = len(gradient)
+    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-300))
+    scaled = hessian * np.outer(scale, scale)
+    low, x = np.zeros((size, size)), np.zeros(size)
+    for i in range(size):
+        for j in range(i + 1):
+            total = scaled[i, j]
+            for k in range(j):
+                total -= low[i, k] * low[j, k]
+            if i == j:
+                if total < 1e-9:
+                    values, vectors = np.linalg.eigh(scaled)
+                    curvature = np.maximum(np.abs(values), 1e-9)
+                    return -scale * (vectors @ ((vectors.T @ (scale * gradient)) / curvature))
+                low[i, i] = np.sqrt(total)
+            else:
+                low[i, j] = total / low[j, j]
+    for i in range(size):
+        total = -scale[i] * gradient[i]
+        for k in range(i):
+            total -= low[i, k] * x[k]
+        x[i] = total / low[i, i]
+    for i in range(size - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, size):
+            total -= low[k, i] * x[k]
+        x[i] = total / low[i, i]
+    return scale * x
+
+
+@numba.njit(cache=True)
 def minimise(
     start: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, iterations: int,
@@ -204,10 +237,7 @@ def minimise(
     u = start.copy()
     current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, gamma, log_size, precision)
     for _ in range(iterations):
-        scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-300))
-        values, vectors = np.linalg.eigh(hessian * np.outer(scale, scale))
-        curvature = np.maximum(np.abs(values), 1e-9)
-        step = -scale * (vectors @ ((vectors.T @ (scale * gradient)) / curvature))
+        step = _downhill(gradient, hessian)
         decrement = -0.5 * (gradient @ step)
         if decrement < 1e-9:
             return u + step, current - decrement, True

@@ -7,6 +7,7 @@ coordinates, so that every answer is a rigid body, from scatter matrices alone.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -81,17 +82,15 @@ class NoiseAware:
         prior = newton.shape_prior(u[:10], *options)[2]
         return Solution(newton.linear_of(u), newton.jacobian(u[:10], newton.factor(u[:10])), prior)
 
-    def _starts(self, linear: Array) -> list[Array]:
-        """Return starting points [theta, bias]: the linear solution made a body, then the neutral ball at its centre."""
+    def _starts(self, linear: Array) -> Iterator[Array]:
+        """Yield starting points [theta, bias]: the linear solution made a body, then the neutral ball at its centre."""
         mass = max(float(linear[0]), 1e-3)
         com = linear[1:4] / mass
         pseudo = forms.pseudo_inertia(linear[:10])
         values, axes = np.linalg.eigh(pseudo[:3, :3] / mass - np.outer(com, com))
         shape = (axes * np.clip(values, SMALLEST**2, LARGEST**2)) @ axes.T
-        return [
-            np.concatenate([forms.log_cholesky(_pseudo(mass, com, s)), linear[10:]])
-            for s in (shape, self.size**2 * np.eye(3))
-        ]
+        for s in (shape, self.size**2 * np.eye(3)):
+            yield np.concatenate([forms.log_cholesky(_pseudo(mass, com, s)), linear[10:]])
 
 
 def _pseudo(mass: float, com: Array, shape: Array) -> Array:

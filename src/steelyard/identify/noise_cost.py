@@ -50,7 +50,7 @@ def inverse_spd(matrix: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=True)
 def multiply(a: Array, b: Array) -> Array:
     """Return a b for small matrices (no BLAS call overhead)."""
     rows, inner, columns = a.shape[0], a.shape[1], b.shape[1]
@@ -64,7 +64,7 @@ def multiply(a: Array, b: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, fastmath=True)
 def inner(a: Array, b: Array) -> float:
     """Return sum of a * b."""
     total = 0.0
@@ -124,11 +124,12 @@ def derivatives(
             WTS[p] = multiply(W, multiply(T[p], S))
             WdV = multiply(W, dV[p])
             WVWB[p] = multiply(WdV, WB)
+            WTS[p] -= WVWB[p]
             WVR[p] = multiply(WdV, R)
             RMS[p] = multiply(R, Mp * Sa)
         for p in range(size):
             for q in range(p + 1):
-                entry = inner(WTS[p], T[q]) - inner(WVWB[p], T[q]) - inner(WVWB[q], T[p])
+                entry = inner(WTS[p], T[q]) - inner(WVWB[q], T[p])
                 entry += inner(WVR[p], dV[q]) + inner(RMS[p], T[q, :, :6])
                 hessian[p, q] += 2 * entry
     for p in range(size):

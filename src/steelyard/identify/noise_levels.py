@@ -13,8 +13,9 @@ from steelyard.identify.rest import RIPPLE
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments
 
-# Below this many residuals per axis the three axes share one level.
-ROWS_PER_AXIS = 200
+# Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
+# and an axis that looks quiet by chance would be over-weighted.
+ROWS_PER_AXIS = 3000
 # The wrench keeps at least this share of the residual variance that noise in the motion could also explain.
 LEAST_SHARE = 0.1
 # Start of the iteration: force in N and torque in N m of an everyday wrist sensor.
