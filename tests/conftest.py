@@ -1,8 +1,29 @@
-"""What every test shares: one fixed Hypothesis profile, so that the same tree gives the same verdict."""
+"""What every test shares: a fixed Hypothesis profile (same tree, same verdict) and where the data are."""
 
 from __future__ import annotations
 
+import os
+from pathlib import Path
+
+import pytest
 from hypothesis import settings
 
 settings.register_profile("steelyard", derandomize=True, max_examples=25, deadline=None, database=None)
 settings.load_profile("steelyard")
+
+ROOT = Path(__file__).resolve().parents[1]
+
+
+@pytest.fixture(scope="session")
+def data_dir() -> Path:
+    """The real recordings: $STEELYARD_DATA, or shared/data beside the project; skips where neither is there."""
+    for folder in (os.environ.get("STEELYARD_DATA"), ROOT.parent / "shared" / "data"):
+        if folder and Path(folder).is_dir():
+            return Path(folder)
+    pytest.skip("no real recordings here: set STEELYARD_DATA to their folder")
+
+
+@pytest.fixture(scope="session")
+def examples_dir() -> Path:
+    """The example descriptions."""
+    return ROOT / "examples"
