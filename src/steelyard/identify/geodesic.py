@@ -1,0 +1,130 @@
+"""Geodesic: weighted least squares with a pull toward a prior body, measured on the cone of bodies (the GEO baseline).
+
+Source: Lee, Wensing, Park 2019, "Geometric robot dynamic identification", eq. 21 (entropic) and eq. 18 (Riemannian); the
+strength is their gamma = alpha tr(A^T Sigma^-1 A). The prior adds no second parallel-axis term.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cache
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import eigh
+
+from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.correlated import score_variance
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.linear import normal_equations, solve_scaled
+from steelyard.identify.noise_levels import with_noise
+from steelyard.identify.problem import Problem
+from steelyard.inertia import InertialParameters, forms
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import Moments
+
+ITERATIONS = 100
+NEUTRAL_RADIUS = 0.05
+# Half the expected further fall of the cost, in units of one squared standard deviation.
+CONVERGED = 1e-9
+
+
+@dataclass(frozen=True)
+class Geodesic:
+    """Options of the geodesic estimator.
+
+    prior       the body to pull toward, in S; None = a ball of 5 cm with the mass and centre of least squares
+    distance    "entropic": log-det divergence; "riemannian": squared affine-invariant distance
+    alpha       strength, as a share of the trace of the weighted normal matrix
+    bias        "free" or "none"
+    """
+
+    prior: InertialParameters | None = None
+    distance: Literal["entropic", "riemannian"] = "entropic"
+    alpha: float = 1e-5
+    bias: str = "free"
+
+    def __post_init__(self) -> None:
+        if self.distance not in ("entropic", "riemannian"):
+            raise BadValue(f"distance must be entropic or riemannian; got {self.distance!r}.")
+
+    def identify(self, log: MotionLog) -> Estimate:
+        """Return the estimate of a log. Raises CannotAnswer where mass and centre of mass are not fixed."""
+        log = with_noise(log, self.bias == "free")
+        problem = Problem.of(Moments.of_log(log), self.bias == "free")
+        solution = self._fit(problem)
+        return conclude(problem, solution, "geodesic", score_variance(log, problem, solution))
+
+    def solve(self, moments: Moments) -> Estimate:
+        """Return the estimate from a statistic that carries its noise."""
+        problem = Problem.of(moments, self.bias == "free")
+        return conclude(problem, self._fit(problem), "geodesic")
+
+    def _fit(self, problem: Problem) -> Solution:
+        """Newton's method on the cone: the cost is convex in the parameters (entropic) or along geodesics."""
+        weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+        H, g = normal_equations(problem.T, problem.scatter, weights)
+        linear = solve_scaled(H, g)
+        prior = _neutral(linear) if self.prior is None else forms.pseudo_inertia(self.prior.vector)
+        gamma = 0.5 * self.alpha * float(np.trace(H[:10, :10]))
+        x = np.concatenate([forms.from_pseudo_inertia(prior), linear[10:]])
+        for _ in range(ITERATIONS):
+            value, slope, metric = self._pull(x, prior)
+            gradient, hessian = H @ x - g, H.copy()
+            gradient[:10] += gamma * slope
+            hessian[:10, :10] += gamma * metric
+            step = solve_scaled(hessian, -gradient)
+            decrement = -float(gradient @ step)
+            if decrement < CONVERGED:
+                return Solution(x + step, np.eye(10), gamma * metric)
+            x = self._shorten(x, step, decrement, 0.5 * x @ H @ x - g @ x + gamma * value, H, g, gamma, prior)
+        raise CannotAnswer(f"The geodesic fit did not settle in {ITERATIONS} steps; give a prior nearer to the object.")
+
+    def _shorten(
+        self, x: Array, step: Array, decrement: float, cost: float, H: Array, g: Array, gamma: float, prior: Array
+    ) -> Array:
+        """Return the first of x + step, x + step/2, ... that is a body and lowers the cost."""
+        for halving in range(60):
+            trial = x + 0.5**halving * step
+            value = self._pull(trial, prior)[0]
+            now = 0.5 * trial @ H @ trial - g @ trial + gamma * value
+            if now <= cost - 1e-4 * 0.5**halving * decrement + 1e-12 * abs(cost):
+                return np.asarray(trial)
+        return np.asarray(x)
+
+    def _pull(self, x: Array, prior: Array) -> tuple[float, Array, Array]:
+        """Return the distance of phi = x[:10] from the prior, its gradient (10,) and metric (10, 10); inf outside."""
+        P = forms.pseudo_inertia(x[:10])
+        values, vectors = eigh(P, prior)
+        if values[0] <= 0:
+            return np.inf, np.zeros(10), np.zeros((10, 10))
+        logs = np.log(values)
+        inverse = np.linalg.inv(P)
+        units = _units()
+        half = inverse @ units
+        metric = np.einsum("pij,qji->pq", half, half)
+        if self.distance == "entropic":
+            slope = np.einsum("ij,pij->p", np.linalg.inv(prior) - inverse, units)
+            return float((values - logs - 1).sum()), slope, metric
+        # With P v = lambda P0 v the gradient of sum log^2 lambda is sum 2 log lambda / lambda v v^T.
+        slope = np.einsum("ij,pij->p", (vectors * (2 * logs / values)) @ vectors.T, units)
+        longest = float(np.abs(logs).max())
+        bend = longest / np.tanh(longest) if longest > 1e-6 else 1.0
+        return float((logs**2).sum()), slope, 2 * bend * metric
+
+
+@cache
+def _units() -> Array:
+    """Return the pseudo-inertia (10, 4, 4) of each unit parameter."""
+    return forms.pseudo_inertia(np.eye(10))
+
+
+def _neutral(linear: Array) -> Array:
+    """Return the pseudo-inertia of a 5 cm ball with the mass and centre that least squares found."""
+    mass = max(float(linear[0]), 1e-3)
+    centre = np.append(linear[1:4] / mass, 1.0)
+    out = np.outer(centre, centre)
+    out[:3, :3] += NEUTRAL_RADIUS**2 / 5 * np.eye(3)
+    return mass * out

@@ -1,0 +1,104 @@
+"""LeastSquares: ordinary, weighted and total least squares on the statistic (the OLS baseline).
+
+Source: Atkeson, An, Hollerbach 1986, eq. 6-12 (ordinary); Van Huffel and Vandewalle 1991, section 3.5 (total, with exact
+columns). None of the three keeps the answer a rigid body: `Estimate.parameters.validity()` says when it is not.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from scipy.linalg import eigh
+
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.correlated import score_variance
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.linear import normal_equations, reweighted, solve_scaled
+from steelyard.identify.noise_levels import with_noise
+from steelyard.identify.problem import Problem
+from steelyard.identify.regressor import residual_map
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import Moments
+
+KINDS = ("ordinary", "weighted", "total")
+
+
+@dataclass(frozen=True)
+class LeastSquares:
+    """Options of linear least squares.
+
+    kind   "ordinary": every row and axis alike, N and N m mixed; "weighted": by the wrench noise; "total": noise in the
+           accelerations too, one common scale free (the noise-aware cost with a fixed weight)
+    bias   "free" or "none"
+    """
+
+    kind: Literal["ordinary", "weighted", "total"] = "weighted"
+    bias: str = "free"
+
+    def __post_init__(self) -> None:
+        if self.kind not in KINDS:
+            raise BadValue(f"kind must be one of {', '.join(KINDS)}; got {self.kind!r}.")
+
+    def identify(self, log: MotionLog) -> Estimate:
+        """Return the estimate of a log. Raises CannotAnswer where mass and centre of mass are not fixed."""
+        log = with_noise(log, self.bias == "free")
+        problem = Problem.of(Moments.of_log(log), self.bias == "free")
+        solution = self._fit(problem)
+        return conclude(problem, solution, "least-squares", score_variance(log, problem, solution))
+
+    def solve(self, moments: Moments) -> Estimate:
+        """Return the estimate from a statistic that carries its noise."""
+        problem = Problem.of(moments, self.bias == "free")
+        return conclude(problem, self._fit(problem), "least-squares")
+
+    def _fit(self, problem: Problem) -> Solution:
+        if self.kind == "total":
+            return Solution.unconstrained(_total(problem))
+        if self.kind == "weighted":
+            weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+        else:
+            weights = np.broadcast_to(np.eye(6), (len(problem.scatter), 6, 6)).copy()
+        return Solution.unconstrained(solve_scaled(*normal_equations(problem.T, problem.scatter, weights)))
+
+
+def _total(problem: Problem) -> Array:
+    """Return the total least squares solution: the smallest generalised eigenvector of data against noise.
+
+    With K = sum_p x_p T_p + [0, 1, 0] both sum r^T W r and its expectation under noise alone are quadratic in (x, 1);
+    the ratio of the two is least at the answer. Bias columns are exact and are projected out first.
+    """
+    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
+    bias = linear[10:] if problem.with_bias else np.zeros(6)
+    K = residual_map(linear[:10], bias)
+    unit = np.zeros((1, *problem.T.shape[1:]))
+    unit[0, :, 12:18] = np.eye(6)
+    T = np.concatenate([problem.T[:10], unit, problem.T[10:]])
+    data, noise = np.zeros((len(T), len(T))), np.zeros((11, 11))
+    for S, Sa, Sw in zip(problem.scatter, problem.acceleration, problem.wrench, strict=True):
+        W = np.linalg.inv(np.diag(Sw) + (K[:, :6] * Sa) @ K[:, :6].T)
+        data += np.einsum("pij,qij->pq", W @ T @ S, T)
+        noise[:10, :10] += S[18, 18] * np.einsum("pij,qij->pq", (W @ T[:10, :, :6]) * Sa, T[:10, :, :6])
+        noise[10, 10] += S[18, 18] * float(np.diag(W) @ Sw)
+    reduced = _project_out(data, 11)
+    scale = 1 / np.sqrt(np.maximum(np.diag(reduced), 1e-300))
+    # Noise against data, so that the matrix to factor is positive definite even where columns carry no noise.
+    regular = reduced * np.outer(scale, scale) + 1e-13 * np.eye(11)
+    _, vectors = eigh(noise * np.outer(scale, scale), regular)
+    x = scale * vectors[:, -1]
+    x = x / x[10]
+    if not problem.with_bias:
+        return np.asarray(x[:10])
+    rest = -np.linalg.pinv(data[11:, 11:], hermitian=True) @ data[11:, :11] @ x
+    return np.concatenate([x[:10], rest])
+
+
+def _project_out(matrix: Array, keep: int) -> Array:
+    """Return the Schur complement of the first `keep` rows and columns."""
+    if len(matrix) == keep:
+        return matrix
+    corner = np.linalg.pinv(matrix[keep:, keep:], hermitian=True)
+    return np.asarray(matrix[:keep, :keep] - matrix[:keep, keep:] @ corner @ matrix[keep:, :keep])
