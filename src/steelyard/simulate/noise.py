@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 
 Spectrum = Literal["white", "2hz"]
+SPECTRA: tuple[Spectrum, ...] = ("white", "2hz")
 CUTOFF_HZ = 2.0
 _SETTLE_S = 5.0
 

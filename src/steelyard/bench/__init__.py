@@ -1,0 +1,1 @@
+"""Benches: every number the README claims, re-made from seeds; dictionaries in the shape of `formats`."""

@@ -1,0 +1,197 @@
+"""How often the 95 % intervals hold the truth, and how wide they are for the errors actually made."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass, replace
+from multiprocessing import get_context
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue, SteelyardError
+from steelyard.identify.noise_aware import NoiseAware
+from steelyard.inertia import InertialParameters, forms
+from steelyard.simulate import scenarios, simulate_log
+from steelyard.simulate.noise import Spectrum
+
+HALF_WIDTH = 1.96
+BATCH = 20
+ENTRIES = ("mass", "com_x", "com_y", "com_z", "i_xx", "i_xy", "i_xz", "i_yy", "i_yz", "i_zz")
+KINDS = {"mass": slice(0, 1), "com": slice(1, 4), "inertia": slice(4, 10)}
+BIAS_STD = np.repeat([0.2, 5.0], 3)
+RULES = (
+    "Ordered logs with a clock; 95 % interval = estimate +- 1.96 std; only what the estimate calls "
+    "identified. coverage_pct pools all intervals of a kind. width_ratio = mean half-width / rms error for each (object, "
+    "entry), averaged within the kind with the number of intervals as weight; width_ratio_pooled = the same "
+    "over the whole kind at once, each object in its own scale (mass, radius of gyration, half the trace of the "
+    "inertia about the centre of mass). An honest interval has a ratio of 1.96."
+)
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Case:
+    """What all logs of one table have in common.
+
+    declared  whether the log says its noise level; bias "free": an unknown bias is added and estimated
+    """
+
+    motion: str
+    noise: str
+    spectrum: Spectrum
+    declared: bool = True
+    bias: str = "none"
+
+
+@dataclass(frozen=True, eq=False)
+class Outcome:
+    """One fit: errors and half-widths (10,) of mass, com, inertia about the CoM, in the object's scale."""
+
+    name: str
+    error: Array
+    half_width: Array
+    identified: np.ndarray[Any, np.dtype[np.bool_]]
+
+
+def run(
+    seeds: int = 1000,
+    motion: str = "stop_go",
+    noise: str = "moderate",
+    spectra: Sequence[Spectrum] = ("white", "2hz"),
+    progress: Progress | None = None,
+    *,
+    all_objects: bool = False,
+    declared: bool = True,
+    bias: str = "none",
+    workers: int = 1,
+) -> dict[str, Any]:
+    """Return coverage and width per spectrum and kind over `seeds` logs (x ten objects with `all_objects`).
+
+    Without `all_objects` seed k uses object k mod 10. `workers` processes share the fits.
+    """
+    if seeds < 1:
+        raise BadValue(f"There must be at least one seed; got {seeds}.")
+    names = scenarios.object_names()
+    jobs = [(s, n) for s in range(seeds) for n in (names if all_objects else (names[s % len(names)],))]
+    cases = [Case(motion, noise, spectrum, declared, bias) for spectrum in spectra]
+    found: dict[str, list[Outcome | str]] = {case.spectrum: [] for case in cases}
+    for case in cases:
+        for outcomes in _fitted(case, jobs, workers):
+            found[case.spectrum] += outcomes
+            if progress is not None:
+                progress(sum(map(len, found.values())), len(jobs) * len(cases))
+    return {
+        "bench": "coverage",
+        "rules": RULES,
+        "seeds": list(range(seeds)),
+        "motion": motion,
+        "noise": noise,
+        "noise_declared": declared,
+        "bias": bias,
+        "cases": {spectrum: summary(outcomes) for spectrum, outcomes in found.items()},
+    }
+
+
+def _fitted(case: Case, jobs: list[tuple[int, str]], workers: int) -> Iterator[list[Outcome | str]]:
+    """Yield the outcomes of the jobs in order, a batch at a time."""
+    batches = [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)]
+    with ExitStack() as stack:
+        if workers == 1:
+            yield from (_fit_all(case, batch) for batch in batches)
+        else:
+            # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
+            pool = stack.enter_context(ProcessPoolExecutor(workers, mp_context=get_context("spawn")))
+            yield from pool.map(_fit_all, [case] * len(batches), batches)
+
+
+def _fit_all(case: Case, jobs: Sequence[tuple[int, str]]) -> list[Outcome | str]:
+    return [_fit(case, seed, name) for seed, name in jobs]
+
+
+def _fit(case: Case, seed: int, name: str) -> Outcome | str:
+    """Return the outcome of one log, or the message of the error that it raised."""
+    bias = np.random.default_rng([seed, 1]).normal(0, BIAS_STD) if case.bias == "free" else None
+    options: dict[str, Any] = {"shuffled": False, "spectrum": case.spectrum, "bias": bias}
+    log, true = simulate_log(name, case.motion, case.noise, seed, **options)
+    try:
+        estimate = NoiseAware(bias=case.bias).identify(log if case.declared else replace(log, noise=None))
+    except SteelyardError as reason:
+        return f"{name}, seed {seed}: {reason}"
+    scale = object_scale(true)
+    error = (people(estimate.parameters) - people(true)) / scale
+    return Outcome(name, error, HALF_WIDTH * estimate.std / scale, estimate.identified)
+
+
+def people(body: InertialParameters) -> Array:
+    """Return mass, com, inertia about the CoM (10,) in the order of `Estimate.std`."""
+    return np.concatenate([[float(body.mass)], body.com, forms.upper(body.inertia_com)])
+
+
+def object_scale(body: InertialParameters) -> Array:
+    """Return the size (10,) of mass, radius of gyration and half the trace of the inertia about the CoM."""
+    half_trace = float(np.trace(body.inertia_com)) / 2
+    return np.repeat([float(body.mass), np.sqrt(half_trace / float(body.mass)), half_trace], [1, 3, 6])
+
+
+def summary(outcomes: Sequence[Outcome | str]) -> dict[str, Any]:
+    """Return coverage and width ratios by kind and by entry, and what was identified per object."""
+    good = [outcome for outcome in outcomes if isinstance(outcome, Outcome)]
+    failures = [outcome for outcome in outcomes if isinstance(outcome, str)]
+    objects = _identified(good)
+    return {
+        "logs": len(outcomes),
+        "failures": failures,
+        "kinds": {kind: _widths(good, which) for kind, which in KINDS.items()},
+        "entries": {name: _widths(good, slice(k, k + 1)) for k, name in enumerate(ENTRIES)},
+        "objects": objects,
+        "all_six_objects": sum(entry["inertia_identified"] == 6 for entry in objects.values()),
+    }
+
+
+def _widths(outcomes: Sequence[Outcome], which: slice) -> dict[str, Any]:
+    """Return coverage and width ratios of the chosen entries; None where nothing was identified."""
+    groups = _by_group(outcomes, which)
+    if not groups:
+        return {"coverage_pct": None, "width_ratio": None, "width_ratio_pooled": None, "intervals": 0}
+    everything = np.concatenate(groups)
+    ratios = [_ratio(group) for group in groups]
+    return {
+        "coverage_pct": float(100 * np.mean(np.abs(everything[:, 0]) <= everything[:, 1])),
+        "width_ratio": float(np.average(ratios, weights=[len(group) for group in groups])),
+        "width_ratio_pooled": _ratio(everything),
+        "intervals": len(everything),
+    }
+
+
+def _by_group(outcomes: Sequence[Outcome], which: slice) -> list[Array]:
+    """Return error and half-width (n, 2) of what was identified, per object and entry."""
+    groups: dict[tuple[str, int], list[tuple[float, float]]] = {}
+    for outcome in outcomes:
+        for k in range(*which.indices(10)):
+            if outcome.identified[k]:
+                pair = float(outcome.error[k]), float(outcome.half_width[k])
+                groups.setdefault((outcome.name, k), []).append(pair)
+    return [np.array(group) for group in groups.values()]
+
+
+def _ratio(pairs: Array) -> float:
+    """Return mean half-width / rms error."""
+    return float(pairs[:, 1].mean() / np.sqrt(np.mean(pairs[:, 0] ** 2)))
+
+
+def _identified(outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:
+    """Return per object how many of six inertia entries the estimates call identified."""
+    counts: dict[str, list[int]] = {}
+    for outcome in outcomes:
+        counts.setdefault(outcome.name, []).append(int(outcome.identified[4:].sum()))
+    return {
+        name: {
+            "inertia_identified": float(np.median(count)),
+            "all_six_pct": 100 * float(np.mean(np.equal(count, 6))),
+        }
+        for name, count in counts.items()
+    }
