@@ -58,11 +58,7 @@ FILE_CALLS = {
 }  # fmt: skip
 EXCUSED = {"logs.moments"}  # saves and loads its statistic as NPZ; to move to io
 PLOTTING = {"matplotlib", "plotly", "viser", "webbrowser"}
-RAISABLE = {
-    "AttributeError",
-    "SystemExit",
-    "StopIteration",
-}  # the first is what a lazy __getattr__ must raise
+RAISABLE = {"AttributeError", "SystemExit", "StopIteration"}  # a lazy __getattr__ must raise the first
 
 
 @cache

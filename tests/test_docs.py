@@ -1,0 +1,42 @@
+"""The documentation keeps its promises: an FAQ entry for each finding, and no page outside the site."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+from steelyard.findings import REMEDIES, Finding
+
+ROOT = Path(__file__).parents[1]
+FAQ = (ROOT / "docs" / "findings.md").read_text()
+ENTRIES = re.split(r"^### ", FAQ, flags=re.MULTILINE)[1:]
+
+
+def test_every_finding_has_one_entry_and_every_entry_a_finding() -> None:
+    assert sorted(entry.splitlines()[0] for entry in ENTRIES) == sorted(REMEDIES)
+
+
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.splitlines()[0])
+def test_an_entry_says_what_it_means_how_it_is_seen_and_what_to_do(entry: str) -> None:
+    assert [word for word in ("**Means**", "**Seen**", "**Do**") if word not in entry] == []
+
+
+@pytest.mark.parametrize("code", REMEDIES)
+def test_codes_are_words_and_remedies_are_sentences(code: str) -> None:
+    assert re.fullmatch(r"[a-z]+(-[a-z]+)*", code)
+    assert REMEDIES[code].endswith(".")
+    assert Finding.of(code, "Numbers.") == Finding(code, "Numbers.", REMEDIES[code])
+
+
+def test_every_page_is_in_the_navigation() -> None:
+    navigation = (ROOT / "mkdocs.yml").read_text()
+    pages = [str(path.relative_to(ROOT / "docs")) for path in (ROOT / "docs").rglob("*.md")]
+    assert [page for page in pages if page not in navigation] == []
+
+
+def test_every_decision_is_in_the_index() -> None:
+    folder = ROOT / "docs" / "decisions"
+    index = (folder / "index.md").read_text()
+    assert [path.name for path in folder.glob("[0-9]*.md") if path.name not in index] == []
