@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parents[1]
 
 @pytest.fixture(scope="session")
 def data_dir() -> Path:
-    """The real recordings: $STEELYARD_DATA, or shared/data beside the project; skips where neither is there."""
+    """Folder of real recordings: $STEELYARD_DATA, or shared/data beside the project; else skips."""
     for folder in (os.environ.get("STEELYARD_DATA"), ROOT.parent / "shared" / "data"):
         if folder and Path(folder).is_dir():
             return Path(folder)

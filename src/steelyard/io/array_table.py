@@ -61,7 +61,7 @@ class ArrayTable:
                 key, inner = self.sources[number]
                 if key not in arrays:
                     arrays[key] = _numeric(self.path, key, archive)
-                column = arrays[key].reshape(len(arrays[key]), -1)[:, inner]
+                column = arrays[key].reshape(len(arrays[key]), math.prod(arrays[key].shape[1:]))[:, inner]
                 keep = number in exact and column.dtype.kind in "iu"
                 out[number] = column.astype(np.int64 if keep else np.float64)
         return out

@@ -77,7 +77,7 @@ class TextTable:
 
     def _parse(self, block: str, order: list[int], integers: set[int], line: int) -> Columns:
         """Return the columns of one block of lines, the first of which is `line`."""
-        lines = block.split("\n")
+        lines = block.removesuffix("\n").split("\n")
         if not any(_holds_row(text) for text in lines):
             return {}
         self._check_width(lines, line)

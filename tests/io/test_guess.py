@@ -1,0 +1,199 @@
+"""Bare files with usual names, and poses typed from a pendant."""
+
+# ruff: noqa: E501  (the full text of an error stands on one line)
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from steelyard.errors import BadDescription, BadValue
+from steelyard.io import read_pendant, read_recording
+from steelyard.io.description import EXAMPLE
+from steelyard.logs.recording import STANDARD_GRAVITY, Stream
+from steelyard.spatial import Rotation
+
+W = [1.0, 2.0, 3.0, 0.1, 0.2, 0.3]
+Q = [0.5, 0.5, 0.5, 0.5]
+
+
+def bare(folder: Path, names: list[str], *rows: list[float]) -> Stream:
+    text = "\n".join([",".join(names), *(",".join(f"{v:.20g}" for v in row) for row in rows)])
+    (folder / "data.csv").write_text(text)
+    (stream,) = read_recording(folder / "data.csv").streams
+    return stream
+
+
+@pytest.mark.parametrize(
+    "wrench",
+    [
+        "fx fy fz tx ty tz", "Fx Fy Fz Tx Ty Tz", "force_x force_y force_z torque_x torque_y torque_z",
+        "wrench.force.x wrench.force.y wrench.force.z wrench.torque.x wrench.torque.y wrench.torque.z",
+        "/ft/force/x /ft/force/y /ft/force/z /ft/torque/x /ft/torque/y /ft/torque/z",
+        "Fx [N];Fy [N];Fz [N];Mx [N*m];My [N*m];Mz [N*m]",
+    ],
+)  # fmt: skip
+@pytest.mark.parametrize("turn", ["qw qx qy qz", "orientation.w orientation.x orientation.y orientation.z"])
+def test_usual_names(tmp_path: Path, wrench: str, turn: str) -> None:
+    names = ["time", *(wrench.split(";") if ";" in wrench else wrench.split()), *turn.split()]
+    stream = bare(tmp_path, names, [0, *W, *Q], [0.01, *W, *Q])
+    assert stream.channels["force"].tolist() == [W[:3]] * 2
+    assert stream.channels["torque"].tolist() == [W[3:]] * 2
+    np.testing.assert_allclose(
+        stream.channels["rotation"][0], Rotation.from_quaternion_wxyz(Q).matrix, atol=1e-15
+    )
+    assert stream.time is not None
+    assert stream.time.tolist() == [0, 0.01]
+    assert stream.name == "data.csv"
+
+
+def test_units_in_names(tmp_path: Path) -> None:
+    stream = bare(
+        tmp_path,
+        ["t_ms", "fx (kN)", "fy (kN)", "fz (kN)", "tx", "ty", "tz", "qw", "qx", "qy", "qz"],
+        [0, *W, *Q],
+        [4, *W, *Q],
+    )
+    assert stream.channels["force"][0].tolist() == [1000, 2000, 3000]
+    assert stream.time is not None
+    assert stream.time.tolist() == [0, 0.004]
+
+
+@pytest.mark.parametrize(
+    ("stamp", "step"), [(1708857503, 1), (1708857503931, 1e-3), (1708857503931759, 1e-6)]
+)
+def test_unix_stamps(tmp_path: Path, stamp: int, step: float) -> None:
+    names = ["timestamp", *["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]]
+    time = bare(tmp_path, names, [stamp, *W, *Q], [stamp + 1, *W, *Q]).time
+    assert time is not None
+    assert time[1] - time[0] == pytest.approx(step, rel=1e-9)
+
+
+def test_size_tells_accelerometer_gravity_and_gyro_apart(tmp_path: Path) -> None:
+    names = [
+        "t",
+        *[
+            "fx",
+            "fy",
+            "fz",
+            "tx",
+            "ty",
+            "tz",
+            "ax",
+            "ay",
+            "az",
+            "gx",
+            "gy",
+            "gz",
+            "wx",
+            "wy",
+            "wz",
+            "x",
+            "y",
+            "z",
+        ],
+    ]
+    stream = bare(
+        tmp_path,
+        names,
+        [0, *W, 0, 0, 1.01, 0.1, 0.2, 0.3, 1, 2, 3, 4, 5, 6],
+        [1, *W, 0, 0, 1, 0.1, 0.2, 0.3, 1, 2, 3, 4, 5, 6],
+    )
+    assert set(stream.channels) == {"force", "torque", "specific_force", "angular_velocity", "position"}
+    np.testing.assert_allclose(stream.channels["specific_force"][1], [0, 0, STANDARD_GRAVITY])
+    stream = bare(
+        tmp_path, names[:13], [0, *W, 0, 0, 9.8, 0, 0, -9.82][:13], [1, *W, 0, 0, 9.8, 0, 0, -9.82][:13]
+    )
+    assert set(stream.channels) == {"force", "torque", "specific_force", "gravity"}
+    assert stream.channels["specific_force"][1].tolist() == [0, 0, 9.8]
+
+
+def test_rows_that_turn_far_without_a_clock_are_poses(tmp_path: Path) -> None:
+    names = ["fx", "fy", "fz", "tx", "ty", "tz", "gx", "gy", "gz"]
+    turned = [[*W, 0, 0, -9.8], [*W, 0, -9.8, 0], [*W, 9.8, 0, 0]]
+    assert bare(tmp_path, names, *turned).poses
+    smooth = [[*W, 9.8 * np.sin(a), 0, -9.8 * np.cos(a)] for a in np.linspace(0, 1, 100)]
+    assert not bare(tmp_path, names, *smooth).poses
+
+
+def test_length_of_gravity_is_taken_from_the_file(tmp_path: Path) -> None:
+    bare(
+        tmp_path, ["fx", "fy", "fz", "tx", "ty", "tz", "gx", "gy", "gz"], [*W, 0, 0, -9.82], [*W, 0, -9.82, 0]
+    )
+    assert read_recording(tmp_path / "data.csv").gravity.tolist() == [0, 0, -9.82]
+
+
+def test_npz_with_usual_arrays(tmp_path: Path) -> None:
+    arrays = {
+        "force_sensor": [W[:3]] * 9,
+        "torque_sensor": [W[3:]] * 9,
+        "gravity_sensor": [[0, 0, -9.81]] * 9,
+    }
+    turns = np.broadcast_to(np.eye(3), (9, 3, 3))
+    np.savez(tmp_path / "m.npz", time=np.arange(9) / 100, rotation_world_from_sensor=turns, **arrays)  # type: ignore[arg-type]
+    (stream,) = read_recording(tmp_path / "m.npz").streams
+    assert set(stream.channels) == {"force", "torque", "gravity", "rotation"}
+
+
+@pytest.mark.parametrize(
+    ("names", "reason"),
+    [
+        ("a b c", "no force and no torque was recognised. Columns here: a, b, c."),
+        ("fx fy fz tx ty tz", "nothing says where gravity points in the sensor frame. Columns here: fx, fy, fz, tx, ty, tz."),
+        ("fx fy fz qw qx qy qz", "no torque was recognised. Columns here: fx, fy, fz, qw, qx, qy, qz."),
+        ("fx FX", 'two columns are called "fx". Columns here: fx, FX.'),
+        ("1 2", "the file has no header. It has 2 columns."),
+        ("fx[lb] fy fz tx ty tz qw qx qy qz", 'unknown unit "lb" of force; possible are N, kN, kgf, lbf. Columns here: fx[lb], fy, fz, tx, ty, tz, qw, qx, qy, qz.'),
+        ("fx fy fz tx ty tz gx gy gz", "nothing says where gravity points in the sensor frame. Columns here: fx, fy, fz, tx, ty, tz, gx, gy, gz."),
+        ("t fx fy fz tx ty tz qw qx qy qz", "time rises by 2000 per row, which can hardly be seconds. Columns here: t, fx, fy, fz, tx, ty, tz, qw, qx, qy, qz."),
+    ],
+)  # fmt: skip
+def test_names_that_do_not_tell(tmp_path: Path, names: str, reason: str) -> None:
+    words = names.split()
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, words, [0.0] * len(words), [2000.0] * len(words))
+    assert str(caught.value) == (
+        f"{tmp_path / 'data.csv'}: cannot tell what the columns are: {reason} "
+        f"Write a description that says it, for example:\n{EXAMPLE}"
+    )
+
+
+# --- pendant --------------------
+
+
+def test_pendant(tmp_path: Path) -> None:
+    recording = read_pendant(
+        [
+            "# three poses",
+            "0 0 0  1 2 3  4 5 6",
+            "",
+            "90, 0, 0, 1, 2, 3, 4, 5, 6",
+            "0;90;0;1;2;3;4;5;6 # last",
+        ]
+    )
+    (stream,) = recording.streams
+    assert stream.poses
+    assert len(stream) == 3
+    assert recording.wrench_sign == -1
+    np.testing.assert_allclose(stream.channels["rotation"][1], [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
+    assert stream.channels["force"].tolist() == [[1, 2, 3]] * 3
+    assert stream.channels["torque"].tolist() == [[4, 5, 6]] * 3
+
+
+NINE = "Each line holds nine {}numbers: roll pitch yaw (deg, S to W), fx fy fz (N), tx ty tz (N*m)."
+
+
+@pytest.mark.parametrize(
+    ("line", "text"),
+    [
+        ("", f"no pose was typed. {NINE.format('')}"),
+        ("1 2 3", f"line 1: got 3 numbers. {NINE.format('finite ')}"),
+        ("a 2 3", f"line 1: could not convert string to float: 'a'. {NINE.format('')}"),
+    ],
+)
+def test_pendant_lines_that_are_wrong(line: str, text: str) -> None:
+    with pytest.raises(BadValue) as caught:
+        read_pendant([line])
+    assert str(caught.value) == text
