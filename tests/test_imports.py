@@ -73,7 +73,7 @@ def modules() -> dict[str, str]:
 
 @cache
 def trees() -> dict[str, ast.Module]:
-    return {name: ast.parse(text) for name, text in modules().items()}
+    return {name: ast.parse(text, name or "__init__") for name, text in modules().items()}
 
 
 def unit(name: str) -> str:
