@@ -200,6 +200,11 @@ def test_binary_description(tmp_path: Path) -> None:
     assert message(path, BadFile) == "DIR/log.toml: expected a TOML text in UTF-8; found a binary file."
 
 
+def test_folder_called_toml(tmp_path: Path) -> None:
+    (tmp_path / "log.toml").mkdir()
+    assert message(tmp_path / "log.toml", BadFile) == "DIR/log.toml: cannot be read (Is a directory)."
+
+
 def test_no_stream(tmp_path: Path) -> None:
     path = write(tmp_path, "[log]\n")
     assert message(path, BadDescription) == (

@@ -35,7 +35,13 @@ def read_recording(path: Path | str, data: Path | str | None = None) -> Recordin
     Returns the streams in SI, each on its own clock; all clocks count from one common origin.
     Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
     """
-    path, data = Path(path), None if data is None else Path(data)
+    try:
+        return _read(Path(path), None if data is None else Path(data))
+    except OSError as error:
+        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
+
+
+def _read(path: Path, data: Path | None) -> Recording:
     if not path.exists():
         path = find_file(str(path), Path.cwd(), data)
     if path.suffix.lower() != ".toml":
