@@ -15,7 +15,6 @@ from steelyard.identify import noise_cost
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
 from steelyard.identify.problem import Problem
-from steelyard.identify.regressor import residual_map
 from steelyard.inertia import InertialParameters, forms
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of
@@ -45,7 +44,7 @@ class Solution:
     @property
     def bias(self) -> Array:
         """The wrench bias (6,) [tau, f]; zero where it was not estimated."""
-        return self.linear[10:] if len(self.linear) > 10 else np.zeros(6)
+        return self.linear[10:16] if len(self.linear) > 10 else np.zeros(6)
 
 
 @numba.njit(cache=True)
@@ -83,11 +82,14 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
     `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
     Raises CannotAnswer where mass or centre of mass are not fixed.
     """
-    K = residual_map(solution.linear[:10], solution.bias)
+    K = problem.residual_map(solution.linear)
     data = (K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
     H, extra, _ = noise_cost.information(*data)
     chi2 = noise_cost.value(*data[:1], *data[2:]) / max(6 * problem.samples - len(solution.linear), 1.0)
     V = score if score is not None else max(chi2, 1.0) * (H + extra)
+    if problem.with_bias:
+        H[10:16, 10:16] += problem.bias_prior.precision
+        V[10:16, 10:16] += problem.bias_prior.precision
     covariance = _sandwich(H, V, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
     sight = _sight(H, V, solution.linear[:10])
@@ -102,7 +104,8 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
         ),
         sight.identified,
         solution.bias,
-        np.sqrt(np.diag(covariance)[10:]) if problem.with_bias else np.zeros(6),
+        covariance[10:16, 10:16] if problem.with_bias else np.zeros((6, 6)),
+        covariance[:10, 10:16] if problem.with_bias else np.zeros((10, 6)),
     )  # fmt: skip
     left_out = leave_one_out(problem, solution.linear, H, solution.jacobian, solution.prior)
     return replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))

@@ -18,9 +18,7 @@ from steelyard.check import Array
 from steelyard.identify import noise_cost
 from steelyard.identify.conclude import Solution
 from steelyard.identify.problem import Problem
-from steelyard.identify.regressor import residual_map
 from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import features
 
 # Longer logs are judged by the scatter of scores summed over blocks of time; shorter ones have too few.
 FEWEST, LONGEST, BLOCKS = 50, 20_000, 200
@@ -36,7 +34,7 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
     """Return the variance (p, p) of the score, or None where the rows have no order in time."""
     if log.time is None or len(log) < FEWEST:
         return None
-    K = residual_map(solution.linear[:10], solution.bias)
+    K = problem.residual_map(solution.linear)
     log = log.rows(np.argsort(log.time, kind="stable"))
     if len(log) > LONGEST:
         return _by_blocks(log, K, problem)
@@ -70,7 +68,7 @@ def _by_blocks(log: MotionLog, K: Array, problem: Problem) -> Array:
 
 def _whitened(log: MotionLog, K: Array, problem: Problem) -> tuple[Array, Array]:
     """Return whitened residuals (N, 6) and their slopes (N, 6, p)."""
-    z = features(log)
+    z = problem.features(log)
     residual = z @ K.T
     slope = np.tensordot(z, problem.T, axes=(1, 2)).swapaxes(1, 2)
     for index, number in enumerate(problem.classes):

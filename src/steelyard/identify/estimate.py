@@ -48,7 +48,8 @@ class Estimate:
 
     identified   (10,) of mass, com x y z, inertia about the CoM xx xy xz yy yz zz
     wrench_bias  (6,) [tau, f] in the recording's own sign and axes: what to subtract from the raw channels
-    wrench_bias_std  (6,) of the same
+    bias_covariance  (6, 6) of the same
+    cross_covariance  (10, 6) of the parameters with the bias: needed where two runs share one bias
     """
 
     parameters: InertialParameters
@@ -57,7 +58,8 @@ class Estimate:
     evidence: Evidence
     identified: np.ndarray[Any, np.dtype[np.bool_]]
     wrench_bias: Array = field(default_factory=lambda: np.zeros(6))
-    wrench_bias_std: Array = field(default_factory=lambda: np.zeros(6))
+    bias_covariance: Array = field(default_factory=lambda: np.zeros((6, 6)))
+    cross_covariance: Array = field(default_factory=lambda: np.zeros((10, 6)))
     frame: str = "S"
     delays_s: Mapping[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
@@ -75,6 +77,11 @@ class Estimate:
     def std(self) -> Array:
         """Standard deviations (10,) of mass [kg], com [m], inertia about the CoM [kg m^2]."""
         return np.sqrt(np.maximum(np.diag(self.people_covariance), 0))
+
+    @property
+    def wrench_bias_std(self) -> Array:
+        """Standard deviations (6,) of the wrench bias [N m, N]."""
+        return np.sqrt(np.maximum(np.diag(self.bias_covariance), 0))
 
     @property
     def mass(self) -> float:

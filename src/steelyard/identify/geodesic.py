@@ -15,11 +15,10 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify.conclude import Solution, conclude
-from steelyard.identify.correlated import score_variance
+from steelyard.identify.conclude import Solution
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.linear import normal_equations, solve_scaled
-from steelyard.identify.noise_levels import with_noise
+from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.linear import solve_scaled
 from steelyard.identify.problem import Problem
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.log import MotionLog
@@ -44,28 +43,24 @@ class Geodesic:
     prior: InertialParameters | None = None
     distance: Literal["entropic", "riemannian"] = "entropic"
     alpha: float = 1e-5
-    bias: str = "free"
+    bias: Bias | str = "free"
 
     def __post_init__(self) -> None:
         if self.distance not in ("entropic", "riemannian"):
             raise BadValue(f"distance must be entropic or riemannian; got {self.distance!r}.")
 
     def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log. Raises CannotAnswer where mass and centre of mass are not fixed."""
-        log = with_noise(log, self.bias == "free")
-        problem = Problem.of(Moments.of_log(log), self.bias == "free")
-        solution = self._fit(problem)
-        return conclude(problem, solution, "geodesic", score_variance(log, problem, solution))
+        """Return the estimate of a log; see `fit.fit_log`."""
+        return fit_log(log, Bias.of(self.bias), self._fit, "geodesic")
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        problem = Problem.of(moments, self.bias == "free")
-        return conclude(problem, self._fit(problem), "geodesic")
+        return fit_moments(moments, Bias.of(self.bias), self._fit, "geodesic")
 
     def _fit(self, problem: Problem) -> Solution:
         """Newton's method on the cone: the cost is convex in the parameters (entropic) or along geodesics."""
         weights = np.stack([np.diag(1 / w) for w in problem.wrench])
-        H, g = normal_equations(problem.T, problem.scatter, weights)
+        H, g = problem.normal_equations(weights)
         linear = solve_scaled(H, g)
         prior = _neutral(linear) if self.prior is None else forms.pseudo_inertia(self.prior.vector)
         gamma = 0.5 * self.alpha * float(np.trace(H[:10, :10]))

@@ -13,7 +13,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify import noise_cost
 from steelyard.identify.problem import Problem
-from steelyard.identify.regressor import residual_map
 from steelyard.inertia import forms
 
 FEWEST_BLOCKS = 4
@@ -51,7 +50,7 @@ def _without(
     """Return the refit without the chosen groups, and the squared residual (6,) it leaves in them."""
     classes = problem.block_class[chosen]
     scatter = problem.blocks[chosen]
-    K = residual_map(linear[:10], linear[10:] if len(linear) > 10 else np.zeros(6))
+    K = problem.residual_map(linear)
     data = (K, problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
     _, gradient, _ = noise_cost.derivatives(*data)
     _, _, plain = noise_cost.information(*data)
@@ -59,7 +58,7 @@ def _without(
     scale = 1 / np.sqrt(np.maximum(np.diag(rest), 1e-12 * np.diag(full) + 1e-300))
     step = scale * (np.linalg.pinv(rest * np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (scale * (J.T @ gradient / 2)))
     moved = linear + J @ step
-    K = residual_map(moved[:10], moved[10:] if len(linear) > 10 else np.zeros(6))
+    K = problem.residual_map(moved)
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)
 
 

@@ -14,13 +14,11 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.identify.conclude import Solution, conclude
-from steelyard.identify.correlated import score_variance
+from steelyard.identify.conclude import Solution
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.linear import normal_equations, reweighted, solve_scaled
-from steelyard.identify.noise_levels import with_noise
+from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.linear import reweighted, solve_scaled
 from steelyard.identify.problem import Problem
-from steelyard.identify.regressor import residual_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 
@@ -37,23 +35,19 @@ class LeastSquares:
     """
 
     kind: Literal["ordinary", "weighted", "total"] = "weighted"
-    bias: str = "free"
+    bias: Bias | str = "free"
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise BadValue(f"kind must be one of {', '.join(KINDS)}; got {self.kind!r}.")
 
     def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log. Raises CannotAnswer where mass and centre of mass are not fixed."""
-        log = with_noise(log, self.bias == "free")
-        problem = Problem.of(Moments.of_log(log), self.bias == "free")
-        solution = self._fit(problem)
-        return conclude(problem, solution, "least-squares", score_variance(log, problem, solution))
+        """Return the estimate of a log; see `fit.fit_log`."""
+        return fit_log(log, Bias.of(self.bias), self._fit, "least-squares")
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        problem = Problem.of(moments, self.bias == "free")
-        return conclude(problem, self._fit(problem), "least-squares")
+        return fit_moments(moments, Bias.of(self.bias), self._fit, "least-squares")
 
     def _fit(self, problem: Problem) -> Solution:
         if self.kind == "total":
@@ -62,7 +56,7 @@ class LeastSquares:
             weights = np.stack([np.diag(1 / w) for w in problem.wrench])
         else:
             weights = np.broadcast_to(np.eye(6), (len(problem.scatter), 6, 6)).copy()
-        return Solution.unconstrained(solve_scaled(*normal_equations(problem.T, problem.scatter, weights)))
+        return Solution.unconstrained(solve_scaled(*problem.normal_equations(weights)))
 
 
 def _total(problem: Problem) -> Array:
@@ -72,8 +66,7 @@ def _total(problem: Problem) -> Array:
     the ratio of the two is least at the answer. Bias columns are exact and are projected out first.
     """
     linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
-    bias = linear[10:] if problem.with_bias else np.zeros(6)
-    K = residual_map(linear[:10], bias)
+    K = problem.residual_map(linear)
     unit = np.zeros((1, *problem.T.shape[1:]))
     unit[0, :, 12:18] = np.eye(6)
     T = np.concatenate([problem.T[:10], unit, problem.T[10:]])

@@ -2,9 +2,9 @@
 
 P = U U^T with U = e^alpha [[U3, t], [0, 1]], t the centre of mass and U3 the upper triangular root of the second moment
 per unit mass. The shape prior acts on U3 alone, so that it moves neither mass nor centre of mass directly:
-    prior(U3) = gamma [ 3 log(tr(U3 U3^T)/3) - log det(U3 U3^T) ] + log(tr(U3 U3^T) / (3 s^2))^2 / (2 w)^2 * 2 ...
-The first term is the entropic divergence from the ball of the size that fits best (Lee, Wensing, Park 2019, with the
-prior's mass, centre and size profiled out); the second a wide log-normal pull of that size to s.
+    prior(U3) = gamma [ 3 log(r^2) - log det(U3 U3^T) ] + precision/2 (log r - log s)^2,  r^2 = tr(U3 U3^T)/3.
+The first term is the entropic divergence from the ball that fits best (Lee, Wensing, Park 2019, with the prior's mass,
+centre and size profiled out); the second a wide log-normal pull of the radius of gyration r to s.
 """
 
 from __future__ import annotations
@@ -164,19 +164,23 @@ def linear_of(u: Array) -> Array:
 @numba.njit(cache=True)
 def cost(
     u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float,
+    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
 ) -> float:  # fmt: skip
-    """Return Q/2 + prior at u = [theta, bias]."""
+    """Return Q/2 + priors at u = [theta, bias]; the bias prior has mean (6,) and precision (6, 6)."""
     K = residual_map_of(T, linear_of(u))
-    return 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u[:10], gamma, log_size, precision)[0]
+    total = 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u[:10], gamma, log_size, precision)[0]
+    if len(u) > 10:
+        off = u[10:16] - bias
+        total += 0.5 * off @ (bias_precision @ off)
+    return total
 
 
 @numba.njit(cache=True)
 def cost_derivatives(
     u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float,
+    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
 ) -> tuple[float, Array, Array]:  # fmt: skip
-    """Return Q/2 + prior with gradient (p,) and Hessian (p, p) in u = [theta, bias]."""
+    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias]."""
     size = u.shape[0]
     theta = u[:10]
     U = factor(theta)
@@ -188,7 +192,13 @@ def cost_derivatives(
     hessian = 0.5 * (J.T @ H @ J)
     hessian[:10, :10] += 0.5 * _curvature(theta, U, g[:10]) + prior_hessian
     gradient[:10] += prior_gradient
-    return 0.5 * Q + prior, gradient, hessian
+    total = 0.5 * Q + prior
+    if size > 10:
+        pull = bias_precision @ (u[10:16] - bias)
+        total += 0.5 * (u[10:16] - bias) @ pull
+        gradient[10:16] += pull
+        hessian[10:16, 10:16] += bias_precision
+    return total, gradient, hessian
 
 
 @numba.njit(cache=True)
@@ -227,7 +237,7 @@ def _downhill(gradient: Array, hessian: Array) -> Array:
 @numba.njit(cache=True)
 def minimise(
     start: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float, iterations: int,
+    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array, iterations: int,
 ) -> tuple[Array, float, bool]:  # fmt: skip
     """Return the minimum u, its cost and whether Newton converged, from `start` by damped Newton steps.
 
@@ -235,7 +245,8 @@ def minimise(
     kept within a trust length of 1 in log coordinates and halved until the cost falls.
     """
     u = start.copy()
-    current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, gamma, log_size, precision)
+    prior = (gamma, log_size, precision, bias, bias_precision)
+    current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
     for _ in range(iterations):
         step = _downhill(gradient, hessian)
         decrement = -0.5 * (gradient @ step)
@@ -246,7 +257,7 @@ def minimise(
             step *= 1.0 / longest
         moved = False
         for _ in range(30):
-            trial = cost(u + step, T, scatter, acceleration, wrench, gamma, log_size, precision)
+            trial = cost(u + step, T, scatter, acceleration, wrench, *prior)
             if trial < current - 1e-4 * abs(gradient @ step) or trial < current - 1e-10 * abs(current):
                 moved = True
                 break
@@ -254,5 +265,5 @@ def minimise(
         if not moved:
             return u, current, decrement < 1e-3
         u = u + step
-        current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, gamma, log_size, precision)
+        current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
     return u, current, False

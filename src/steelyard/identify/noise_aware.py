@@ -15,13 +15,11 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.identify import newton
-from steelyard.identify.conclude import Solution, conclude
-from steelyard.identify.correlated import score_variance
+from steelyard.identify.conclude import Solution
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.linear import reweighted
-from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import Problem
-from steelyard.identify.rest import at_rest
 from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -34,44 +32,35 @@ SMALLEST, LARGEST, NEUTRAL = 0.005, 0.2, 0.05 / np.sqrt(5)
 class NoiseAware:
     """Options of the noise-aware estimator.
 
-    bias         "free": a constant force and torque bias is estimated; "none": the sensor is known to be tared
+    bias         "free", "none", or a Bias with a prior or a drift
     prior        weight of the pull toward the ball of the size that fits best: 1 counts like one sample per axis
     size         radius of gyration per axis to which the size is pulled where the data are silent [m]
     size_spread  how far off `size` may be, as a factor e^size_spread (one standard deviation)
     iterations   Newton steps at most
     """
 
-    bias: str = "free"
+    bias: Bias | str = "free"
     prior: float = 0.5
     size: float = float(NEUTRAL)
     size_spread: float = 1.0
     iterations: int = 60
 
     def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log; noise that it does not declare is estimated, rest is verified.
-
-        Raises CannotAnswer where the data do not fix mass and centre of mass.
-        """
-        log = with_noise(log, self.bias == "free")
-        if log.still.any():
-            first = self._fit(Problem.of(Moments.of_log(log, by_block=False), self.bias == "free"))
-            log = at_rest(log, first.linear[:10], first.bias)
-        problem = Problem.of(Moments.of_log(log), self.bias == "free")
-        solution = self._fit(problem)
-        return conclude(problem, solution, "noise-aware", score_variance(log, problem, solution))
+        """Return the estimate of a log; see `fit.fit_log`."""
+        return fit_log(log, Bias.of(self.bias), self._fit, "noise-aware", verify_rest=True)
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        problem = Problem.of(moments, self.bias == "free")
-        return conclude(problem, self._fit(problem), "noise-aware")
+        return fit_moments(moments, Bias.of(self.bias), self._fit, "noise-aware")
 
     def _fit(self, problem: Problem) -> Solution:
         data = (problem.T, problem.scatter, problem.acceleration, problem.wrench)
         options = (self.prior, float(np.log(self.size)), self.size_spread**-2)
+        known = (problem.bias_prior.mean, problem.bias_prior.precision)
         linear = reweighted(*data, 3)
         best = None
         for start in self._starts(linear):
-            found = newton.minimise(start, *data, *options, self.iterations)
+            found = newton.minimise(start, *data, *options, *known, self.iterations)
             if best is None or found[1] < best[1]:
                 best = found
             if found[2]:

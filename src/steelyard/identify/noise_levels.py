@@ -72,7 +72,7 @@ def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
     acceleration = np.stack([noise[c].acceleration for c in moments.noise_class])
     wrench = np.stack([noise[c].wrench for c in moments.noise_class])
     linear = reweighted(T, moments.scatter, acceleration, wrench, 4)
-    K = residual_map(linear[:10], linear[10:] if with_bias else np.zeros(6))
+    K = residual_map(linear[:10], linear[10:16] if with_bias else np.zeros(6))
     # Parameters that the data fix take their share of the residual degrees of freedom away.
     lost = min(len(T), 6 * moments.samples / 2) / (6 * moments.samples)
     for group, c in enumerate(moments.noise_class):

@@ -2,37 +2,52 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.identify.linear import normal_equations
 from steelyard.identify.regressor import design
-from steelyard.logs.moments import Integers, Moments
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import Integers, Moments, features
 
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
 
 
 @dataclass(frozen=True, eq=False)
+class BiasPrior:
+    """What is known of the wrench bias beforehand: mean (6,) [tau, f] and precision (6, 6)."""
+
+    mean: Array
+    precision: Array
+
+
+NOTHING_KNOWN = BiasPrior(np.zeros(6), np.zeros((6, 6)))
+
+
+@dataclass(frozen=True, eq=False)
 class Problem:
-    """Scatter (C, Z, Z), variances of acceleration and wrench (C, 6) each, and whether a constant bias is free.
+    """Scatter (C, Z, Z) with variances of acceleration and wrench (C, 6) each, and the design T (p, 6, Z).
+
+    The linear parameters are phi (10), then the bias (6) unless the sensor is tared, then its drift (6) where asked.
 
     classes       (C,) number of each class in the log
-    blocks        (B, Z, Z) the same rows by still pose or time block, and their class (B,), for hold-out
+    blocks        (B, Z, Z) the same rows by still pose or time block, with class and number (B,), for hold-out
     """
 
     scatter: Array
     acceleration: Array
     wrench: Array
-    with_bias: bool
+    T: Array
     classes: Integers
     blocks: Array
     block_class: Integers
     block_number: Integers
     still_samples: float = 0.0
+    bias_prior: BiasPrior = field(default=NOTHING_KNOWN)
 
     @classmethod
     def of(cls, moments: Moments, with_bias: bool) -> Problem:
@@ -50,24 +65,64 @@ class Problem:
         wrench = np.stack([moments.noise[c].wrench for c in classes])
         if (wrench <= 0).any():
             raise BadValue("Wrench noise must be above zero on every axis; a zero variance would weigh infinitely.")
+        still = float(moments.counts[moments.still].sum())
         return cls(
-            scatter,
-            acceleration,
-            wrench,
-            with_bias,
-            classes,
-            moments.scatter,
-            label,
-            moments.block,
-            float(moments.counts[moments.still].sum()),
+            scatter, acceleration, wrench, design(with_bias), classes,
+            moments.scatter, label, moments.block, still,
+        )  # fmt: skip
+
+    def with_drift(self, log: MotionLog) -> Problem:
+        """Return the problem with a bias that also grows linearly in time; `log` is the one the statistic came from.
+
+        Time is scaled to -1..1 over the log, so that the drift's unit is half the change from start to end.
+        """
+        z = np.column_stack([features(log), _scaled_time(log)])
+        key = np.stack([log.noise_class, log.still.astype(np.int64), log.pose], 1)
+        groups, label = np.unique(key, axis=0, return_inverse=True)
+        blocks = np.stack([z[label == g].T @ z[label == g] for g in range(len(groups))])
+        block_class = np.searchsorted(self.classes, groups[:, 0])
+        scatter = np.zeros((len(self.classes), 20, 20))
+        np.add.at(scatter, block_class, blocks)
+        T = np.zeros((len(self.T) + 6, 6, 20))
+        T[: len(self.T), :, :19] = self.T
+        T[len(self.T) :, :, 19] = -np.eye(6)
+        return replace(
+            self, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2]
         )
 
-    @cached_property
-    def T(self) -> Array:
-        """The design (p, 6, Z): derivative of the residual map by the linear parameters."""
-        return design(self.with_bias)
+    def residual_map(self, linear: Array) -> Array:
+        """Return K (6, Z), so that the wrench residual of a row is K z."""
+        K = np.tensordot(linear, self.T, axes=1)
+        K[:, 12:18] += np.eye(6)
+        return np.asarray(K)
+
+    def normal_equations(self, weights: Array) -> tuple[Array, Array]:
+        """Return H (p, p) and g (p,) of the rows weighted by `weights` (C, 6, 6), with what is known of the bias."""
+        H, g = normal_equations(self.T, self.scatter, weights)
+        if self.with_bias:
+            H[10:16, 10:16] += self.bias_prior.precision
+            g[10:16] += self.bias_prior.precision @ self.bias_prior.mean
+        return H, g
+
+    @property
+    def with_bias(self) -> bool:
+        """Whether a constant wrench bias is among the parameters."""
+        return len(self.T) > 10
 
     @property
     def samples(self) -> float:
         """Rows in all."""
         return float(self.scatter[:, 18, 18].sum())
+
+    def features(self, log: MotionLog) -> Array:
+        """Return z (N, Z) of the rows of a log, as wide as this problem's statistic."""
+        z = features(log)
+        return np.column_stack([z, _scaled_time(log)]) if self.T.shape[2] == 20 else z
+
+
+def _scaled_time(log: MotionLog) -> Array:
+    """Return time scaled to -1..1 over the log."""
+    if log.time is None:
+        raise CannotAnswer("A drifting bias needs a clock; the log has none. Record a time column.")
+    start, end = float(log.time.min()), float(log.time.max())
+    return np.asarray((2 * log.time - start - end) / max(end - start, 1e-9))

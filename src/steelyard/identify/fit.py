@@ -1,0 +1,76 @@
+"""The frame that every estimator shares: noise filled in, rest verified, statistic, solution, conclusion."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Literal
+
+from steelyard.errors import BadValue
+from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.correlated import score_variance
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.noise_levels import with_noise
+from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem
+from steelyard.identify.rest import at_rest
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import Moments
+
+
+@dataclass(frozen=True)
+class Bias:
+    """What the force-torque sensor reads without a load.
+
+    kind   "free": a constant force and torque are estimated; "none": the sensor is known to be tared
+    prior  what another run has shown of it
+    drift  the bias also grows linearly over the log
+    """
+
+    kind: Literal["free", "none"] = "free"
+    prior: BiasPrior = NOTHING_KNOWN
+    drift: bool = False
+
+    def __post_init__(self) -> None:
+        if self.kind not in ("free", "none"):
+            raise BadValue(f"bias must be free or none; got {self.kind!r}.")
+        if self.drift and self.kind == "none":
+            raise BadValue('A tared sensor (bias "none") cannot drift; use bias "free" with drift.')
+
+    @classmethod
+    def of(cls, bias: Bias | str) -> Bias:
+        """Return `bias`, or the one of that kind."""
+        return bias if isinstance(bias, Bias) else cls(bias)  # type: ignore[arg-type]
+
+    @property
+    def free(self) -> bool:
+        """Whether a bias is estimated."""
+        return self.kind == "free"
+
+
+Solver = Callable[[Problem], Solution]
+
+
+def fit_moments(moments: Moments, bias: Bias, solver: Solver, method: str) -> Estimate:
+    """Return the estimate from a statistic that carries its noise."""
+    problem = replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
+    return conclude(problem, solver(problem), method)
+
+
+def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest: bool = False) -> Estimate:
+    """Return the estimate of a log; noise that it does not declare is estimated, time order widens the error bars.
+
+    `verify_rest` fuses the acceleration of resting rows with zero where the wrench agrees. Raises CannotAnswer where
+    the data do not fix mass and centre of mass.
+    """
+    log = with_noise(log, bias.free)
+    if verify_rest and log.still.any():
+        first = solver(_problem(log, bias, by_block=False))
+        log = at_rest(log, first.linear[:10], first.bias)
+    problem = _problem(log, bias, by_block=True)
+    solution = solver(problem)
+    return conclude(problem, solution, method, score_variance(log, problem, solution))
+
+
+def _problem(log: MotionLog, bias: Bias, by_block: bool) -> Problem:
+    problem = replace(Problem.of(Moments.of_log(log, by_block), bias.free), bias_prior=bias.prior)
+    return problem.with_drift(log) if bias.drift else problem
