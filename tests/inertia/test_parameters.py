@@ -108,6 +108,19 @@ def test_pseudo_inertia_blocks_and_tensor_off_diagonals() -> None:
     assert_allclose(body.pseudo_inertia, 2 * np.outer(point, point))
 
 
+def test_log_cholesky_order_is_that_of_the_paper() -> None:
+    a, d1, d2, d3, s12, s23, s13, t1, t2, t3 = theta = 0.1 * np.arange(1, 11)
+    U = np.array([
+        [np.exp(d1), s12, s13, t1],
+        [0, np.exp(d2), s23, t2],
+        [0, 0, np.exp(d3), t3],
+        [0, 0, 0, 1],
+    ])  # fmt: skip
+    body = InertialParameters.from_log_cholesky(theta)
+    assert_allclose(body.pseudo_inertia, np.exp(2 * a) * U @ U.T)
+    assert_allclose(body.com, [t1, t2, t3])
+
+
 def differences(function, at: np.ndarray, step: float = 1e-6) -> np.ndarray:
     """Central differences of `function` (..., k) -> (..., n) as (..., n, k)."""
     columns = []
