@@ -24,11 +24,11 @@ ENTRIES = ("mass", "com_x", "com_y", "com_z", "i_xx", "i_xy", "i_xz", "i_yy", "i
 KINDS = {"mass": slice(0, 1), "com": slice(1, 4), "inertia": slice(4, 10)}
 BIAS_STD = np.repeat([0.2, 5.0], 3)
 RULES = (
-    "Ordered logs with a clock; 95 % interval = estimate +- 1.96 std; only what the estimate calls "
-    "identified. coverage_pct pools all intervals of a kind. width_ratio = mean half-width / rms error for each (object, "
-    "entry), averaged within the kind with the number of intervals as weight; width_ratio_pooled = the same "
-    "over the whole kind at once, each object in its own scale (mass, radius of gyration, half the trace of the "
-    "inertia about the centre of mass). An honest interval has a ratio of 1.96."
+    "Ordered logs with a clock; 95 % interval = estimate +- 1.96 std, of what the estimate calls identified. "
+    "coverage_pct pools all intervals of a kind. width_ratio = mean half-width / rms error for each "
+    "(object, entry), averaged within the kind with the number of intervals as weight; width_ratio_pooled = "
+    "the same over the whole kind at once, each object in its own scale (mass, radius of gyration, half the "
+    "trace of the inertia about the centre of mass). An honest interval has a ratio of 1.96."
 )
 Progress = Callable[[int, int], None]
 

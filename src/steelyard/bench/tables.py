@@ -14,6 +14,7 @@ _IDENTIFY = (
     ("consistent %", "consistent_pct", 0),
     ("failures", "failures", 0),
     ("solve ms", "solve_ms", 3),
+    ("log ms", "identify_ms", 2),
 )
 _COVERAGE = (
     ("coverage %", "coverage_pct", 1),
