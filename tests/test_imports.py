@@ -47,7 +47,8 @@ MAY_IMPORT: dict[str, set[str]] = {
         "identify.estimate",
     },
 }  # fmt: skip
-MAY_IMPORT["bench"] = UPPER | {"simulate", "evaluate", "pipelines", "io", "report", "live"}
+MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "pipelines", "io", "report", "live"}
+MAY_IMPORT["bench"] = MAY_IMPORT["api"] | {"api"}
 MAY_IMPORT["cli"] = MAY_IMPORT["bench"] | {"bench", ""}
 MAY_IMPORT[""] = MAY_IMPORT["cli"] | {"cli"}  # the package itself: `import steelyard as sy`
 
