@@ -35,19 +35,20 @@ MAY_IMPORT: dict[str, set[str]] = {
     "robots": {"spatial"},
     "identify": {"parts.parts", "logs", "inertia", "spatial"},
     "team": {"identify.estimate", "identify.evidence", "identify.regressor", "logs", "inertia", "spatial"},
+    "sanity": {"identify", "logs", "inertia", "spatial"},
     "excite": {"robots", "identify", "logs"},
     "workshop": {"shape", "parts", "inertia"},
     "simulate": UPPER,
     "evaluate": UPPER,
     "live": UPPER,
     "report": UPPER | {"evaluate"},
-    "pipelines": UPPER | {"simulate", "evaluate"},
+    "pipelines": UPPER | {"simulate", "evaluate", "sanity"},
     "io": {
         "spatial", "inertia", "logs.log", "logs.recording", "shape.mesh", "shape.tets", "parts.parts",
         "identify.estimate",
     },
 }  # fmt: skip
-MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "pipelines", "io", "report", "live"}
+MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live"}
 MAY_IMPORT["bench"] = MAY_IMPORT["api"] | {"api"}
 MAY_IMPORT["cli"] = MAY_IMPORT["bench"] | {"bench", ""}
 MAY_IMPORT[""] = MAY_IMPORT["cli"] | {"cli"}  # the package itself: `import steelyard as sy`
