@@ -15,7 +15,7 @@ from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.inertia.solids import box
-from steelyard.io import read_result, read_result_parameters, result_dict, write_result
+from steelyard.io import read_result, result_dict, write_result
 from steelyard.spatial import Pose, Rotation
 
 
@@ -43,7 +43,8 @@ def estimate() -> Estimate:
 def test_keys_of_the_format(estimate: Estimate) -> None:
     result = result_dict(estimate)
     assert list(result) == [
-        "mass_kg", "com_m", "inertia_com_kgm2", "frame", "method", "consistent", "std", "covariance", "parameters",
+        "mass_kg", "com_m", "inertia_com_kgm2", "frame", "method", "consistent", "std", "covariance",
+        "bias_covariance", "cross_covariance", "parameters",
         "identified", "force_bias_N", "torque_bias_Nm", "delays_s", "evidence", "findings", "notes",
     ]  # fmt: skip
     assert result["mass_kg"] == pytest.approx(4.8)
@@ -71,17 +72,23 @@ def test_inertia_is_null_where_the_data_do_not_fix_it(estimate: Estimate) -> Non
 def test_round_trip(estimate: Estimate, tmp_path: Path) -> None:
     for identified in (np.ones(10, np.bool_), np.arange(10) < 4):
         write_result(replace(estimate, identified=identified), tmp_path / "r.json")
-        body, covariance, result = read_result(tmp_path / "r.json")
-        np.testing.assert_allclose(body.vector, estimate.parameters.vector, rtol=1e-12, atol=1e-15)
-        np.testing.assert_allclose(covariance, estimate.covariance)
-        assert result["method"] == "noise-aware"
+        back = read_result(tmp_path / "r.json")
+        np.testing.assert_allclose(back.parameters.vector, estimate.parameters.vector, rtol=1e-12, atol=1e-15)
+        np.testing.assert_allclose(back.covariance, estimate.covariance)
+        np.testing.assert_allclose(back.wrench_bias, estimate.wrench_bias)
+        np.testing.assert_allclose(back.cross_covariance, estimate.cross_covariance)
+        assert back.method == "noise-aware"
+        assert (back.identified == identified).all()
+        assert back.codes() == estimate.codes()
     assert [path.name for path in tmp_path.iterdir()] == ["r.json"]
 
 
 def test_a_data_sheet_typed_as_a_tool(tmp_path: Path) -> None:
     (tmp_path / "t.json").write_text('{"mass_kg": 0.5, "com_m": [0, 0, 0.1], "inertia_com_kgm2": null}')
-    tool = read_result_parameters(tmp_path / "t.json")
-    np.testing.assert_allclose(tool.vector[:4], [0.5, 0, 0, 0.05])
+    tool = read_result(tmp_path / "t.json")
+    np.testing.assert_allclose(tool.parameters.vector[:4], [0.5, 0, 0, 0.05])
+    assert tool.identified[:4].all()
+    assert not tool.identified[4:].any()
 
 
 def test_nothing_is_left_where_writing_fails(estimate: Estimate, tmp_path: Path) -> None:
@@ -124,8 +131,8 @@ def test_a_tool_in_another_frame(tmp_path: Path) -> None:
     path = tmp_path / "r.json"
     path.write_text(json.dumps(GOOD | {"frame": "left"}))
     with pytest.raises(BadFile) as caught:
-        read_result_parameters(path)
-    assert str(caught.value) == f'{path}: a tool must be given in the sensor frame "S"; found "left".'
+        read_result(path)
+    assert str(caught.value) == f'{path}: a result must be given in the sensor frame "S"; found "left".'
 
 
 def test_missing_result(tmp_path: Path) -> None:

@@ -1,119 +1,60 @@
-"""`steelyard bench`: the numbers of the README, re-made."""
+"""`steelyard bench identify|coverage`."""
 
 from __future__ import annotations
 
-import json
-import sys
-from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import click
 
+from steelyard.bench.timing import one_blas_thread
+from steelyard.cli.console import print_json, progress_bar, say
 
-def _list(_context: click.Context, _option: click.Parameter, value: str | None) -> tuple[str, ...]:
-    """Return a comma-separated option as a tuple."""
-    return tuple(part.strip() for part in (value or "").split(",") if part.strip())
-
-
-def _progress(label: str) -> Callable[[int, int], None] | None:
-    """Return a counter on stderr, or None where nobody watches."""
-    if not sys.stderr.isatty():
-        return None
-
-    def show(done: int, total: int) -> None:
-        click.echo(f"\r{label} {done}/{total}" + ("\n" if done == total else ""), err=True, nl=False)
-
-    return show
+_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
-def _print(result: dict[str, Any], as_json: bool, table: Callable[[dict[str, Any]], str]) -> None:
-    """Print one JSON object, or the table; notes go to stderr with the JSON."""
-    if as_json:
-        for note in result.get("notes", ()):
-            click.echo(note, err=True)
-        click.echo(json.dumps(result, allow_nan=False))
-    else:
-        click.echo(table(result))
-
-
-@click.group()
+@click.group(context_settings={"help_option_names": ["-h", "--help"]})
 def bench() -> None:
-    """Re-make the numbers of the README from fixed seeds."""
-    from steelyard.bench.timing import one_blas_thread
-
+    """Make every claimed number again."""
     one_blas_thread()
 
 
 @bench.command()
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-@click.option("--seeds", default=5, show_default=True, type=click.IntRange(1), help="Seeds 0 .. N-1.")
-@click.option("--objects", callback=_list, help="Comma-separated; all ten if left out.")
-@click.option("--motions", callback=_list, help="Comma-separated: stop_go, dyn_slow, dyn_fast.")
-@click.option("--noise", "noises", callback=_list, help="Comma-separated: none, low, moderate, high.")
-@click.option("--methods", callback=_list, help="Comma-separated; ours and all installed peers if left out.")
-@click.option("--million/--no-million", default=True, help="The log of a million samples as well.")
-@click.option("--data", hidden=True, help="Accepted like everywhere; this bench makes its own data.")
-def identify(
-    as_json: bool,
-    seeds: int,
-    objects: tuple[str, ...],
-    motions: tuple[str, ...],
-    noises: tuple[str, ...],
-    methods: tuple[str, ...],
-    million: bool,
-    data: str | None,
-) -> None:
-    """Our methods and the installed peers on ten objects, three motions and four noise levels."""
-    from steelyard.bench import identify as rooms
+@click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
+@click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+@click.option("--motions", multiple=True, help="Only these motions.")
+@click.option("--noise", "noises", multiple=True, help="Only these noise levels.")
+@click.option("--methods", multiple=True, help="Only these methods.")
+@click.option("--million", type=click.IntRange(min=0), default=1_000_000, show_default=True, help="Rows of the long log.")
+@click.option("--data", type=click.Path(path_type=Path), help="Accepted and not needed: the bench makes its data.")
+@_JSON
+def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> None:
+    """Ten bodies, three motions, four noise levels: our methods and, where installed, the peers'."""
+    from steelyard.bench import identify as job
     from steelyard.bench.tables import identify_table
 
-    result = rooms.run(
-        range(seeds),
-        methods,
-        _progress("logs"),
-        objects=objects,
-        motions=motions,
-        noises=noises,
-        million=1_000_000 if million else 0,
-    )
-    _print(result, as_json, identify_table)
+    result = job.run(range(seeds), progress=progress_bar("bench identify"), **choices)
+    for note in result["notes"]:
+        say(note)
+    print_json(result) if as_json else click.echo(identify_table(result))
 
 
 @bench.command()
-@click.option("--json", "as_json", is_flag=True, help="One JSON object on stdout.")
-@click.option("--seeds", default=1000, show_default=True, type=click.IntRange(1), help="Seeds 0 .. N-1.")
+@click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True)
 @click.option("--motion", default="stop_go", show_default=True)
 @click.option("--noise", default="moderate", show_default=True)
-@click.option("--spectrum", default="both", show_default=True, type=click.Choice(["white", "2hz", "both"]))
-@click.option("--all-objects", is_flag=True, help="All ten objects for every seed, not one in turn.")
-@click.option("--undeclared", is_flag=True, help="The logs do not say their noise level: it is estimated.")
-@click.option("--bias", default="none", show_default=True, type=click.Choice(["none", "free"]))
-@click.option("--workers", default=1, show_default=True, type=click.IntRange(1), help="Processes.")
-def coverage(
-    as_json: bool,
-    seeds: int,
-    motion: str,
-    noise: str,
-    spectrum: str,
-    all_objects: bool,
-    undeclared: bool,
-    bias: str,
-    workers: int,
-) -> None:
-    """How often the 95 % intervals hold the truth, by kind, and how wide they are."""
-    from steelyard.bench import coverage as rooms
+@click.option("--spectrum", type=click.Choice(["white", "2hz", "both"]), default="both", show_default=True)
+@click.option("--all-objects", is_flag=True, help="Every seed on all ten objects instead of one in turn.")
+@click.option("--noise-unknown", is_flag=True, help="The log does not declare its noise: it is estimated.")
+@click.option("--bias", type=click.Choice(["free", "none"]), default="none", show_default=True)
+@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
+@_JSON
+def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **choices: Any) -> None:
+    """Do 95 % intervals hold the truth 95 % of the time, white and correlated noise?"""
+    from steelyard.bench import coverage as job
     from steelyard.bench.tables import coverage_table
-    from steelyard.simulate.noise import SPECTRA
 
-    result = rooms.run(
-        seeds,
-        motion,
-        noise,
-        [name for name in SPECTRA if spectrum in (name, "both")],
-        _progress("fits"),
-        all_objects=all_objects,
-        declared=not undeclared,
-        bias=bias,
-        workers=workers,
-    )
-    _print(result, as_json, coverage_table)
+    spectra = ("white", "2hz") if spectrum == "both" else (spectrum,)
+    progress = progress_bar("bench coverage")
+    result = job.run(seeds, spectra=spectra, declared=not noise_unknown, progress=progress, **choices)
+    print_json(result) if as_json else click.echo(coverage_table(result))

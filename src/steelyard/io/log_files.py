@@ -16,7 +16,6 @@ from steelyard.io.channels import channel, require_one_length
 from steelyard.io.clocks import Clock, common_origin, steady
 from steelyard.io.description import Description, read_description
 from steelyard.io.requirements import require_answerable, require_matched_rows
-from steelyard.io.result_files import read_result_parameters
 from steelyard.io.rotations import FORMS
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
 from steelyard.io.tables import Table, choose_columns, find_file, open_table
@@ -119,16 +118,13 @@ def _recording(
         for name, spec, values, time in zip(names, specs, channels, times, strict=True)
     )
     require_matched_rows(streams, path.name)
-    tool = None
-    if description.tool is not None:
-        tool = read_result_parameters(find_file(description.tool, path.parent, data))
+    tool = None if description.tool is None else str(find_file(description.tool, path.parent, data))
     return Recording(
         streams,
         gravity=check.frozen(description.gravity),
         wrench_sign=description.wrench_sign,
         noise=description.noise,
         tool=tool,
-        tool_result=description.tool,
         object_pose=description.object_pose,
         object_pose_std=description.object_pose_std,
         name=path.stem,

@@ -6,7 +6,6 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from steelyard.check import Array
-from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose, Rotation
 
 STANDARD_GRAVITY = 9.80665
@@ -70,8 +69,7 @@ class Recording:
     wrench_sign   +1: the wrench is what the robot applies to the object; -1: the reaction (on-sensor)
     noise         declared standard deviations: force [N], torque [N m], acceleration [m/s^2],
                   angular_acceleration [rad/s^2]; missing ones are estimated
-    tool          a known body to subtract, in S
-    tool_result   the path of the result `tool` came from, for messages
+    tool          path of the result or log of the gripper alone, to be taken away
     object_pose   pose of the scan's frame O in S, with its uncertainty (m, rad)
     """
 
@@ -79,8 +77,7 @@ class Recording:
     gravity: Array
     wrench_sign: int = 1
     noise: Mapping[str, float] = field(default_factory=dict)
-    tool: InertialParameters | None = None
-    tool_result: str | None = None
+    tool: str | None = None
     object_pose: Pose | None = None
     object_pose_std: tuple[float, float] | None = None
     name: str = "log"

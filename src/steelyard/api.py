@@ -1,0 +1,45 @@
+"""The verbs of `import steelyard as sy`: the pipelines, with files read where paths are given."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.fit import Bias
+from steelyard.identify.noise_aware import NoiseAware
+from steelyard.io import read_recording, read_result
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording
+from steelyard.pipelines import held_object
+
+Log = str | Path | Recording | MotionLog
+
+
+def identify(
+    log: Log,
+    options: held_object.Options = held_object.Options(),
+    *,
+    tool: str | Path | Recording | Estimate | None = None,
+    data: str | Path | None = None,
+) -> Estimate:
+    """Return mass, centre of mass and inertia of what the robot holds, with covariance, evidence and findings.
+
+    log      a log description (.toml), a bare data file, a Recording, or a MotionLog made by the caller (which is
+             fitted as it is, without alignment and sanity checks)
+    options  method, bias and prior size
+    tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared
+    data     folder that relative paths in the description start from
+
+    Raises BadInput where the files make no sense, CannotAnswer where they do not determine mass and centre of mass.
+    """
+    if isinstance(log, MotionLog):
+        return NoiseAware(bias=Bias(options.bias, drift=options.drift)).identify(log)
+    recording = log if isinstance(log, Recording) else read_recording(log, data)
+    return held_object.identify(recording, options, _tool(recording.tool if tool is None else tool, data))
+
+
+def _tool(tool: str | Path | Recording | Estimate | None, data: str | Path | None) -> Recording | Estimate | None:
+    """Return the tool, read where it is given as a path."""
+    if not isinstance(tool, str | Path):
+        return tool
+    return read_result(tool) if Path(tool).suffix == ".json" else read_recording(tool, data)

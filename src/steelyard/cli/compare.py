@@ -1,0 +1,33 @@
+"""`steelyard compare a.json b.json`."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from pathlib import Path
+
+import click
+
+from steelyard.cli.console import print_json
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("first", type=click.Path(path_type=Path))
+@click.argument("second", type=click.Path(path_type=Path))
+@click.option("--any-grasp", is_flag=True, help="Compare only mass and principal moments: the grasps may differ.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
+    """Say whether two results can be the same object, held the same way."""
+    from steelyard.identify import same
+    from steelyard.io import read_result
+
+    a, b = read_result(first), read_result(second)
+    found = same.compare(
+        a.parameters, a.covariance, b.parameters, b.covariance, a.identified & b.identified, any_grasp
+    )
+    if as_json:
+        print_json(asdict(found) | {"same": found.same})
+        return
+    verdict = "the same object" if found.same else "not the same object"
+    click.echo(f"{verdict}: p = {found.p_value:.3g} (chi² {found.chi2:.1f}, {found.dof} degrees of freedom)")
+    for name, gap, std in found.compared:
+        click.echo(f"  {name:20s} {gap:+.3e} ± {std:.1e}" + ("   <-" if abs(gap) > 3 * std else ""))

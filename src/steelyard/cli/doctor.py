@@ -1,0 +1,66 @@
+"""`steelyard doctor`."""
+
+from __future__ import annotations
+
+import platform
+from importlib import metadata
+
+import click
+
+from steelyard import __version__
+from steelyard.cli.console import print_json
+from steelyard.errors import CannotAnswer
+
+CORE = ("numpy", "scipy", "numba", "click")
+EXTRAS = {"pyarrow": "parquet", "pin": "peers", "rigeo": "peers"}
+# A noise-free log must give the answer to rounding; the weak prior alone moves it by less than this share.
+TOLERANCE = 1e-4
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def doctor(as_json: bool) -> None:
+    """Show versions and what is installed, and identify a made body whose answer is known."""
+    versions = {name: _version(name) for name in (*CORE, *EXTRAS)}
+    error, seconds = _known_answer()
+    healthy = error < TOLERANCE
+    if as_json:
+        print_json(
+            {
+                "steelyard": __version__, "python": platform.python_version(), "packages": versions,
+                "mass_error": error, "seconds": seconds, "healthy": healthy,
+            }
+        )  # fmt: skip
+    else:
+        click.echo(f"steelyard {__version__}, Python {platform.python_version()} on {platform.system()} {platform.machine()}")
+        for name in CORE:
+            click.echo(f"  {name:8s} {versions[name]}")
+        for name, extra in EXTRAS.items():
+            hint = versions[name] or f"not installed (optional: pip install 'steelyard[{extra}]')"
+            click.echo(f"  {name:8s} {hint}")
+        click.echo(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
+    if not healthy:
+        raise CannotAnswer(f"The known body came out wrong by {error:.2g} of its size: this installation cannot be trusted.")
+
+
+def _version(name: str) -> str | None:
+    try:
+        return metadata.version(name)
+    except metadata.PackageNotFoundError:
+        return None
+
+
+def _known_answer() -> tuple[float, float]:
+    """Return the worst relative error in mass and first moment on a noise-free log, and the wall time [s]."""
+    import time
+
+    import numpy as np
+
+    from steelyard.identify.noise_aware import NoiseAware
+    from steelyard.simulate.logs import simulate_log
+
+    start = time.perf_counter()
+    log, true = simulate_log("hammer", "stop_go", "none", 0)
+    found = NoiseAware().identify(log).parameters
+    error = np.abs(found.vector[:4] - true.vector[:4]).max() / float(true.mass)
+    return float(error), time.perf_counter() - start

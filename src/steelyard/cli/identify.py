@@ -1,0 +1,63 @@
+"""`steelyard identify LOG`."""
+
+from __future__ import annotations
+
+import sys
+from pathlib import Path
+from typing import Any, cast
+
+import click
+
+from steelyard.cli.console import print_json, say, say_if_compiling
+from steelyard.errors import BadValue
+
+METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("log", required=False, type=click.Path(path_type=Path))
+@click.option("--data", type=click.Path(path_type=Path), help="Folder that relative paths in the description start from.")
+@click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="Estimator.")
+@click.option("--bias", type=click.Choice(["free", "none"]), default="free", show_default=True,
+              help="Estimate the sensor's bias, or trust that it is tared.")
+@click.option("--drift", is_flag=True, help="Let the bias grow linearly over the log.")
+@click.option("--tool", type=click.Path(path_type=Path),
+              help="Result (.json) or log of the gripper alone: taken away, sharing one sensor bias.")
+@click.option("--object-size", type=float, metavar="M",
+              help="Rough longest dimension of the object [m]; used only where the data leave the inertia open.")
+@click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
+@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+def identify(log: Path | None, data: Path | None, tool: Path | None, pendant: bool, output: Path | None,
+             as_json: bool, **chosen: Any) -> None:  # fmt: skip
+    """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
+    if pendant == (log is not None):
+        raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
+    say_if_compiling()
+    from steelyard import api
+    from steelyard.cli.table import estimate_table
+    from steelyard.io import read_pendant, result_dict, write_result
+    from steelyard.pipelines.held_object import Options
+
+    recording = read_pendant(_typed()) if pendant else cast(Path, log)
+    estimate = api.identify(recording, Options(**chosen), tool=tool, data=data)
+    if output is not None:
+        write_result(estimate, output)
+    if as_json:
+        print_json(result_dict(estimate))
+    else:
+        click.echo(estimate_table(estimate, f"{log or 'pendant'}: what the robot holds, in the sensor frame"))
+
+
+def _typed() -> list[str]:
+    """Return the lines typed by hand, up to an empty one or the end of input."""
+    from steelyard.io.pendant import PENDANT_COLUMNS
+
+    if sys.stdin.isatty():
+        say(f"One pose per line: {PENDANT_COLUMNS}. An empty line ends.")
+    lines: list[str] = []
+    for line in sys.stdin:
+        if not line.strip() and lines:
+            break
+        lines.append(line)
+    return lines

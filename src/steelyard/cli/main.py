@@ -1,0 +1,56 @@
+"""`steelyard`: the list of verbs. Each is imported when it is called, so that --help stays quick."""
+
+from __future__ import annotations
+
+import sys
+from importlib import import_module
+
+import click
+
+from steelyard import __version__
+from steelyard.errors import SteelyardError
+
+# Verb -> (module and function, one line of help).
+VERBS: dict[str, tuple[str, str]] = {
+    "identify": ("steelyard.cli.identify:identify", "Log -> mass, centre of mass, inertia, error bars, findings."),
+    "compare": ("steelyard.cli.compare:compare", "Two results: the same object or not, with a p-value."),
+    "demo": ("steelyard.cli.demo:demo", "A made hammer, its log and its answer against the truth."),
+    "doctor": ("steelyard.cli.doctor:doctor", "Versions, what is installed, a tiny identification with a known answer."),
+    "bench": ("steelyard.cli.bench:bench", "Every number that the README claims, made again."),
+}
+
+
+class _Verbs(click.Group):
+    """A group whose verbs are imported on call."""
+
+    def list_commands(self, ctx: click.Context) -> list[str]:
+        return list(VERBS)
+
+    def get_command(self, ctx: click.Context, name: str) -> click.Command | None:
+        if name not in VERBS:
+            return None
+        module, function = VERBS[name][0].split(":")
+        command: click.Command = getattr(import_module(module), function)
+        return command
+
+    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
+        with formatter.section("Commands"):
+            formatter.write_dl([(name, text) for name, (_, text) in VERBS.items()])
+
+
+@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.version_option(__version__, prog_name="steelyard")
+def cli() -> None:
+    """Tell a robot what it holds: mass, centre of mass and inertia, with honest error bars.
+
+    Exit status: 0 an answer, 2 bad input, 3 the data cannot answer.
+    """
+
+
+def main() -> None:
+    """Run the command line; one clear line on stderr for every error that is ours."""
+    try:
+        cli(standalone_mode=True)
+    except SteelyardError as error:
+        click.echo(f"steelyard: {error}", err=True)
+        sys.exit(error.exit_status)

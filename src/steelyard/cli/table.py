@@ -1,0 +1,112 @@
+"""An Estimate as a table for people."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import click
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
+
+INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+
+
+def decimals(std: float) -> int:
+    """Return how many decimals show two figures of a standard deviation."""
+    if not np.isfinite(std) or std <= 0:
+        return 4
+    return int(np.clip(1 - np.floor(np.log10(std)), 0, 9))
+
+
+def plus_minus(value: float, std: float, unit: str) -> str:
+    """Return 'value ± std unit' with two figures of the standard deviation."""
+    if not np.isfinite(std):
+        return f"{value:.4g} ± ? {unit}"
+    places = decimals(std)
+    return f"{value:.{places}f} ± {std:.{places}f} {unit}"
+
+
+def estimate_table(estimate: Estimate, title: str, truth: Array | None = None) -> str:
+    """Return the table: what is held with ±, sensor bias, evidence, findings with remedies.
+
+    `truth` (10,) of mass, com, inertia about the CoM stands beside where it is known.
+    """
+    blocks = [
+        click.style(title, bold=True),
+        _columns(_body_rows(estimate, truth)),
+        *_inertia_note(estimate),
+        "",
+        *_evidence_lines(estimate),
+        "",
+        *_finding_lines(estimate),
+    ]
+    return "\n".join(blocks)
+
+
+def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, ...]]:
+    """Return the rows name, value ± std, and truth."""
+    body = estimate.parameters
+    values = np.concatenate([[body.mass], body.com, body.inertia_com[np.triu_indices(3)]])
+    names = ["mass", "com x", "com y", "com z", *INERTIA]
+    scales = np.repeat([1.0, 1e3, 1e6], [1, 3, 6])
+    units = ["kg"] + ["mm"] * 3 + ["kg mm²"] * 6
+    rows = []
+    for k, name in enumerate(names):
+        if k >= 4 and not estimate.identified[4:].all():
+            continue
+        known = "" if truth is None else f"truth {truth[k] * scales[k]:.{decimals(estimate.std[k] * scales[k])}f}"
+        rows.append((name, plus_minus(values[k] * scales[k], estimate.std[k] * scales[k], units[k]), known))
+    jackknife = estimate.evidence.jackknife_people
+    if jackknife is not None and truth is None:
+        rows = [
+            (*row[:2], f"leave-one-out ± {j * s:.{decimals(j * s)}f}")
+            for row, j, s in zip(rows, jackknife, scales, strict=False)
+        ]
+    return rows
+
+
+def _columns(rows: Sequence[tuple[str, ...]]) -> str:
+    """Return rows as aligned columns."""
+    widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
+    return "\n".join("  " + "   ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows)
+
+
+def _inertia_note(estimate: Estimate) -> list[str]:
+    if estimate.identified[4:].all():
+        return []
+    return ["  inertia    not identified by these data"]
+
+
+def _evidence_lines(estimate: Estimate) -> list[str]:
+    """Return bias, residuals, hold-out and method in a few lines."""
+    seen = estimate.evidence
+    torque, force = np.split(estimate.wrench_bias, 2)
+    lines = [
+        f"  method     {estimate.method}, rank {seen.rank}, {seen.samples} rows of which {seen.still_samples} at rest",
+        f"  residual   {seen.residual_force_N:.3g} N, {seen.residual_torque_Nm:.3g} N m rms"
+        + ("" if seen.chi2_per_dof is None else f"; chi² per degree of freedom {seen.chi2_per_dof:.2f}"),
+    ]
+    if seen.holdout_force_N is not None and seen.holdout_torque_Nm is not None:
+        lines.append(f"  left out   {seen.holdout_force_N:.3g} N, {seen.holdout_torque_Nm:.3g} N m rms when predicted unseen")
+    if estimate.bias_covariance.any():
+        lines.append(f"  bias       force {_vector(force)} N, torque {_vector(torque)} N m (subtract from the raw channels)")
+    lines += [f"  delay      {1e3 * delay:+.2f} ms  {name}" for name, delay in estimate.delays_s.items() if delay]
+    lines += [f"  note       {note}" for note in estimate.notes]
+    return lines
+
+
+def _vector(values: Array) -> str:
+    return "(" + ", ".join(f"{v:.4g}" for v in values) + ")"
+
+
+def _finding_lines(estimate: Estimate) -> list[str]:
+    """Return the findings, each with its remedy."""
+    if not estimate.findings:
+        return ["  no findings"]
+    lines = []
+    for finding in estimate.findings:
+        lines.append(f"  {click.style(finding.code, fg='yellow', bold=True)}: {finding.message}")
+        lines.append(f"      -> {finding.remedy}")
+    return lines

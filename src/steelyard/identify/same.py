@@ -1,0 +1,78 @@
+"""Is it the same object? A chi-square test of two results."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import gammaincc
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.inertia import InertialParameters, forms
+
+NAMES = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """How two results differ.
+
+    p_value  probability of a difference this large between two results of one body
+    compared  what was compared, with the difference (second minus first) and its standard deviation
+    """
+
+    p_value: float
+    chi2: float
+    dof: int
+    compared: tuple[tuple[str, float, float], ...]
+
+    @property
+    def same(self) -> bool:
+        """Whether one body explains both results at the 1 % level."""
+        return self.p_value > 0.01
+
+
+def compare(
+    one: InertialParameters, one_covariance: Array, other: InertialParameters, other_covariance: Array,
+    known: Array, any_grasp: bool = False,
+) -> Comparison:  # fmt: skip
+    """Compare two bodies given with their covariances (10, 10) of m, h, I about the origin.
+
+    `known` (10,) says which of mass, com, inertia about the CoM both results identify. `any_grasp` compares only what
+    does not depend on how the object is held: mass and principal moments.
+    Raises CannotAnswer where nothing is left to compare.
+    """
+    first, first_cov, names = _quantities(one, one_covariance, any_grasp)
+    second, second_cov, _ = _quantities(other, other_covariance, any_grasp)
+    chosen = np.asarray(known, bool)
+    if any_grasp:
+        chosen = np.concatenate([chosen[:1], np.repeat(chosen[4:].all(), 3)])
+    if not chosen.any():
+        raise CannotAnswer("Neither mass nor inertia is identified in both results; there is nothing to compare.")
+    gap = (second - first)[chosen]
+    covariance = (first_cov + second_cov)[np.ix_(chosen, chosen)]
+    scale = 1 / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
+    whitened = np.linalg.pinv(covariance * np.outer(scale, scale), hermitian=True, rcond=1e-10)
+    chi2 = float((scale * gap) @ whitened @ (scale * gap))
+    shown = tuple(
+        (n, float(g), float(s)) for n, g, s in zip(np.array(names)[chosen], gap, 1 / scale, strict=True)
+    )
+    return Comparison(float(gammaincc(len(gap) / 2, chi2 / 2)), chi2, len(gap), shown)
+
+
+def _quantities(body: InertialParameters, covariance: Array, any_grasp: bool) -> tuple[Array, Array, tuple[str, ...]]:
+    """Return what is compared, its covariance and its names."""
+    J = np.zeros((10, 10))
+    J[0, 0], J[1:] = 1, forms.com_jacobian(body.vector)
+    values = np.concatenate([[body.mass], body.com, forms.upper(body.inertia_com)])
+    people = J @ covariance @ J.T
+    if not any_grasp:
+        return values, people, NAMES
+    moments, axes = np.linalg.eigh(body.inertia_com)
+    slopes = np.zeros((4, 10))
+    slopes[0, 0] = 1
+    for k, (i, j) in enumerate(forms.UPPER):
+        slopes[1:, 4 + k] = axes[i] * axes[j] * (1 if i == j else 2)
+    names = ("mass", "principal moment 1", "principal moment 2", "principal moment 3")
+    return np.concatenate([[body.mass], moments]), slopes @ people @ slopes.T, names

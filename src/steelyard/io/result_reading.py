@@ -1,0 +1,112 @@
+"""Results read back from JSON with checks: what `result_files` wrote, or a data sheet typed by hand."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadInput
+from steelyard.findings import Finding
+from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.inertia import InertialParameters
+
+_LARGEST = 64_000_000
+_WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
+
+
+def read_result(path: Path | str) -> Estimate:
+    """Return a result; raises BadFile.
+
+    Only `mass_kg`, `com_m` and `inertia_com_kgm2` are needed, so that a data sheet can be typed as a result: it is then
+    exact, with everything identified. Where a result has no inertia (null), its best guess is in the parameters.
+    """
+    path = Path(path)
+    values = _load_json(path)
+    if values.get("frame", "S") != "S":
+        raise BadFile(f'{path}: a result must be given in the sensor frame "S"; found "{values["frame"]}".')
+    return Estimate(
+        _body(path, values),
+        _matrix(path, values, "covariance", (10, 10)),
+        str(values.get("method", "given")),
+        Evidence(0, float("nan"), 0, 0, float("nan"), float("nan")),
+        _identified(path, values),
+        np.concatenate([_matrix(path, values, "torque_bias_Nm", (3,)), _matrix(path, values, "force_bias_N", (3,))]),
+        _matrix(path, values, "bias_covariance", (6, 6)),
+        _matrix(path, values, "cross_covariance", (10, 6)),
+        findings=_findings(path, values),
+    )
+
+
+def _matrix(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
+    """Return an optional entry, zero where it is left out."""
+    return np.zeros(shape) if values.get(key) is None else _numbers(path, values, key, shape)
+
+
+def _identified(path: Path, values: dict[str, Any]) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    entry = values.get("identified")
+    if entry is None:
+        return np.repeat([True, True, values.get("inertia_com_kgm2") is not None], [1, 3, 6])
+    try:
+        flags = [entry["mass"], *entry["com"], *entry["inertia"]]
+    except (KeyError, TypeError):
+        flags = []
+    if len(flags) != 10 or not all(isinstance(flag, bool) for flag in flags):
+        raise BadFile(f'{path}: "identified" must hold mass, three of com and six of inertia, true or false each.')
+    return np.array(flags)
+
+
+def _findings(path: Path, values: dict[str, Any]) -> tuple[Finding, ...]:
+    try:
+        return tuple(
+            Finding(str(f["code"]), str(f["message"]), str(f["remedy"])) for f in values.get("findings") or ()
+        )
+    except (KeyError, TypeError):
+        raise BadFile(f'{path}: "findings" must be a list of objects with code, message and remedy.') from None
+
+
+def _body(path: Path, values: dict[str, Any]) -> InertialParameters:
+    mass = float(_numbers(path, values, "mass_kg", ()))
+    com = _numbers(path, values, "com_m", (3,))
+    if values.get("inertia_com_kgm2") is None:
+        if "parameters" in values:
+            return InertialParameters(_numbers(path, values, "parameters", (10,)))
+        return InertialParameters.from_com(mass, com, np.zeros((3, 3)))
+    inertia = _numbers(path, values, "inertia_com_kgm2", (3, 3))
+    try:
+        return InertialParameters.from_com(mass, com, inertia)
+    except BadInput as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def _load_json(path: Path) -> dict[str, Any]:
+    try:
+        size = path.stat().st_size
+        if size > _LARGEST:
+            raise BadFile(f"{path}: a result is a small JSON text; this file has {size} bytes.")
+        values = json.loads(path.read_text(encoding="utf-8-sig"))
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
+    except UnicodeDecodeError:
+        raise BadFile(f"{path}: expected a JSON result; found a binary file.") from None
+    except (json.JSONDecodeError, RecursionError) as error:
+        raise BadFile(f"{path}: not valid JSON: {error}.") from None
+    if not isinstance(values, dict):
+        raise BadFile(f"{path}: not a Steelyard result: expected one JSON object. {_WRITE_ONE}")
+    return values
+
+
+def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
+    if key not in values:
+        raise BadFile(f'{path}: not a Steelyard result: "{key}" is missing. {_WRITE_ONE}')
+    try:
+        array = np.array(values[key], dtype=np.float64)
+    except (TypeError, ValueError, OverflowError):
+        array = np.empty(0)
+    if array.shape != shape or not np.isfinite(array).all():
+        wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "one finite number"
+        raise BadFile(f'{path}: "{key}" must be {wanted}; found something else.')
+    return array

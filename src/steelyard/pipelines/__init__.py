@@ -1,0 +1,1 @@
+"""One page per job: each pipeline calls named rooms in order."""

@@ -1,0 +1,128 @@
+"""One arm, one held object: a recording becomes an Estimate.
+
+    examine -> align -> leave touched time out -> fit -> look back -> take the tool away
+
+Every step is a named room; what it noticed travels along as findings.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from steelyard.errors import BadValue
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.fit import Bias
+from steelyard.identify.geodesic import Geodesic
+from steelyard.identify.least_squares import LeastSquares
+from steelyard.identify.noise_aware import NoiseAware
+from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
+from steelyard.logs.alignment import align
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording
+from steelyard.sanity import after, examine, untouched
+
+METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
+# A ball's radius of gyration per axis is its diameter times this.
+BALL = 0.5 / np.sqrt(5)
+
+
+@dataclass(frozen=True)
+class Options:
+    """How to identify.
+
+    method       one of METHODS
+    bias         "free": the sensor's constant bias is estimated; "none": it is known to be tared
+    drift        the bias may grow linearly over the log
+    object_size  rough longest dimension of the object [m], used only where the data leave the inertia open
+    """
+
+    method: Literal["auto", "noise-aware", "least-squares", "geodesic"] = "auto"
+    bias: Literal["free", "none"] = "free"
+    drift: bool = False
+    object_size: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.method not in METHODS:
+            raise BadValue(f"method must be one of {', '.join(METHODS)}; got {self.method!r}.")
+        if self.object_size is not None and not 0.005 <= self.object_size <= 5:
+            raise BadValue(f"object_size must be 0.005 to 5 m; got {self.object_size}.")
+
+
+def identify(recording: Recording, options: Options = Options(), tool: Recording | Estimate | None = None) -> Estimate:
+    """Return mass, centre of mass and inertia of what the robot holds, in the frame of the sensor.
+
+    `tool` is a recording or a result of the gripper alone: it is taken away, and its sensor bias is shared.
+    Raises CannotAnswer where the data do not fix mass and centre of mass, BadInput where they make no sense.
+    """
+    known = identify(tool, options) if isinstance(tool, Recording) else tool
+    recording, before = examine(recording)
+    aligned = align(recording)
+    bias = Bias(options.bias, drift=options.drift)
+    keep, touched = untouched(aligned.log, bias.free)
+    log = aligned.log.rows(keep)
+    estimator, notes = _estimator(options, log, bias)
+    estimate = estimator.identify(log)
+    if known is not None:
+        estimate, shared = _with_tool(options, log, bias, estimate, _in_log_sign(known, recording))
+        notes = (*notes, *shared)
+    late = after(log, estimate, aligned, recording)
+    return _in_recording_sign(
+        replace(
+            estimate.with_findings(*before, *aligned.findings, *touched, *late),
+            delays_s=dict(aligned.delays_s),
+            notes=(*notes, *aligned.notes, *estimate.notes),
+        ),
+        recording,
+    )
+
+
+def _estimator(
+    options: Options, log: MotionLog, bias: Bias
+) -> tuple[NoiseAware | LeastSquares | Geodesic, tuple[str, ...]]:
+    """Return the estimator and what there is to say about the choice."""
+    if options.method == "least-squares":
+        return LeastSquares(bias=bias), ()
+    if options.method == "geodesic":
+        return Geodesic(bias=bias), ("geodesic: the prior is a ball of 5 cm at the centre that least squares found",)
+    size = 0.1 if options.object_size is None else options.object_size
+    estimator = NoiseAware(bias=bias, size=float(BALL * size))
+    prior = f"the weak prior is a ball about {100 * size:.0f} cm across, " + (
+        "the default" if options.object_size is None else "as given"
+    )
+    if options.method == "noise-aware":
+        return estimator, (prior,)
+    moving = bool((log.angular_acceleration.any(1) & ~log.still).any())
+    why = (
+        "the log has rotation, and noise in its acceleration would bias least squares"
+        if moving
+        else "the log is at rest, so that the answer is that of weighted least squares kept physically consistent"
+    )
+    return estimator, (f"method: auto chose noise-aware, because {why}", prior)
+
+
+def _with_tool(
+    options: Options, log: MotionLog, bias: Bias, load: Estimate, tool: Estimate
+) -> tuple[Estimate, tuple[str, ...]]:
+    """Return the object alone, and a note on whether the two runs share one bias."""
+    prior = bias_prior(tool) if bias.free else None
+    if prior is None:
+        return without_tool(load, tool, shared=False), ("the tool's run tells nothing about the bias",)
+    same, p = shares_bias(tool, load)
+    if not same:
+        return without_tool(load, tool, shared=False).with_findings(different_bias(p)), ()
+    estimator, _ = _estimator(options, log, replace(bias, prior=prior))
+    shared = without_tool(estimator.identify(log), tool, shared=True)
+    return shared, (f"one sensor bias is shared with the tool's run (p = {p:.2g})",)
+
+
+def _in_recording_sign(estimate: Estimate, recording: Recording) -> Estimate:
+    """Return the estimate with its bias as the raw channels read it."""
+    sign = recording.wrench_sign
+    return replace(estimate, wrench_bias=sign * estimate.wrench_bias, cross_covariance=sign * estimate.cross_covariance)
+
+
+_in_log_sign = _in_recording_sign
+
