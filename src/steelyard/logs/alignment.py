@@ -1,0 +1,310 @@
+"""Alignment: raw streams on their own clocks and frames become one MotionLog on the wrench clock, in S."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription, CannotAnswer
+from steelyard.findings import Finding
+from steelyard.logs import alignment_findings as say
+from steelyard.logs.conditioning import noise_std, sampling_rate, signal
+from steelyard.logs.delays import Clocks, Question, find_clocks, refine
+from steelyard.logs.imu import Imu, Mounting, imu
+from steelyard.logs.kinematics import Kinematics, Motion, kinematics
+from steelyard.logs.log import MotionLog
+from steelyard.logs.noise import classes, levels
+from steelyard.logs.outliers import bursts, inside, merged
+from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.stillness import Mask, pose_numbers, still_rows
+from steelyard.logs.tables import align_tables, wrench_in_sensor
+from steelyard.spatial import Rotation
+
+_FIT_ROWS = 6000
+_FEWEST_ROWS = 12
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    """How to align.
+
+    cutoff_hz         [Hz] common low-pass; above it an arm and its load do not move as one body
+    max_delay_s       [s] widest delay looked for (no more than a tenth of the log)
+    estimate_delays   look for delays that were not given; False counts them as none
+    leave_out_taps    leave the rows of taps out
+    smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
+    """
+
+    cutoff_hz: float = 40.0
+    max_delay_s: float = 0.25
+    estimate_delays: bool = True
+    leave_out_taps: bool = True
+    smallest_delay_s: float = 0.5e-3
+
+
+@dataclass(frozen=True, eq=False)
+class Aligned:
+    """One log on one clock, and what was found on the way.
+
+    log            the rows, in S, wrench as applied to the object
+    delays_s       stream -> its stamps are late by this much against the wrench clock [s], given or found
+    delays_std_s   stream -> standard deviation [s], 0 where given
+    rotation       (N,) S to W at the rows, None without
+    mounts         stream -> how its accelerometer sits on S
+    acceleration_from   "linear_acceleration", "linear_velocity", "position", "specific_force" or "none"
+    left_out       (K, 2) [s] intervals on the wrench clock that were left out
+    rows_left_out  how many rows those held
+    notes          what the data could not tell, in words
+    """
+
+    log: MotionLog
+    delays_s: Mapping[str, float] = field(default_factory=dict)
+    delays_std_s: Mapping[str, float] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+    rotation: Rotation | None = None
+    mounts: Mapping[str, Mounting] = field(default_factory=dict)
+    acceleration_from: str = "none"
+    left_out: Array = field(default_factory=lambda: np.zeros((0, 2)))
+    rows_left_out: int = 0
+    notes: tuple[str, ...] = ()
+
+
+def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
+    """Return the recording on one clock, in S, with delays and mounts found where they were not given.
+
+    Raises BadDescription where the wrench or the direction of gravity is missing or rows cannot be matched,
+    and CannotAnswer where the streams share too little time.
+    """
+    timed = [s for s in recording.streams if s.time is not None and not s.poses]
+    if not timed:
+        log, rotation, findings, source = align_tables(recording)
+        findings = (*findings, *say.planar_finding(log.gravity))
+        return Aligned(log, findings=findings, rotation=rotation, acceleration_from=source)
+    if len(timed) < len(recording.streams):
+        other = next(s for s in recording.streams if s not in timed)
+        raise BadDescription(
+            f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock."
+        )
+    return _align_timed(_prepare(recording, options or AlignOptions()))
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """A timed recording, each stream as a function of its own time.
+
+    clock, wrench   (N,), (N, 6) raw samples of the wrench in S, as applied to the object
+    known, unknown  delays that were given, and the streams whose delay is sought
+    cutoff          [Hz] common low-pass, None where one stream tells everything on one clock
+    """
+
+    recording: Recording
+    options: AlignOptions
+    clock: Array
+    wrench: Array
+    cutoff: float | None
+    kinematics: Kinematics
+    imu: Imu | None
+    known: Mapping[str, float]
+    unknown: tuple[str, ...]
+
+    @property
+    def source(self) -> str:
+        return "specific_force" if self.imu is not None else self.kinematics.source
+
+    def spans(self) -> dict[str, tuple[float, float]]:
+        """Return the first and last stamp of every stream that is used."""
+        spans = {n: self.kinematics.spans[n] for n in self.kinematics.streams}
+        if self.imu is not None:
+            spans[self.imu.name] = (self.imu.signal.start, self.imu.signal.end)
+        return spans
+
+    def covered(self, time: Array, delays: Mapping[str, float]) -> Mask:
+        """Return which times (N,) all streams cover."""
+        ok = np.ones(len(time), bool)
+        for name, (start, end) in self.spans().items():
+            stamp = time + delays.get(name, 0.0)
+            ok &= (stamp >= start - 1e-9) & (stamp <= end + 1e-9)
+        return ok
+
+
+def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
+    """Smooth the motion, low-pass the rest, and turn the wrench into S."""
+    source = _wrench_stream(recording)
+    lag = source.delay or 0.0
+    streams = tuple(
+        replace(s, time=_time(s) - lag, delay=0.0) if s is source else s for s in recording.streams
+    )
+    wrench_stream = next(s for s in streams if s.name == source.name and "force" in s.channels)
+    cutoff = _cutoff(streams, wrench_stream, options)
+    moving = kinematics(streams, recording.gravity, cutoff)
+    feeling = next((s for s in streams if "specific_force" in s.channels), None)
+    sensor = None
+    if feeling is not None and "linear_acceleration" not in moving.channels:
+        sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
+    used = {*moving.streams, *([sensor.name] if sensor is not None else [])} - {wrench_stream.name}
+    known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
+    sought = (
+        [s.name for s in streams if s.name in used and s.delay is None] if options.estimate_delays else []
+    )
+    rotation = None
+    if any(wrench_stream.frames.get(q, "S") == "W" for q in ("force", "torque")):
+        rotation = moving.at(_time(wrench_stream), known).rotation
+    wrench = wrench_in_sensor(wrench_stream, recording.wrench_sign, rotation)
+    known = {n: d for n, d in known.items() if n not in sought}
+    return _Prepared(
+        recording, options, _time(wrench_stream), wrench, cutoff, moving, sensor, known, tuple(sought)
+    )  # fmt: skip
+
+
+def _wrench_stream(recording: Recording) -> Stream:
+    for stream in recording.streams:
+        if "force" in stream.channels:
+            if "torque" not in stream.channels:
+                raise BadDescription(f"'{stream.name}' has force but no torque; give both in one stream.")
+            return stream
+    raise BadDescription("no stream has force; a log needs force and torque.")
+
+
+def _time(stream: Stream) -> Array:
+    if stream.time is None:
+        raise BadDescription(f"'{stream.name}' has no time.")
+    return stream.time
+
+
+def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) -> float | None:
+    """Return the common low-pass [Hz]: what the slower of wrench and quickest motion stream can follow."""
+    given = {"linear_acceleration", "angular_acceleration"}
+    if len(streams) == 1 and given <= set(wrench.channels):
+        return None
+    rates = {s.name: sampling_rate(_time(s)) for s in streams if s is not wrench}
+    feeling = [rates[s.name] for s in streams if "specific_force" in s.channels and s is not wrench]
+    rate = min(sampling_rate(_time(wrench)), feeling[0] if feeling else max(rates.values(), default=np.inf))
+    return min(options.cutoff_hz, 0.4 * rate)
+
+
+def _align_timed(given: _Prepared) -> Aligned:
+    """Find clocks and mounts on rows without taps, then make the log."""
+    taps = _taps(given) if given.options.leave_out_taps else np.zeros((0, 2))
+    time, wrench = _rows(given)
+    touched = inside(time, taps)
+    clocks, delayed = _clocks(given, time[~touched], wrench[~touched])
+    kept = ~touched & given.covered(time, clocks.delays_s)
+    if kept.sum() < _FEWEST_ROWS:
+        raise CannotAnswer(f"only {int(kept.sum())} rows are left after alignment; record a longer stretch.")
+    log, motion = _log(given, time[kept], wrench[kept], clocks)
+    findings = (
+        *say.delay_findings(clocks, delayed),
+        *say.mount_findings(given.imu, clocks.mounting),
+        *say.planar_finding(log.gravity),
+        *say.tap_findings(taps, float(given.clock[0]), int(touched.sum()), len(time)),
+    )
+    return Aligned(
+        log,
+        clocks.delays_s,
+        clocks.delays_std_s,
+        findings,
+        motion.rotation,
+        {} if given.imu is None or clocks.mounting is None else {given.imu.name: clocks.mounting},
+        given.source,
+        taps,
+        int(touched.sum()),
+        say.notes(clocks, given.source),
+    )
+
+
+def _taps(given: _Prepared) -> Array:
+    """Return the intervals (K, 2) of taps on the wrench clock, as wide as the low-pass smears them."""
+    margin = 0.03 if given.cutoff is None else max(0.03, 1.5 / given.cutoff)
+    found = [bursts(given.clock, part, margin) for part in (given.wrench[:, :3], given.wrench[:, 3:])]
+    for stream in given.recording.streams:
+        if "specific_force" in stream.channels and given.imu is not None:
+            late = given.known.get(stream.name, 0.0)
+            found.append(bursts(_time(stream) - late, stream.channels["specific_force"], margin))
+    return merged(*found)
+
+
+def _rows(given: _Prepared) -> tuple[Array, Array]:
+    """Return the common clock (M,) and the wrench there (M, 6): low-passed, thinned to what passes."""
+    every = 1
+    if given.cutoff is not None:
+        every = max(int(sampling_rate(given.clock) / (2.5 * given.cutoff)), 1)
+    time = given.clock[every // 2 :: every]
+    spans = list(given.spans().values())
+    start = max((s for s, _ in spans), default=float(time[0]))
+    end = min((e for _, e in spans), default=float(time[-1]))
+    reach = given.options.max_delay_s
+    shared = (time >= start - reach) & (time <= end + reach)
+    if start > end or shared.sum() < _FEWEST_ROWS:
+        raise CannotAnswer(
+            f"the streams share no time: the wrench runs from {given.clock[0]:.6g} to {given.clock[-1]:.6g} s, "
+            f"the others together from {start:.6g} to {end:.6g} s. "
+            "Check the time units and that all are of one run."
+        )
+    return time[shared], signal(given.clock, given.wrench, given.cutoff).at(time[shared])
+
+
+def _clocks(given: _Prepared, time: Array, wrench: Array) -> tuple[Clocks, tuple[str, ...]]:
+    """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
+    reach = min(given.options.max_delay_s, 0.1 * float(time[-1] - time[0]))
+    ok = given.covered(time, given.known)
+    if given.unknown:
+        everyone = {**given.known, **dict.fromkeys(given.unknown, 0.0)}
+        inner = [given.covered(time, {n: d + s for n, d in everyone.items()}) for s in (-reach, reach)]
+        ok = inner[0] & inner[1]
+    pick = np.flatnonzero(ok)
+    if len(pick) < _FEWEST_ROWS:
+        raise CannotAnswer(
+            f"the streams share only {len(pick)} rows in time; record a longer stretch on all."
+        )
+    pick = pick[:: max(len(pick) // _FIT_ROWS, 1)]
+    question = Question(
+        time[pick], wrench[pick], given.kinematics, given.imu, given.unknown, given.known, reach
+    )
+    clocks = find_clocks(question)
+    least = given.options.smallest_delay_s
+    late = tuple(n for n in given.unknown if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
+    if len(late) < len(given.unknown):
+        none = {n: 0.0 for n in given.unknown if n not in late}
+        fixed = replace(question, unknown=late, known={**given.known, **none}, _cache={})
+        again = refine(fixed, {**clocks.delays_s, **none})
+        spread = {**clocks.delays_std_s, **{n: again.delays_std_s[n] for n in late}}
+        clocks = replace(again, delays_std_s=spread)
+    return clocks, late
+
+
+def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[MotionLog, Motion]:
+    """Return the log with its still rows, poses and noise."""
+    motion = given.kinematics.at(time, clocks.delays_s)
+    gravity, acceleration, variance = motion.gravity, motion.acceleration, motion.acceleration_variance
+    if given.imu is not None and clocks.mounting is not None:
+        raw = given.imu.signal.at(time + clocks.delays_s.get(given.imu.name, 0.0))
+        own = clocks.mounting.at_sensor(raw, motion.omega, motion.alpha)
+        gravity = gravity if gravity is not None else -_slow(time, own)
+        acceleration = own + gravity
+        arm = float(clocks.mounting.position @ clocks.mounting.position)
+        variance = given.imu.noise_std**2 + arm * motion.alpha_variance
+    if gravity is None:
+        raise BadDescription(
+            "no stream tells where gravity points: give rotation, gravity or specific_force."
+        )
+    bare = MotionLog(wrench, gravity, acceleration, motion.omega, motion.alpha)
+    still = still_rows(time, motion.omega, motion.velocity, wrench)
+    index = classes(still, motion.alpha_variance)
+    residual = wrench - bare.predicted(clocks.body)
+    share = 1.0 if given.cutoff is None else min(1.0, 2 * given.cutoff / sampling_rate(given.clock))
+    noise = levels(
+        index, motion.alpha_variance, variance, residual - np.median(residual, 0), clocks.body,
+        noise_std(given.wrench) ** 2 * share, given.recording.noise,
+    )  # fmt: skip
+    log = replace(
+        bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise
+    )
+    return log, motion
+
+
+def _slow(time: Array, values: Array) -> Array:
+    """Return `values` (N, 3) below 1 Hz: gravity as an accelerometer alone tells it."""
+    return signal(time, values, min(1.0, 0.3 * sampling_rate(time))).at(time)

@@ -1,0 +1,108 @@
+"""What alignment has to say: delays, turned accelerometers, taps, and what the motion could not tell."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.delays import Clocks
+from steelyard.logs.imu import Imu, Mounting
+from steelyard.spatial import Rotation
+
+_TURNED = np.radians(5)
+_LOOSE_M, _LOOSE_RAD = 0.1, 0.1
+
+
+def delay_findings(clocks: Clocks, names: tuple[str, ...]) -> tuple[Finding, ...]:
+    """Return `stream-delayed` for each of the named streams."""
+    return tuple(
+        Finding.of(
+            "stream-delayed",
+            f"The stamps of '{n}' are {'late' if clocks.delays_s[n] > 0 else 'early'} by "
+            f"{abs(clocks.delays_s[n]) * 1e3:.2f} ± {clocks.delays_std_s[n] * 1e3:.2f} ms against the wrench "
+            "(corrected here).",
+        )
+        for n in names
+    )
+
+
+def mount_findings(imu: Imu | None, mounting: Mounting | None) -> tuple[Finding, ...]:
+    """Return `gravity-in-g` and `imu-rotated` where the accelerometer gives reason."""
+    if imu is None or mounting is None:
+        return ()
+    out = []
+    if imu.factor != 1.0:
+        message = (
+            f"The numbers of '{imu.name}' only fit gravity when multiplied by {imu.factor:.4g}; they were."
+        )
+        out.append(Finding.of("gravity-in-g", message))
+    angle = float(mounting.rotation.angle())
+    std = 0.0 if mounting.rotation_std is None else float(np.max(mounting.rotation_std))
+    if imu.rotation is None and angle > max(_TURNED, 3 * std):
+        message = (
+            f"The accelerometer of '{imu.name}' is turned by {np.degrees(angle):.1f} ± {np.degrees(std):.1f} "
+            f"degrees against S: {axes_in_words(mounting.rotation)} (corrected here)."
+        )
+        out.append(Finding.of("imu-rotated", message))
+    return tuple(out)
+
+
+def tap_findings(taps: Array, start: float, rows: int, total: int) -> tuple[Finding, ...]:
+    """Return `outliers` for intervals (K, 2) [s] of taps; `start` [s] is where the log's own time begins."""
+    if not len(taps):
+        return ()
+    at = ", ".join(f"{t - start:.2f}" for t in taps.mean(1)[:8]) + (", ..." if len(taps) > 8 else "")
+    bursts = (
+        "one short burst (tap or knock)" if len(taps) == 1 else f"{len(taps)} short bursts (taps or knocks)"
+    )
+    return (Finding.of("outliers", f"Found {bursts} at {at} s; {rows} of {total} rows were left out."),)
+
+
+def planar_finding(gravity: Array, smallest: float = 0.1) -> tuple[Finding, ...]:
+    """Return `nearly-planar` where gravity (N, 3) in S sweeps two directions and hardly a third.
+
+    Hardly = its standard deviation along the third direction is below `smallest` of its size.
+    """
+    size = float(np.linalg.norm(gravity, axis=1).mean())
+    spread, axes = np.linalg.eigh(np.cov(gravity.T, bias=True))
+    stds = np.sqrt(np.maximum(spread, 0)) / size
+    if not (stds[0] < smallest < stds[1]):
+        return ()
+    axis = axes[:, 0] * np.sign(axes[np.abs(axes[:, 0]).argmax(), 0])
+    shown = ", ".join(f"{v:.2f}" for v in np.round(axis, 2) + 0.0)
+    message = (
+        f"Gravity keeps within {np.degrees(np.arcsin(min(stds[0], 1.0))):.1f} degrees of one plane in S; "
+        f"across that plane, along ({shown}), a bias and a load look alike."
+    )
+    return (Finding.of("nearly-planar", message),)
+
+
+def axes_in_words(rotation: Rotation) -> str:
+    """Return where the x, y, z axes point, as "x, y, z along -z, -x, +y", or that they follow no axes."""
+    m = rotation.matrix
+    best = np.abs(m).argmax(0)
+    if np.abs(m[best, np.arange(3)]).min() < np.cos(np.radians(15)):
+        return "its axes follow none of S"
+    along = ", ".join(f"{'+' if m[b, i] > 0 else '-'}{'xyz'[b]}" for i, b in enumerate(best))
+    return f"its x, y, z axes lie along {along}"
+
+
+def notes(clocks: Clocks, acceleration_from: str) -> tuple[str, ...]:
+    """Return in words what the motion could not tell."""
+    out = []
+    mounting = clocks.mounting
+    if mounting is not None and mounting.position_std is not None:
+        loose = np.flatnonzero(mounting.position_std > _LOOSE_M)
+        if len(loose):
+            axes = ", ".join("xyz"[i] for i in loose)
+            out.append(f"the accelerometer's place along {axes} of S is not fixed by this motion")
+    turn_std = None if mounting is None else mounting.rotation_std
+    if turn_std is not None and float(np.max(turn_std)) > _LOOSE_RAD:
+        out.append("the accelerometer's mount rotation is not fixed about every axis by this motion")
+    if acceleration_from == "none":
+        out.append(
+            "no stream measures the acceleration of S: it is taken as zero, "
+            "with a spread that grows with turning"
+        )
+    return tuple(out)

@@ -1,0 +1,109 @@
+"""Conditioning: low-pass and interpolation of sampled channels, central differences, tare."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+
+_NOISE_BLOCK = 64
+_QUIETEST = 0.84  # 0.1 quantile of the noise level over blocks of that length
+
+
+@dataclass(frozen=True, eq=False)
+class Signal:
+    """A channel as a function of its own clock: cubic through its (filtered) samples.
+
+    start, end  [s] of the samples
+    rate        [Hz] median sampling rate
+    """
+
+    spline: Any
+    start: float
+    end: float
+    rate: float
+
+    def at(self, time: Array) -> Array:
+        """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is
+        held."""
+        return np.asarray(self.spline(np.clip(time, self.start, self.end)))
+
+
+def sampling_rate(time: Array) -> float:
+    """Return the median sampling rate [Hz] of a rising clock [s]."""
+    if len(time) < 2:
+        raise BadValue("a clock needs at least two samples.")
+    return 1.0 / float(np.median(np.diff(time)))
+
+
+def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Signal:
+    """Return `values` (N, D) as a function of time, low-passed at `cutoff_hz` where that is below 0.4 of the
+    rate.
+
+    Without a cut-off the samples themselves are met exactly. Linear where fewer than four samples are left.
+    """
+    from scipy.interpolate import CubicSpline, make_interp_spline
+
+    t, y = check.finite("time", time), check.finite("values", values)
+    rate = sampling_rate(t)
+    if cutoff_hz is not None and cutoff_hz < 0.4 * rate and len(t) > 30:
+        even = np.linspace(t[0], t[-1], int(np.ceil((t[-1] - t[0]) * rate)) + 1)
+        y = lowpass(CubicSpline(t, y)(even), cutoff_hz, (len(even) - 1) / (t[-1] - t[0]))
+        t = even
+    spline = CubicSpline(t, y) if len(t) > 3 else make_interp_spline(t, y, 1)
+    return Signal(spline, float(t[0]), float(t[-1]), rate)
+
+
+def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> Array:
+    """Return `values` (N, D), evenly sampled, through a zero-phase Butterworth low-pass.
+
+    Raises BadValue when the cut-off is not below half the rate.
+    Source: "Cooperative Payload Estimation", IV-B (fourth-order Butterworth; run forwards and backwards
+    here).
+    """
+    from scipy.signal import butter, sosfiltfilt
+
+    if not 0 < cutoff_hz < rate_hz / 2:
+        raise BadValue(
+            f"cut-off must be between 0 and half the rate ({rate_hz / 2:.6g} Hz); got {cutoff_hz:.6g} Hz."
+        )
+    sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
+    pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
+    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=pad))
+
+
+def central_difference(time: Array, values: Array) -> Array:
+    """Return the derivative (N, D) by second-order central differences (one-sided at the ends), as the
+    papers do."""
+    return np.asarray(
+        np.gradient(check.finite("values", values), check.finite("time", time), axis=0, edge_order=2)
+    )
+
+
+def tare(wrench: Array, rows: Any) -> tuple[Array, Array]:
+    """Return wrench (N, 6) less its mean over `rows` (mask, slice or indices), and that mean (6,)."""
+    w = check.vectors("wrench", wrench, 6)
+    if w[rows].size == 0:
+        raise BadValue("tare needs at least one row.")
+    mean = w[rows].mean(0)
+    return w - mean, mean
+
+
+def noise_std(values: Array) -> Array:
+    """Return the white-noise level (D,) of evenly sampled `values` (N, D) from third differences.
+
+    The quietest tenth of short blocks decides, so that motion and vibration elsewhere do not count; the
+    factor makes up for choosing the quietest of blocks that are only noise.
+    """
+    y = check.finite("values", values)
+    if len(y) < 8:
+        return np.zeros(y.shape[1])
+    squares = np.diff(y, 3, axis=0) ** 2 / 20
+    parts = np.array_split(squares, max(len(squares) // _NOISE_BLOCK, 1))
+    quiet = np.sqrt(np.quantile(np.stack([p.mean(0) for p in parts]), 0.1, axis=0))
+    return np.asarray(quiet / _QUIETEST if len(parts) > 9 else quiet)

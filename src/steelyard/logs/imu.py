@@ -1,0 +1,116 @@
+"""Accelerometer: how it sits on S, and the acceleration of S that it tells."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.conditioning import Signal, noise_std, sampling_rate, signal
+from steelyard.logs.recording import STANDARD_GRAVITY, Stream
+from steelyard.spatial import Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Imu:
+    """An accelerometer stream, low-passed; `factor` is what its numbers were multiplied with to be m/s^2.
+
+    signal     specific force (a - g) in its own axes, on its own clock
+    noise_std  [m/s^2] per axis after the low-pass
+    rotation, position  the mount as given, None where it is to be found
+    """
+
+    name: str
+    signal: Signal
+    noise_std: float
+    rotation: Rotation | None
+    position: Array | None
+    factor: float = 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Mounting:
+    """How an accelerometer sits on S: f_S = scale R_SI (f_I - bias) - alpha x p - omega x (omega x p).
+
+    rotation      R_SI
+    position      p (3,) [m] of the accelerometer in S
+    bias          (3,) [m/s^2] in its own axes
+    scale         what its numbers must be multiplied with to agree with gravity
+    rotation_std, position_std, bias_std   (3,) [rad, m, m/s^2]; zero where given
+    """
+
+    rotation: Rotation
+    position: Array
+    bias: Array
+    scale: float = 1.0
+    rotation_std: Array | None = None
+    position_std: Array | None = None
+    bias_std: Array | None = None
+
+    def at_sensor(self, specific_force: Array, omega: Array, alpha: Array) -> Array:
+        """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning
+        of S."""
+        turned = self.scale * self.rotation.apply(specific_force - self.bias)
+        return np.asarray(turned - lever(omega, alpha, self.position))
+
+
+def lever(omega: Array, alpha: Array, p: Array) -> Array:
+    """Return alpha x p + omega x (omega x p) (N, 3): what a point at p feels more than the origin."""
+    return np.cross(alpha, p) + np.cross(omega, np.cross(omega, p))
+
+
+def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
+    """Return the accelerometer of a timed stream; numbers that are plainly in g are turned into m/s^2."""
+    values, time = stream.channels["specific_force"], stream.time
+    assert_time = np.arange(len(values), dtype=float) if time is None else time
+    factor = unit_factor(values, gravity_size)
+    curve = signal(assert_time, values * factor, cutoff_hz)
+    rate = sampling_rate(assert_time)
+    share = 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate)
+    noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * share))
+    mount = stream.mount
+    return Imu(
+        stream.name,
+        curve,
+        noise,
+        None if mount is None else mount.rotation,
+        None if mount is None or mount.position is None else np.asarray(mount.position, dtype=float),
+        factor,
+    )
+
+
+def unit_factor(specific_force: Array, gravity_size: float) -> float:
+    """Return 9.80665 where the numbers are in g, its inverse where g was applied twice, else 1."""
+    size = float(np.median(np.linalg.norm(specific_force, axis=1))) / gravity_size
+    if 0.07 < size < 0.14:
+        return STANDARD_GRAVITY
+    return 1 / STANDARD_GRAVITY if 7 < size < 14 else 1.0
+
+
+def first_mount(specific_force: Array, gravity: Array | None, force: Array) -> Rotation:
+    """Return R_SI from directions: specific force (N, 3) in the accelerometer's axes, gravity and force (N,
+    3) in S.
+
+    Gravity alone decides while it visits two directions of S; else the force joins in (it is along a - g for
+    a load at rest). A constant bias of the accelerometer cancels, save for a small share that only breaks
+    ties.
+    Source: Wahba 1965, by singular values; one-axis turning leaves rank two, which handedness completes.
+    """
+    f = specific_force - specific_force.mean(0)
+    if gravity is None:
+        return _wahba((force - force.mean(0)).T @ f)
+    down = -(gravity - gravity.mean(0))
+    match = down.T @ f + 0.01 * len(f) * np.outer(-gravity.mean(0), specific_force.mean(0))
+    values = np.linalg.svd(match, compute_uv=False)
+    if values[1] < 0.02 * values[0]:
+        forces = force - force.mean(0)
+        spread = np.sqrt((forces**2).sum() / max((f**2).sum(), 1e-30)) or 1.0
+        match = match + 0.1 * forces.T @ f / spread
+    return _wahba(match)
+
+
+def _wahba(match: Array) -> Rotation:
+    u, _, vt = np.linalg.svd(match)
+    u[:, 2] *= np.linalg.det(u @ vt)
+    return Rotation(u @ vt)

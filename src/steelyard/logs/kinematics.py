@@ -1,0 +1,232 @@
+"""Kinematics: gravity, rates and accelerations in S at any time, out of whatever motion channels there
+are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription
+from steelyard.logs.conditioning import Signal, noise_std, signal
+from steelyard.logs.recording import Stream
+from steelyard.logs.smoothing import Smooth, SmoothRotation, smooth, smooth_rotations
+from steelyard.spatial import Rotation
+
+Delays = Mapping[str, float]
+_UNKNOWN_LEVER = 0.5  # [m] how far from a turning axis S may be when nothing measures its acceleration
+
+
+@dataclass(frozen=True, eq=False)
+class Motion:
+    """Motion of S at M times, in S.
+
+    gravity                (M, 3) [m/s^2], None where no channel tells it
+    rotation               (M,) S to W, None without
+    velocity               (M, 3) [m/s] of the S origin in S, None without
+    acceleration           (M, 3) classical, without gravity; zero where `measured` is False
+    acceleration_variance, alpha_variance   (M,) per axis
+    measured               the acceleration comes from a channel, not from a guess
+    """
+
+    gravity: Array | None
+    rotation: Rotation | None
+    omega: Array
+    alpha: Array
+    velocity: Array | None
+    acceleration: Array
+    alpha_variance: Array
+    acceleration_variance: Array
+    measured: bool
+
+
+@dataclass(frozen=True, eq=False)
+class Channel:
+    """One quantity of one stream, ready to be evaluated; `curve` is a Signal or a smoothed signal."""
+
+    stream: str
+    curve: Signal | Smooth | SmoothRotation
+    world: bool
+    variance: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class Kinematics:
+    """The motion channels of a recording, each with the clock of its stream.
+
+    channels  quantity -> Channel
+    gravity_world  (3,) [m/s^2]
+    """
+
+    channels: Mapping[str, Channel]
+    gravity_world: Array
+    spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+
+    @property
+    def streams(self) -> tuple[str, ...]:
+        """Names of the streams that are used."""
+        return tuple(dict.fromkeys(c.stream for c in self.channels.values()))
+
+    @property
+    def source(self) -> str:
+        """Say where the acceleration comes from."""
+        order = ("linear_acceleration", "linear_velocity", "position")
+        return next((q for q in order if q in self.channels), "none")
+
+    def at(self, time: Array, delays: Delays) -> Motion:
+        """Return the motion at `time` (M,) [s] of the common clock; delays [s] say how late each stream's
+        stamps are."""
+        turn, omega, alpha, alpha_variance = self._turning(time, delays)
+        gravity = self._gravity(time, delays, turn)
+        velocity = self._vector("linear_velocity", time, delays, turn)
+        if velocity is None and turn is not None and "position" in self.channels:
+            states, _ = self._smooth("position", time, delays)
+            velocity = turn.inverse().apply(states[:, 1])
+        acceleration, variance = self._acceleration(time, delays, turn, omega)
+        measured = acceleration is not None
+        if acceleration is None:
+            acceleration = np.zeros_like(omega)
+            guess = _UNKNOWN_LEVER * ((omega**2).sum(1) + np.linalg.norm(alpha, axis=1))
+            variance = guess**2 / 3
+        return Motion(gravity, turn, omega, alpha, velocity, acceleration, alpha_variance, variance, measured)
+
+    def _smooth(self, quantity: str, time: Array, delays: Delays) -> tuple[Array, Array]:
+        channel = self.channels[quantity]
+        assert_curve = channel.curve
+        if not isinstance(assert_curve, Smooth):
+            raise BadDescription(f"{quantity} of '{channel.stream}' is not smoothed.")
+        return assert_curve.at(time + delays.get(channel.stream, 0.0))
+
+    def _vector(self, quantity: str, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
+        """Return a channel's values in S, None where there is no such channel."""
+        channel = self.channels.get(quantity)
+        if channel is None:
+            return None
+        shifted = time + delays.get(channel.stream, 0.0)
+        curve = channel.curve
+        if isinstance(curve, Smooth):
+            values = curve.at(shifted)[0][:, 0]
+        elif isinstance(curve, Signal):
+            values = curve.at(shifted)
+        else:
+            raise BadDescription(f"{quantity} cannot be a rotation.")
+        return _into_sensor(values, channel, turn)
+
+    def _turning(self, time: Array, delays: Delays) -> tuple[Rotation | None, Array, Array, Array]:
+        zero = np.zeros((len(time), 3))
+        turn, omega, alpha, variance = None, zero, zero, np.zeros(len(time))
+        rotation = self.channels.get("rotation")
+        if rotation is not None and isinstance(rotation.curve, SmoothRotation):
+            turn, omega, alpha, v = rotation.curve.at(time + delays.get(rotation.stream, 0.0))
+            variance = v[:, 2]
+        given = self._vector("angular_velocity", time, delays, turn)
+        if given is not None:
+            omega = given
+            if isinstance(self.channels["angular_velocity"].curve, Smooth):
+                states, v = self._smooth("angular_velocity", time, delays)
+                # The derivative of body components is the body angular acceleration, in W or S alike.
+                alpha = _into_sensor(states[:, 1], self.channels["angular_velocity"], turn)
+                variance = v[:, 1]
+        given = self._vector("angular_acceleration", time, delays, turn)
+        if given is not None:
+            alpha, variance = given, np.full(len(time), self.channels["angular_acceleration"].variance)
+        return turn, omega, alpha, variance
+
+    def _gravity(self, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
+        if turn is not None:
+            return np.asarray(turn.inverse().matrix @ self.gravity_world)
+        return self._vector("gravity", time, delays, None)
+
+    def _acceleration(
+        self, time: Array, delays: Delays, turn: Rotation | None, omega: Array
+    ) -> tuple[Array | None, Array]:
+        """Return the classical acceleration in S and its variance from the first channel that tells it."""
+        given = self._vector("linear_acceleration", time, delays, turn)
+        if given is not None:
+            return given, np.full(len(time), self.channels["linear_acceleration"].variance)
+        if "linear_velocity" in self.channels:
+            channel = self.channels["linear_velocity"]
+            states, variance = self._smooth("linear_velocity", time, delays)
+            derivative = _into_sensor(states[:, 1], channel, turn)
+            if not channel.world:
+                derivative = derivative + np.cross(omega, states[:, 0])
+            return derivative, variance[:, 1]
+        if "position" in self.channels and turn is not None:
+            states, variance = self._smooth("position", time, delays)
+            return turn.inverse().apply(states[:, 2]), variance[:, 2]
+        return None, np.zeros(len(time))
+
+
+def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: float | None) -> Kinematics:
+    """Smooth the motion channels of timed streams; of each quantity the first stream that has it counts.
+
+    Given accelerations are low-passed at `cutoff_hz` [Hz] only; a given angular velocity is smoothed where
+    the angular acceleration must come from it. Raises BadDescription when W-frame channels come without a
+    rotation.
+    """
+    found: dict[str, tuple[Stream, Array]] = {}
+    for stream in streams:
+        for quantity, values in stream.channels.items():
+            found.setdefault(quantity, (stream, values))
+    makers: dict[str, Callable[[Stream, Array], Channel]] = {
+        "rotation": _rotation_channel,
+        "angular_acceleration": lambda s, v: _plain_channel(s, v, "angular_acceleration", cutoff_hz),
+        "linear_acceleration": lambda s, v: _plain_channel(s, v, "linear_acceleration", cutoff_hz),
+        "gravity": lambda s, v: _plain_channel(s, v, "gravity", cutoff_hz),
+    }
+    for quantity, better in (
+        ("angular_velocity", "angular_acceleration"),
+        ("linear_velocity", "linear_acceleration"),
+        ("position", "linear_acceleration"),
+    ):
+        known = better in found
+        makers[quantity] = (
+            (lambda s, v, q=quantity: _plain_channel(s, v, q, cutoff_hz))  # type: ignore[misc]
+            if known
+            else (lambda s, v, q=quantity: _smooth_channel(s, v, q))  # type: ignore[misc]
+        )
+    channels = {q: makers[q](*found[q]) for q in makers if q in found}
+    for quantity, channel in channels.items():
+        if channel.world and "rotation" not in channels and quantity not in ("position",):
+            raise BadDescription(
+                f"{quantity} of '{channel.stream}' is given in W, but no stream gives the rotation of S in W."
+            )
+    spans = {s.name: (float(s.time[0]), float(s.time[-1])) for s in streams if s.time is not None}
+    return Kinematics(channels, gravity_world, spans)
+
+
+def _clock(stream: Stream) -> Array:
+    if stream.time is None:
+        raise BadDescription(f"'{stream.name}' has no time; streams with their own rows need a clock.")
+    return stream.time
+
+
+def _rotation_channel(stream: Stream, values: Array) -> Channel:
+    return Channel(stream.name, smooth_rotations(_clock(stream), Rotation.nearest(values)), False)
+
+
+def _plain_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
+    curve = signal(_clock(stream), values, cutoff_hz)
+    share = min(1.0, 2 * cutoff_hz / curve.rate) if cutoff_hz is not None else 1.0
+    variance = float((noise_std(values) ** 2).mean()) * share
+    return Channel(stream.name, curve, _world(stream, quantity), variance)
+
+
+def _smooth_channel(stream: Stream, values: Array, quantity: str) -> Channel:
+    return Channel(stream.name, smooth(_clock(stream), values), _world(stream, quantity))
+
+
+def _world(stream: Stream, quantity: str) -> bool:
+    return quantity == "position" or stream.frames.get(quantity, "S") == "W"
+
+
+def _into_sensor(values: Array, channel: Channel, turn: Rotation | None) -> Array:
+    if not channel.world:
+        return values
+    if turn is None:
+        raise BadDescription(
+            f"a channel of '{channel.stream}' is given in W, but there is no rotation of S in W."
+        )
+    return turn.inverse().apply(values)

@@ -1,0 +1,65 @@
+"""Noise of an aligned log: which rows share one level, and what those levels are."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.log import Noise
+from steelyard.logs.stillness import Mask, Numbers
+from steelyard.spatial import cross_matrix
+
+_FEWEST_ROWS = 30
+
+
+def classes(still: Mask, alpha_variance: Array) -> Numbers:
+    """Return a class (N,) per row: still rows, and moving rows binned by factors of four of their variance
+    (N,)."""
+    base = float(np.median(alpha_variance)) or 1.0
+    bins = np.clip(np.rint(np.log(np.maximum(alpha_variance, 1e-30) / base) / np.log(4.0)), -1, 3).astype(
+        np.int64
+    )
+    label = np.where(still, -2, bins)
+    # A bin with few rows joins the moving rows around the median.
+    names, counts = np.unique(label, return_counts=True)
+    rare = names[(counts < _FEWEST_ROWS) & (names != -2)]
+    label = np.where(np.isin(label, rare), 0, label)
+    _, index = np.unique(label, return_inverse=True)
+    return np.asarray(index, dtype=np.int64)
+
+
+def levels(
+    index: Numbers, alpha_variance: Array, acceleration_variance: Array, residual: Array, body: Array,
+    least: Array, declared: Mapping[str, float],
+) -> tuple[Noise, ...]:  # fmt: skip
+    """Return one Noise per class from the variances of the motion (N,) and the wrench residual (N, 6) of a
+    body (10,).
+
+    The wrench carries what the residual shows beyond the noise of the motion, at least `least` (6,) [(N
+    m)^2, N^2].
+    Declared standard deviations (force, torque, acceleration, angular_acceleration) win.
+    """
+    mass_matrix = _mass_matrix(body)
+    out = []
+    for k in range(int(index.max()) + 1):
+        rows = index == k
+        motion = np.repeat([alpha_variance[rows].mean(), acceleration_variance[rows].mean()], 3)
+        for name, part in (("angular_acceleration", slice(0, 3)), ("acceleration", slice(3, 6))):
+            if name in declared:
+                motion[part] = declared[name] ** 2
+        seen = (1.4826 * np.median(np.abs(residual[rows]), axis=0)) ** 2
+        explained = np.einsum("ij,j,ij->i", mass_matrix, motion, mass_matrix)
+        wrench = np.maximum(seen - explained, np.maximum(least, 0.01 * seen))
+        for name, part in (("torque", slice(0, 3)), ("force", slice(3, 6))):
+            if name in declared:
+                wrench[part] = declared[name] ** 2
+        out.append(Noise(motion, wrench))
+    return tuple(out)
+
+
+def _mass_matrix(body: Array) -> Array:
+    """Return M = [[I, [h]x], [-[h]x, m 1]] that acts on [alpha; a - g]."""
+    h, inertia = cross_matrix(body[1:4]), body[[[4, 5, 6], [5, 7, 8], [6, 8, 9]]]
+    return np.block([[inertia, h], [-h, body[0] * np.eye(3)]])

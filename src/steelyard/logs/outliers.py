@@ -1,0 +1,95 @@
+"""Taps: short bursts in a wrench or an accelerometer that stand out of their own surroundings."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.conditioning import lowpass, sampling_rate
+from steelyard.logs.stillness import Mask
+
+_SPLIT_HZ = 20.0  # a held body moves below, a knock rings above
+_PEAK, _EDGE = 8.0, 4.0  # sigmas to call a tap, and to end it
+_SURROUNDINGS_S = 0.6
+_SHARE_OF_RANGE = 0.05
+
+
+def bursts(time: Array, values: Array, margin_s: float = 0.03) -> Array:
+    """Return intervals (K, 2) [s] in which `values` (N, 3), sampled at `time` (N,) [s], burst.
+
+    The part above 20 Hz (or a fifth of the rate) is measured against its median size in the 0.6 s before and
+    after, whichever is larger, so that the start of a motion or a noisy stretch is no tap; and a tap must
+    reach a twentieth of the range of the channel. Each interval is widened by `margin_s`.
+    """
+    rate = sampling_rate(time)
+    half = max(int(_SURROUNDINGS_S * rate), 8)
+    if len(time) < 4 * half:
+        return np.zeros((0, 2))
+    size = _fast_part(values, rate)
+    level = _level(size, half)
+    slow = np.quantile(values, [0.02, 0.98], axis=0)
+    floor = _SHARE_OF_RANGE * float(np.linalg.norm(slow[1] - slow[0]))
+    return _intervals(time, (size > _PEAK * level) & (size > floor), size > _EDGE * level, margin_s)
+
+
+def merged(*groups: Array) -> Array:
+    """Return the union of groups of intervals (K, 2) as disjoint intervals in order."""
+    parts = np.concatenate([np.zeros((0, 2)), *groups])
+    parts = parts[np.argsort(parts[:, 0])]
+    if len(parts) < 2:
+        return parts
+    ends = np.maximum.accumulate(parts[:, 1])
+    first = np.concatenate([[True], parts[1:, 0] > ends[:-1]])
+    last = np.concatenate([first[1:], [True]])
+    return np.stack([parts[first, 0], ends[last]], 1)
+
+
+def inside(time: Array, intervals: Array) -> Mask:
+    """Return which of `time` (N,) lie in disjoint, ordered intervals (K, 2)."""
+    edges = intervals.ravel()
+    return np.asarray(np.searchsorted(edges, time, "right") % 2 == 1)
+
+
+def _fast_part(values: Array, rate: float) -> Array:
+    """Return the size (N,) of what is above the split frequency."""
+    split = min(_SPLIT_HZ, 0.2 * rate)
+    return np.asarray(np.linalg.norm(values - lowpass(values, split, rate, order=2), axis=1))
+
+
+def _level(size: Array, half: int) -> Array:
+    """Return the local Gaussian scale (N,): the larger of the medians before and after each sample."""
+    blocks = max(half // 16, 1)
+    count = len(size) // blocks
+    coarse = np.median(size[: count * blocks].reshape(count, blocks), axis=1)
+    wing = max(half // blocks, 2)
+    padded = np.concatenate([np.full(wing, np.nan), coarse, np.full(wing, np.nan)])
+    windows = np.lib.stride_tricks.sliding_window_view(padded, wing)
+    with np.errstate(all="ignore"):
+        median = _nan_median(windows)
+    before, after = median[:count], median[wing + 1 : wing + 1 + count]
+    level = np.fmax(before, after)
+    level = np.where(np.isfinite(level), level, np.median(coarse))
+    at = (np.arange(count) + 0.5) * blocks
+    # The norm of three Gaussians has its median at 1.54 sigma.
+    return np.asarray(np.interp(np.arange(len(size)), at, level) / 1.54)
+
+
+def _nan_median(windows: Array) -> Array:
+    """Return medians of the rows without NaN; NaN where fewer than half of a row is left."""
+    enough = np.isfinite(windows).sum(1) * 2 >= windows.shape[1]
+    out = np.full(len(windows), np.nan)
+    if enough.any():
+        out[enough] = np.nanmedian(windows[enough], axis=1)
+    return out
+
+
+def _intervals(time: Array, peak: Mask, edge: Mask, margin_s: float) -> Array:
+    """Return the stretches around peaks in which the signal comes above the edge at least every 0.1 s."""
+    rows = np.flatnonzero(edge | peak)
+    if not peak.any():
+        return np.zeros((0, 2))
+    cuts = np.flatnonzero(np.diff(time[rows]) > 0.05)
+    starts, ends = rows[np.concatenate([[0], cuts + 1])], rows[np.concatenate([cuts, [len(rows) - 1]])]
+    hits = np.concatenate([[0], np.cumsum(peak)])
+    kept = hits[ends + 1] > hits[starts]
+    return merged(np.stack([time[starts[kept]] - margin_s, time[ends[kept]] + margin_s], 1))

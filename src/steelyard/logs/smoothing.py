@@ -1,0 +1,247 @@
+"""Smoother: values and two derivatives of a sampled signal, with the variances they deserve.
+
+The signal is taken as the n-fold integral of white noise seen through white noise (a smoothing spline); one
+number, the ratio of the two, is chosen by the likelihood of the innovations. Rotations are smoothed as
+quaternions, component by component with one filter: the answer then turns with the frames, and noise on the
+unit sphere stays isotropic.
+Source: Rauch, Tung, Striebel 1965; Wahba 1978 (spline as a posterior mean); body rates from 2 q* dq/dt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+from typing import Any
+
+import numpy as np
+from numba import njit
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.spatial import Rotation
+
+_SEARCH_ROWS = 6000
+_NOISE_FLOOR = 1e-9
+_ORDERS = (3, 4, 5)
+_WARM_UP = 6  # innovations left out of the likelihood: the start is not known
+
+
+@dataclass(frozen=True, eq=False)
+class Smooth:
+    """A smoothed signal of D channels that share one noise level.
+
+    time       (N,) [s]
+    states     (N, 3, D) value, first and second derivative
+    variance   (N, 3) of each of them, per channel
+    noise_std  of one measurement of one channel
+    """
+
+    time: Array
+    states: Array
+    variance: Array
+    noise_std: float
+
+    def at(self, time: Array) -> tuple[Array, Array]:
+        """Return states (M, 3, D) and variances (M, 3) at other times [s] (quintic Hermite; ends are
+        held)."""
+        times = np.clip(time, self.time[0], self.time[-1])
+        left = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.time) - 2)
+        step = self.time[left + 1] - self.time[left]
+        states = _quintic(self.states[left], self.states[left + 1], (times - self.time[left]) / step, step)
+        variance = np.stack([np.interp(times, self.time, v) for v in self.variance.T], 1)
+        return states, variance
+
+
+def smooth(time: Array, values: Array, noise_dof: int | None = None) -> Smooth:
+    """Smooth `values` (N, D), sampled at rising `time` (N,) [s], by an n-fold integral of white noise.
+
+    The order n (3 = white jerk of a position, 4, 5) and the bandwidth are the most likely ones.
+    noise_dof  how many of the D channels carry noise (3 for unit quaternions); None = all
+
+    Raises BadValue with fewer than 12 samples.
+    """
+    t, y = check.finite("time", time), check.finite("values", values)
+    if len(t) < 2 * _WARM_UP:
+        raise BadValue(f"smoothing needs at least {2 * _WARM_UP} samples in time; got {len(t)}.")
+    step = float(np.median(np.diff(t)))
+    origin = y.mean(0)
+    clock, centred = (t - t[0]) / step, np.ascontiguousarray(y - origin)
+    share = (noise_dof or y.shape[1]) / y.shape[1]
+    _, order, ratio = min(_best_ratio(clock, centred, n) for n in _ORDERS)
+    scale = ratio ** (1 / (2 * order))
+    floor = (_NOISE_FLOOR * (np.ptp(y, axis=0).max() + 1e-12)) ** 2
+    states, cov, quad, _, count = _smooth_kernel(clock * scale, centred, order, scale)
+    noise = max(quad / max(count * y.shape[1] * share, 1.0), floor)
+    back = (scale / step) ** np.arange(order)
+    states, variance = states * back[:, None], np.einsum("nii->ni", cov) * back**2 * noise
+    states[:, 0] += origin
+    return Smooth(
+        t, check.frozen(states[:, :3]), check.frozen(np.maximum(variance[:, :3], 0)), float(np.sqrt(noise))
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class SmoothRotation:
+    """Smoothed rotations R_WS: quaternions (one Smooth of four channels) and the rates that follow from
+    them."""
+
+    quaternion: Smooth
+
+    @property
+    def time(self) -> Array:
+        """Sample times (N,) [s]."""
+        return self.quaternion.time
+
+    @property
+    def noise_std(self) -> float:
+        """Noise of one measured rotation, per axis [rad]."""
+        return 2 * self.quaternion.noise_std
+
+    def at(self, time: Array) -> tuple[Rotation, Array, Array, Array]:
+        """Return rotation, angular velocity, angular acceleration (M, 3) in S, and variances (M, 3).
+
+        The variances are per axis of the angle [rad^2], rate [rad^2/s^2] and acceleration [rad^2/s^4].
+        """
+        states, variance = self.quaternion.at(time)
+        q, dq, ddq = states[:, 0], states[:, 1], states[:, 2]
+        square = (q * q).sum(1)[:, None]
+        growth = 2 * (q * dq).sum(1)[:, None] / square
+        omega = 2 * _conjugate_times(q, dq) / square
+        alpha = 2 * _conjugate_times(q, ddq) / square - omega * growth
+        return Rotation.from_quaternion_wxyz(q), omega, alpha, 4 * variance
+
+
+def smooth_rotations(time: Array, rotation: Rotation) -> SmoothRotation:
+    """Smooth rotations R_WS (batch (N,)) sampled at rising `time` (N,) [s]."""
+    q = rotation.quaternion_wxyz()
+    flips = np.cumprod(np.where((q[1:] * q[:-1]).sum(1) < 0, -1.0, 1.0))
+    q = q * np.concatenate([[1.0], flips])[:, None]
+    return SmoothRotation(smooth(time, q, noise_dof=3))
+
+
+def _conjugate_times(q: Array, p: Array) -> Array:
+    """Return the vector part of q* p for quaternions (N, 4), scalar first."""
+    return np.asarray(q[:, :1] * p[:, 1:] - p[:, :1] * q[:, 1:] - np.cross(q[:, 1:], p[:, 1:]))
+
+
+def _quintic(a: Array, b: Array, u: Array, h: Array) -> Array:
+    """Return states between neighbouring states a and b (M, 3, D) at the fraction u (M,) of the step h
+    (M,)."""
+    s, h = u[:, None], h[:, None]
+    gap = b[:, 0] - a[:, 0] - a[:, 1] * h - a[:, 2] * h**2 / 2
+    slope = (b[:, 1] - a[:, 1] - a[:, 2] * h) * h
+    bend = (b[:, 2] - a[:, 2]) * h**2
+    c3, c4, c5 = 10 * gap - 4 * slope + bend / 2, -15 * gap + 7 * slope - bend, 6 * gap - 3 * slope + bend / 2
+    value = a[:, 0] + a[:, 1] * h * s + a[:, 2] * (h * s) ** 2 / 2 + s**3 * (c3 + s * (c4 + s * c5))
+    first = a[:, 1] + a[:, 2] * h * s + s**2 * (3 * c3 + s * (4 * c4 + s * 5 * c5)) / h
+    second = a[:, 2] + s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / h**2
+    return np.stack([value, first, second], 1)
+
+
+def _best_ratio(clock: Array, values: Array, order: int) -> tuple[float, int, float]:
+    """Return the least cost, the order, and the most likely ratio of process to measurement noise per
+    step."""
+    from scipy.optimize import minimize_scalar
+
+    pieces = _pieces(len(clock))
+
+    def cost(log_ratio: float) -> float:
+        scale = float(np.exp(log_ratio / (2 * order)))
+        found = [_likelihood(clock[p] * scale, values[p], order, scale) for p in pieces]
+        quad, log_det, count = np.sum(found, 0)
+        size = float(np.abs(values).max()) + 1e-300
+        return float(count * np.log(quad / count + (_NOISE_FLOOR * size) ** 2) + log_det)
+
+    grid = np.log(10.0) * np.arange(-4.0 * order, 4.1, 1.0)
+    best = float(grid[int(np.argmin([cost(g) for g in grid]))])
+    found = minimize_scalar(cost, bounds=(best - 2.4, best + 2.4), method="bounded", options={"xatol": 0.02})
+    return float(found.fun), order, float(np.exp(found.x))
+
+
+def _pieces(rows: int) -> list[slice]:
+    """Return up to three stretches of a long log to choose the smoothing from."""
+    if rows <= _SEARCH_ROWS:
+        return [slice(0, rows)]
+    each = _SEARCH_ROWS // 3
+    return [slice(int(s), int(s) + each) for s in np.linspace(0, rows - each, 3)]
+
+
+def _likelihood(clock: Array, values: Array, order: int, scale: float) -> tuple[float, float, float]:
+    _, _, _, _, _, _, quad, log_det, count = _forward(clock, values, _model(order), scale)
+    return float(quad) / values.shape[1], float(log_det), float(count)
+
+
+def _model(order: int) -> tuple[Array, Array]:
+    """Return the coefficients of F(dt) and Q(dt), to be multiplied by powers of dt."""
+    F, Q = np.zeros((order, order)), np.zeros((order, order))
+    for i in range(order):
+        for j in range(order):
+            if j >= i:
+                F[i, j] = 1 / factorial(j - i)
+            a, b = order - 1 - i, order - 1 - j
+            Q[i, j] = 1 / (factorial(a) * factorial(b) * (a + b + 1))
+    return F, Q
+
+
+def _smooth_kernel(clock: Array, values: Array, order: int, density: float) -> tuple[Any, ...]:
+    """Run both passes; return smoothed states, covariances, innovation energy, log-determinant and count."""
+    forward = _forward(clock, values, _model(order), density)
+    states, cov = _backward(*forward[:6])
+    return states, cov, *forward[6:]
+
+
+@njit(cache=True)
+def _forward(clock, values, model, density):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Kalman filter with unit measurement noise and process density `density` in the given time unit."""
+    base_F, base_Q = model
+    n, rows, channels = base_F.shape[0], values.shape[0], values.shape[1]
+    filtered, predicted = np.zeros((rows, n, channels)), np.zeros((rows, n, channels))
+    P_filtered, P_predicted = np.zeros((rows, n, n)), np.zeros((rows, n, n))
+    transition = np.zeros((rows, n, n))
+    x, P = np.zeros((n, channels)), 1e6 * np.eye(n)
+    x[0] = values[0]
+    F, Q = np.zeros((n, n)), np.zeros((n, n))
+    quad, log_det, count = 0.0, 0.0, 0
+    for k in range(rows):
+        if k > 0:
+            dt = clock[k] - clock[k - 1]
+            for i in range(n):
+                for j in range(n):
+                    F[i, j] = base_F[i, j] * dt ** max(j - i, 0)
+                    Q[i, j] = density * base_Q[i, j] * dt ** (2 * n - 1 - i - j)
+            x = F @ x
+            P = F @ P @ F.T + Q
+            transition[k] = F
+        predicted[k], P_predicted[k] = x, P
+        S = P[0, 0] + 1.0
+        gain = P[:, 0] / S
+        for c in range(channels):
+            e = values[k, c] - x[0, c]
+            for i in range(n):
+                x[i, c] += gain[i] * e
+            if k >= _WARM_UP:
+                quad += e * e / S
+        if k >= _WARM_UP:
+            log_det += np.log(S)
+            count += 1
+        # Joseph form keeps P positive with a very wide start.
+        A = np.eye(n)
+        A[:, 0] -= gain
+        P = A @ P @ A.T
+        for i in range(n):
+            for j in range(n):
+                P[i, j] += gain[i] * gain[j]
+        filtered[k], P_filtered[k] = x, P
+    return filtered, P_filtered, predicted, P_predicted, transition, rows, quad, log_det, count
+
+
+@njit(cache=True)
+def _backward(filtered, P_filtered, predicted, P_predicted, transition, rows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Rauch-Tung-Striebel pass."""
+    states, cov = filtered.copy(), P_filtered.copy()
+    for k in range(rows - 2, -1, -1):
+        gain = np.linalg.solve(P_predicted[k + 1], transition[k + 1] @ P_filtered[k]).T.copy()
+        states[k] = filtered[k] + gain @ (states[k + 1] - predicted[k + 1])
+        cov[k] = P_filtered[k] + gain @ (cov[k + 1] - P_predicted[k + 1]) @ gain.T
+    return states, cov

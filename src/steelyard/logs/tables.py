@@ -1,0 +1,126 @@
+"""Tables without time: still poses, and rows whose order means nothing; the wrench of a stream in S."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription
+from steelyard.findings import Finding
+from steelyard.logs.imu import first_mount
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording, Stream
+from steelyard.spatial import Rotation
+
+
+def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tuple[Finding, ...], str]:
+    """Return the log of streams without time, matched by row, the rotations, findings and the acceleration's
+    source.
+
+    A table of poses is at rest. Other rows keep the accelerations that were given; nothing is
+    differentiated, and `clock-missing` says so.
+    """
+    streams = recording.streams
+    lengths = {s.name: len(s) for s in streams}
+    if len(set(lengths.values())) > 1:
+        shown = ", ".join(f"'{n}' has {k}" for n, k in lengths.items())
+        raise BadDescription(
+            f"streams without time are matched by row, so they need one length; {shown} rows."
+        )
+    found = {q: (s, v) for s in reversed(streams) for q, v in s.channels.items()}
+    if "force" not in found or "torque" not in found:
+        raise BadDescription("a log needs force and torque.")
+    rotation = Rotation.nearest(found["rotation"][1]) if "rotation" in found else None
+    force, torque = found["force"][0], found["torque"][0]
+    merged = (
+        force if force is torque else Stream(force.name, {**force.channels, "torque": found["torque"][1]})
+    )
+    wrench = wrench_in_sensor(merged, recording.wrench_sign, rotation)
+    gravity = _gravity(recording, rotation, wrench)
+    if all(s.poses for s in streams):
+        return MotionLog.of_poses(wrench, gravity), rotation, (), "none"
+    log = _log_of_rows(recording, wrench, gravity, rotation)
+    names = ", ".join(f"'{s.name}'" for s in streams)
+    given = [q for q in ("linear_acceleration", "angular_acceleration") if q in found]
+    what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"
+    finding = Finding.of(
+        "clock-missing", f"{names} has no clock: no delay or derivative can be found; {what}."
+    )
+    return log, rotation, (finding,), "linear_acceleration" if "linear_acceleration" in found else "none"
+
+
+def wrench_in_sensor(stream: Stream, sign: int, rotation: Rotation | None) -> Array:
+    """Return the wrench (N, 6) that the robot applies to the object, about the S origin in S.
+
+    `rotation` (N,) turns S into W; it is needed for channels given in W (moments there are about the S
+    origin too).
+    """
+    parts = []
+    for quantity in ("torque", "force"):
+        values = stream.channels[quantity]
+        if stream.frames.get(quantity, "S") == "W":
+            if rotation is None:
+                raise BadDescription(
+                    f"{quantity} of '{stream.name}' is given in W, but no stream gives the rotation."
+                )
+            values = rotation.inverse().apply(values)
+        elif stream.mount is not None and stream.mount.rotation is not None:
+            values = stream.mount.rotation.apply(values)
+        parts.append(values)
+    torque, force = parts
+    if stream.mount is not None and stream.mount.position is not None:
+        torque = torque + np.cross(stream.mount.position, force)
+    return sign * np.concatenate([torque, force], 1)
+
+
+def _gravity(recording: Recording, rotation: Rotation | None, wrench: Array) -> Array:
+    """Return gravity in S (N, 3) from the rotation, else the gravity channel, else an accelerometer at
+    rest."""
+    if rotation is not None:
+        return np.asarray(rotation.inverse().matrix @ recording.gravity)
+    for stream, values in _with("gravity", recording):
+        return _turned(stream, values)
+    for stream, values in _with("specific_force", recording):
+        known = stream.mount.rotation if stream.mount is not None else None
+        return -(known or first_mount(values, None, wrench[:, 3:])).apply(values)
+    raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
+
+
+def _with(quantity: str, recording: Recording) -> Iterator[tuple[Stream, Array]]:
+    for stream in recording.streams:
+        if quantity in stream.channels:
+            yield stream, stream.channels[quantity]
+
+
+def _turned(stream: Stream, values: Array) -> Array:
+    if stream.mount is not None and stream.mount.rotation is not None:
+        return stream.mount.rotation.apply(values)
+    return values
+
+
+def _log_of_rows(recording: Recording, wrench: Array, gravity: Array, rotation: Rotation | None) -> MotionLog:
+    zero = np.zeros_like(gravity)
+    motion = {}
+    for quantity in ("linear_acceleration", "angular_velocity", "angular_acceleration"):
+        motion[quantity] = zero
+        for stream, values in _with(quantity, recording):
+            if stream.frames.get(quantity, "S") == "W":
+                if rotation is None:
+                    raise BadDescription(
+                        f"{quantity} of '{stream.name}' is given in W, but there is no rotation."
+                    )
+                values = rotation.inverse().apply(values)
+            motion[quantity] = values
+            break
+    if motion["linear_acceleration"] is zero:
+        for _stream, values in _with("specific_force", recording):
+            if rotation is not None and _stream.mount is not None and _stream.mount.rotation is not None:
+                motion["linear_acceleration"] = _stream.mount.rotation.apply(values) + gravity
+            break
+    still = np.full(len(wrench), not any(m is not zero for m in motion.values()))
+    return MotionLog(
+        wrench, gravity, motion["linear_acceleration"], motion["angular_velocity"],
+        motion["angular_acceleration"], still=still
+    )  # fmt: skip
