@@ -15,6 +15,10 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.noise_cost import derivatives, value
 
+# Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two full
+# steps end at rounding, where a line search could only see noise.
+NEAR = 1e-4
+
 # theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each of the last six sits in U.
 _ROW = np.array([0, 0, 1, 2, 0, 1, 0, 0, 1, 2])
 _COLUMN = np.array([0, 0, 1, 2, 1, 2, 2, 3, 3, 3])
@@ -250,8 +254,10 @@ def minimise(
     for _ in range(iterations):
         step = _downhill(gradient, hessian)
         decrement = -0.5 * (gradient @ step)
-        if decrement < 1e-9:
-            return u + step, current - decrement, True
+        if decrement < NEAR:
+            u = u + step
+            current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
+            return u + _downhill(gradient, hessian), current, True
         longest = np.abs(step[:7]).max()
         if longest > 1.0:
             step *= 1.0 / longest

@@ -114,21 +114,30 @@ def log_cholesky_jacobian(theta: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
+def _shift_slopes() -> Array:
+    """Return C (6, 3, 3): entry k of |h|^2 1 - h h^T is h^T C_k h / 2."""
+    out = np.zeros((6, 3, 3))
+    for k, (i, j) in enumerate(UPPER):
+        out[k] += 2 * np.eye(3) * (i == j)
+        out[k, i, j] -= 1
+        out[k, j, i] -= 1
+    return out
+
+
+_SHIFT = _shift_slopes()
+
+
 def com_jacobian(phi: Array) -> Array:
     """Return d (com, inertia about the CoM: xx xy xz yy yz zz) / d phi, shape (..., 9, 10).
 
     With c = h/m and I_C = I - m (|c|^2 1 - c c^T) = I - (|h|^2 1 - h h^T)/m.
     """
-    m, h = phi[..., 0], phi[..., 1:4]
+    m, h = phi[..., 0, None], phi[..., 1:4]
     out = np.zeros((*phi.shape[:-1], 9, 10))
-    for i in range(3):
-        out[..., i, 0] = -h[..., i] / m**2
-        out[..., i, 1 + i] = 1 / m
-    square = (h * h).sum(-1)
-    for k, (i, j) in enumerate(UPPER):
-        out[..., 3 + k, 4 + k] = 1
-        out[..., 3 + k, 0] = ((i == j) * square - h[..., i] * h[..., j]) / m**2
-        for a in range(3):
-            slope = 2 * (i == j) * h[..., a] - (a == i) * h[..., j] - (a == j) * h[..., i]
-            out[..., 3 + k, 1 + a] = -slope / m
+    out[..., :3, 0] = -h / m**2
+    out[..., [0, 1, 2], [1, 2, 3]] = 1 / m
+    slope = np.einsum("kab,...b->...ka", _SHIFT, h)
+    out[..., [3, 4, 5, 6, 7, 8], [4, 5, 6, 7, 8, 9]] = 1.0
+    out[..., 3:, 0] = 0.5 * np.einsum("...ka,...a->...k", slope, h) / m**2
+    out[..., 3:, 1:4] = -slope / m[..., None]
     return out

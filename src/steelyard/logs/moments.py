@@ -26,6 +26,8 @@ ALPHA, ACCEL, OMEGA2, TORQUE, FORCE, ONE = slice(0, 3), slice(3, 6), slice(6, 12
 MOTION, WRENCH = slice(0, 12), slice(12, 18)
 
 _CHUNK = 128
+# Runs of rows of one group shorter than this, on average, are sorted before the pass.
+SHORTEST_RUN = 16
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
@@ -49,23 +51,24 @@ def _features(
 
 @numba.njit(cache=True, fastmath=True, nogil=True)
 def _scatter_pass(
-    alpha: Array, accel: Array, gravity: Array, omega: Array, wrench: Array, bounds: Integers, out: Array
+    alpha: Array, accel: Array, gravity: Array, omega: Array, wrench: Array, starts: Integers, group: Integers, out: Array
 ) -> None:
-    """Add z z^T of the rows bounds[g]..bounds[g+1] to out[g], in one pass over memory."""
+    """Add z z^T of the rows starts[k]..starts[k+1] to out[group[k]] for every run k, in one pass over memory."""
     buffer = np.empty((SIZE, _CHUNK))
-    for group in range(len(bounds) - 1):
-        for start in range(bounds[group], bounds[group + 1], _CHUNK):
-            rows = min(_CHUNK, bounds[group + 1] - start)
+    for run in range(len(group)):
+        for start in range(starts[run], starts[run + 1], _CHUNK):
+            rows = min(_CHUNK, starts[run + 1] - start)
             _features(alpha, accel, gravity, omega, wrench, start, rows, buffer)
             for i in range(SIZE):
                 for j in range(i, SIZE):
                     total = 0.0
                     for k in range(rows):
                         total += buffer[i, k] * buffer[j, k]
-                    out[group, i, j] += total
+                    out[group[run], i, j] += total
+    for g in range(out.shape[0]):
         for i in range(SIZE):
             for j in range(i):
-                out[group, i, j] = out[group, j, i]
+                out[g, i, j] = out[g, j, i]
 
 
 @dataclass(frozen=True, eq=False)
@@ -88,14 +91,18 @@ class Moments:
     def of_log(cls, log: MotionLog, by_block: bool = True) -> Moments:
         """Return the statistic of a log, grouped by noise class, stillness and (by default) block."""
         groups, label = _groups(log, by_block)
-        if (label[1:] < label[:-1]).any():
+        starts = np.concatenate([[0], np.flatnonzero(label[1:] != label[:-1]) + 1, [len(log)]])
+        if len(starts) > len(log) / SHORTEST_RUN + 2:
+            # Rows of many groups mixed: gather them first, so that products run over long stretches.
             order = np.argsort(label, kind="stable")
             log, label = log.rows(order), label[order]
-        bounds = np.searchsorted(label, np.arange(len(groups) + 1)).astype(np.int64)
+            starts = np.searchsorted(label, np.arange(len(groups) + 1))
         out = np.zeros((len(groups), SIZE, SIZE))
-        _scatter_pass(
-            log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench, bounds, out
-        )
+        if len(log):
+            _scatter_pass(
+                log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench,
+                starts.astype(np.int64), label[starts[:-1]], out,
+            )  # fmt: skip
         return cls(out, groups[:, 0], groups[:, 1], groups[:, 2].astype(np.bool_), log.noise)
 
     @classmethod
@@ -180,7 +187,13 @@ def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:
     block = log.pose if by_block else np.full(1, -1)
     blocks = int(block.max()) + 2
     key = (2 * log.noise_class + log.still) * blocks + (block + 1)
-    present = np.flatnonzero(np.bincount(key))
+    edges = np.flatnonzero(key[1:] != key[:-1])
+    if not len(edges):
+        present = key[:1]
+    elif len(edges) < len(key) // SHORTEST_RUN:
+        present = np.unique(key[np.append(edges, len(key) - 1)])
+    else:
+        present = np.flatnonzero(np.bincount(key))
     rank = np.zeros(int(present[-1]) + 1, np.int64)
     rank[present] = np.arange(len(present))
     kind, position = np.divmod(present, blocks)

@@ -1,0 +1,72 @@
+"""A Recording written as CSV files with their description: what a user's own log would look like."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadFile
+from steelyard.io.result_files import write_text
+from steelyard.logs.recording import Recording, Stream
+from steelyard.spatial import Rotation
+
+_COLUMNS = {
+    "force": (("fx", "fy", "fz"), 'unit = "N"'),
+    "torque": (("tx", "ty", "tz"), 'unit = "N*m"'),
+    "rotation": (("qw", "qx", "qy", "qz"), 'form = "quaternion-wxyz"'),
+    "position": (("x", "y", "z"), 'unit = "m"'),
+    "specific_force": (("ax", "ay", "az"), 'unit = "m/s^2"'),
+}
+
+
+def write_recording(recording: Recording, folder: Path) -> Path:
+    """Write every stream as CSV and the description as log.toml into `folder`; return the description's path.
+
+    Raises BadFile where the folder cannot be written or a stream holds a quantity that this writer does not know.
+    """
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
+    sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
+    gravity = ", ".join(f"{g:g}" for g in recording.gravity)
+    text = [f"[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = \"{sign}\"\n"]
+    for stream in recording.streams:
+        text.append(_described(stream))
+        write_text(folder / stream.name, _csv(stream))
+    description = folder / "log.toml"
+    write_text(description, "\n".join(text))
+    return description
+
+
+def _described(stream: Stream) -> str:
+    """Return the [[stream]] table."""
+    lines = ["[[stream]]", f'path = "{stream.name}"']
+    if stream.time is not None:
+        lines.append('time = { columns = ["t"], unit = "s" }')
+    for quantity in stream.channels:
+        if quantity not in _COLUMNS:
+            raise BadFile(f"{stream.name}: cannot write {quantity}; this writer knows {', '.join(_COLUMNS)}.")
+        names, unit = _COLUMNS[quantity]
+        lines.append(f"{quantity} = {{ columns = [{', '.join(f'{n!r}' for n in names)}], {unit} }}".replace("'", '"'))
+    return "\n".join(lines) + "\n"
+
+
+def _csv(stream: Stream) -> str:
+    """Return the table with a header, nine significant figures."""
+    names, columns = [], []
+    if stream.time is not None:
+        names.append("t")
+        columns.append(stream.time[:, None])
+    for quantity, values in stream.channels.items():
+        names += _COLUMNS[quantity][0]
+        columns.append(_cells(quantity, values))
+    rows = np.concatenate(columns, axis=1)
+    body = "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows)
+    return ",".join(names) + "\n" + body + "\n"
+
+
+def _cells(quantity: str, values: Array) -> Array:
+    return Rotation(values).quaternion_wxyz() if quantity == "rotation" else values

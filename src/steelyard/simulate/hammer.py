@@ -1,0 +1,88 @@
+"""The demo's hammer: closed-form solids, a cobot-safe motion, and the recording that a robot would have made.
+
+The recording is what real ones are: a force-torque sensor that reports the reaction with a bias, on its own clock, and
+poses from the robot's encoders on another, no accelerometer.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array, frozen
+from steelyard.inertia import InertialParameters, solids
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording, Stream
+from steelyard.simulate.motions import Kinematics, Step, StopAndGo
+from steelyard.spatial import Pose, Rotation
+
+GRAVITY = np.array([0.0, 0.0, -9.81])
+WOOD, STEEL = 700.0, 7800.0
+WRENCH_HZ, POSE_HZ, DURATION = 250.0, 125.0, 20.0
+FORCE_STD, TORQUE_STD = 0.1, 0.005
+BIAS = np.array([0.12, -0.31, 0.05, 3.2, -1.4, 7.9])
+ENCODER_M, ENCODER_RAD = 2e-5, 5e-5
+
+
+@dataclass(frozen=True, eq=False)
+class Example:
+    """A recording with its known answer."""
+
+    recording: Recording
+    truth: InertialParameters
+
+
+def body() -> InertialParameters:
+    """Return the hammer in S: a wooden handle along z from 40 mm, a steel head across x with a conical peen."""
+    handle = solids.cylinder(0.014, 0.26, WOOD).in_frame(_at(0, 0, 0.17))
+    face = solids.cylinder(0.014, 0.06, STEEL).in_frame(_at(0.035, 0, 0.315, pitch=90))
+    neck = solids.box(0.03, 0.024, 0.024, STEEL).in_frame(_at(-0.01, 0, 0.315))
+    peen = solids.cone(0.012, 0.05, STEEL).in_frame(_at(-0.0375, 0, 0.315, pitch=-90))
+    return handle + face + neck + peen
+
+
+def _at(x: float, y: float, z: float, pitch: float = 0.0) -> Pose:
+    return Pose(Rotation.from_rpy([0.0, np.deg2rad(pitch), 0.0]), np.array([x, y, z]))
+
+
+def motion() -> StopAndGo:
+    """Return seven stops over 20 s, gravity along every axis of S, turns of 1.1 s between them."""
+    keys = np.deg2rad([
+        [0, 0, 0], [90, 0, 25], [180, 10, -20], [90, 60, 40], [0, -70, 30], [-80, 20, 0], [0, 0, 0],
+    ])  # fmt: skip
+    lift = Step(0.0, 2.0, np.array([0.0, 0.0, 0.15]))
+    return StopAndGo(keys, DURATION / len(keys), 1.1, (lift, Step(10.0, 2.0, np.array([0.1, 0.0, 0.0]))))
+
+
+def recording(seed: int = 0) -> Example:
+    """Return the hammer's recording: wrench stream and pose stream on two clocks, sensor sign and bias as usual."""
+    rng = np.random.default_rng(seed)
+    truth = body()
+    time = np.arange(int(DURATION * WRENCH_HZ)) / WRENCH_HZ
+    noise = rng.standard_normal((len(time), 6)) * np.repeat([TORQUE_STD, FORCE_STD], 3)
+    wrench = -_exact(motion().at(time)).predicted(truth.vector) + BIAS + noise
+    poses = motion().at(np.arange(int(DURATION * POSE_HZ)) / POSE_HZ)
+    turned = poses.rotation @ Rotation.exp(ENCODER_RAD * rng.standard_normal((len(poses.time), 3)))
+    position = poses.position + ENCODER_M * rng.standard_normal((len(poses.time), 3))
+    streams = (
+        Stream("wrench.csv", {"force": frozen(wrench[:, 3:]), "torque": frozen(wrench[:, :3])}, frozen(time)),
+        Stream("pose.csv", {"rotation": turned.matrix, "position": frozen(position)}, frozen(poses.time)),
+    )
+    return Example(Recording(streams, frozen(GRAVITY), -1, name="hammer"), truth)
+
+
+def _exact(seen: Kinematics) -> MotionLog:
+    """Return the exact motion as a log with a wrench still to come."""
+    return MotionLog(
+        np.zeros((len(seen.time), 6)),
+        seen.rotation.inverse().apply(GRAVITY),
+        seen.acceleration,
+        seen.angular_velocity,
+        seen.angular_acceleration,
+    )
+
+
+def truth_for_people(truth: InertialParameters) -> Array:
+    """Return mass, com, inertia about the CoM xx xy xz yy yz zz (10,)."""
+    return np.concatenate([[float(truth.mass)], truth.com, truth.inertia_com[np.triu_indices(3)]])
