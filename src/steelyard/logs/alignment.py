@@ -12,8 +12,9 @@ from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs import alignment_findings as say
 from steelyard.logs.conditioning import noise_std, sampling_rate, signal
-from steelyard.logs.delays import Clocks, Question, find_clocks, refine
+from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.imu import Imu, Mounting, imu
+from steelyard.logs.joint_fit import refine
 from steelyard.logs.kinematics import Kinematics, Motion, kinematics
 from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
@@ -239,7 +240,8 @@ def _rows(given: _Prepared) -> tuple[Array, Array]:
     shared = (time >= start - reach) & (time <= end + reach)
     if start > end or shared.sum() < _FEWEST_ROWS:
         raise CannotAnswer(
-            f"the streams share no time: the wrench runs from {given.clock[0]:.6g} to {given.clock[-1]:.6g} s, "
+            "the streams share no time: "
+            f"the wrench runs from {given.clock[0]:.6g} to {given.clock[-1]:.6g} s, "
             f"the others together from {start:.6g} to {end:.6g} s. "
             "Check the time units and that all are of one run."
         )
@@ -263,7 +265,7 @@ def _clocks(given: _Prepared, time: Array, wrench: Array) -> tuple[Clocks, tuple
     question = Question(
         time[pick], wrench[pick], given.kinematics, given.imu, given.unknown, given.known, reach
     )
-    clocks = find_clocks(question)
+    clocks = refine(question, {**given.known, **scan(question)})
     least = given.options.smallest_delay_s
     late = tuple(n for n in given.unknown if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
     if len(late) < len(given.unknown):

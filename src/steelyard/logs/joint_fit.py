@@ -1,0 +1,228 @@
+"""Joint fit of delays, accelerometer mount, lever arm, bias and body to the wrench: robust least squares."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.delays import Clocks, Question, features, free_residual, turning
+from steelyard.logs.imu import Imu, Mounting, first_mount, lever
+from steelyard.logs.log import MotionLog
+from steelyard.spatial import Rotation
+
+_BLOCKS = 20
+_ROUNDS = 4
+_STEPS = 12
+_PRIOR = {"delay": 0.1, "rotation": 0.5, "position": 0.3, "bias": 1.0, "scale": 0.01, "centre": 0.5}
+_PRIOR_BODY = np.array([30.0, 3, 3, 3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3])
+_STEP = 1e-4
+_LONGEST_STEP = 0.01  # [s] a delay may move at once
+_FINEST = 1e-4  # of a channel's spread: no residual is trusted below
+_LONGEST_MEMORY = 0.1  # of the rows: how far the correlation of residuals is followed
+
+
+@dataclass(frozen=True, eq=False)
+class _Layout:
+    """Where each unknown sits in the vector of the joint fit, with its starting value and prior width."""
+
+    slices: dict[str, slice]
+    start: Array
+    width: Array
+    mount: Rotation | None
+
+    @classmethod
+    def of(
+        cls, question: Question, delays: Mapping[str, float], mount: Rotation | None, centre: bool
+    ) -> _Layout:
+        names, start, width = [], [], []
+
+        def add(name: str, value: Array, spread: Array) -> None:
+            names.append((name, len(value)))
+            start.append(value)
+            width.append(spread)
+
+        n = len(question.unknown)
+        add("delay", np.array([delays[s] for s in question.unknown]), np.full(n, _PRIOR["delay"]))
+        imu = question.imu
+        if imu is not None:
+            if imu.rotation is None:
+                add("rotation", np.zeros(3), np.full(3, _PRIOR["rotation"]))
+            if imu.position is None:
+                add("position", np.zeros(3), np.full(3, _PRIOR["position"]))
+            add("bias", np.zeros(3), np.full(3, _PRIOR["bias"]))
+            add("scale", np.ones(1), np.full(1, _PRIOR["scale"]))
+            if centre:
+                add("centre", np.zeros(3), np.full(3, _PRIOR["centre"]))
+        add("body", np.zeros(10), _PRIOR_BODY)
+        add("wrench_bias", question.wrench.mean(0), np.full(6, 1e3))
+        ends = np.cumsum([k for _, k in names])
+        slices = {name: slice(int(e) - k, int(e)) for (name, k), e in zip(names, ends, strict=True)}
+        return cls(slices, np.concatenate(start), np.concatenate(width), mount)
+
+    def get(self, theta: Array, name: str, default: Array) -> Array:
+        """Return one block of theta."""
+        return theta[self.slices[name]] if name in self.slices else default
+
+    def mounting(self, theta: Array, imu: Imu) -> Mounting:
+        """Return the accelerometer's mounting in theta."""
+        rotation = imu.rotation if imu.rotation is not None else self.mount
+        if rotation is None:
+            rotation = Rotation.identity()
+        if "rotation" in self.slices:
+            rotation = Rotation.exp(theta[self.slices["rotation"]]) @ rotation
+        position = self.get(theta, "position", imu.position if imu.position is not None else np.zeros(3))
+        scale = float(self.get(theta, "scale", np.ones(1))[0])
+        return Mounting(rotation, position, self.get(theta, "bias", np.zeros(3)), scale)
+
+    def delays(self, theta: Array, question: Question) -> dict[str, float]:
+        """Return all delays, given and sought."""
+        sought = dict(zip(question.unknown, (float(v) for v in theta[self.slices["delay"]]), strict=True))
+        return {**question.known, **sought}
+
+
+def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
+    """Return the joint robust least-squares answer, started from `delays` [s].
+
+    Residuals: the wrench of a free body with a free bias, and, where an accelerometer and gravity are there,
+    what the accelerometer shows against gravity and the measured acceleration (or a free centre of turning
+    where none is measured). Scales come from the residuals; rows far off count less; standard deviations
+    from time blocks.
+    """
+    motion, force = question.seen(delays)
+    mount = None
+    if question.imu is not None and force is not None:
+        mount = question.imu.rotation or first_mount(force, motion.gravity, question.wrench[:, 3:])
+    layout = _Layout.of(question, delays, mount, centre=motion.gravity is not None and not motion.measured)
+    theta, sigma = layout.start.copy(), None
+    for _ in range(_ROUNDS):
+        theta, weights, sigma = _descend(question, layout, theta, sigma)
+    std = _block_std(question, layout, theta, weights)
+    residual = _residual(question, layout, theta)[:, :6]
+    found = layout.delays(theta, question)
+    spread = dict.fromkeys(found, 0.0)
+    spread.update(zip(question.unknown, (float(v) for v in std[layout.slices["delay"]]), strict=True))
+    mounting = None
+    if question.imu is not None:
+        mounting = replace(
+            layout.mounting(theta, question.imu),
+            rotation_std=layout.get(std, "rotation", np.zeros(3)),
+            position_std=layout.get(std, "position", np.zeros(3)),
+            bias_std=layout.get(std, "bias", np.zeros(3)),
+        )
+    return Clocks(found, spread, mounting, theta[layout.slices["body"]], residual)
+
+
+def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
+    """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
+    motion, raw = question.seen(layout.delays(theta, question))
+    zero = np.zeros_like(motion.omega)
+    gravity = motion.gravity
+    pull = (gravity if gravity is not None else zero) - motion.acceleration
+    extra: list[Array] = []
+    if question.imu is not None and raw is not None:
+        mounting = layout.mounting(theta, question.imu)
+        own = mounting.at_sensor(raw, motion.omega, motion.alpha)
+        if gravity is not None:
+            # What a centre of turning away from S adds; absorbs the S acceleration that nothing measures.
+            shift = lever(motion.omega, motion.alpha, layout.get(theta, "centre", np.zeros(3)))
+            # Over the scale, so that it multiplies gravity and not the vibration (which would draw it below
+            # one).
+            extra = [(own - shift + pull) / mounting.scale]
+        pull = -own
+    log = MotionLog(question.wrench, pull, zero, motion.omega, motion.alpha)
+    body, bias = theta[layout.slices["body"]], theta[layout.slices["wrench_bias"]]
+    return np.concatenate([question.wrench - bias - log.predicted(body), *extra], 1)
+
+
+def _jacobian(question: Question, layout: _Layout, theta: Array) -> tuple[Array, Array]:
+    """Return residuals (N, k) and their derivative (N, k, P) by forward differences."""
+    base = _residual(question, layout, theta)
+    out = np.empty((*base.shape, len(theta)))
+    for i in range(len(theta)):
+        moved = theta.copy()
+        moved[i] += _STEP
+        out[..., i] = (_residual(question, layout, moved) - base) / _STEP
+    return base, out
+
+
+def _descend(
+    question: Question, layout: _Layout, theta: Array, sigma: Array | None
+) -> tuple[Array, Array, Array]:
+    """Take Gauss-Newton steps at fixed scales; return theta, row weights (N, k) and new scales (k,)."""
+    sigma = _first_scales(question, layout) if sigma is None else sigma
+    pull = 1 / layout.width**2
+    for _ in range(_STEPS):
+        r, J = _jacobian(question, layout, theta)
+        H, scores = _normal(J, _weights(r, sigma), r, pull)
+        step = -np.linalg.solve(H, scores.sum(0) + pull * (theta - layout.start))
+        biggest = float(np.abs(step[layout.slices["delay"]]).max(initial=0.0))
+        step = step * min(1.0, _LONGEST_STEP / max(biggest, 1e-12))
+        theta = theta + step
+        if np.abs(step * np.sqrt(np.diag(H))).max() < 0.01:
+            break
+    r = _residual(question, layout, theta)
+    least = _first_scales(question, layout)
+    seen = np.clip(1.4826 * np.median(np.abs(r), axis=0), 0.3 * least, 3 * least)
+    seen[6:] *= np.sqrt(_memory(r[:, 6:]))
+    return theta, _weights(r, seen), seen
+
+
+def _normal(J: Array, weights: Array, r: Array, pull: Array) -> tuple[Array, Array]:
+    """Return the normal matrix (P, P) with its prior and the scores (N, P) of the rows."""
+    weighted = J * weights[..., None]
+    flat = J.reshape(-1, J.shape[-1])
+    H = weighted.reshape(flat.shape).T @ flat + np.diag(pull)
+    return H, np.asarray((weighted * r[..., None]).sum(1))
+
+
+def _memory(residual: Array) -> Array:
+    """Return how many rows (k,) of a correlated residual (N, k) are worth one independent row, at least 1."""
+    rows, channels = residual.shape
+    if channels == 0:
+        return np.ones(0)
+    spectrum = np.abs(np.fft.rfft(residual - residual.mean(0), 2 * rows, axis=0)) ** 2
+    correlation = np.fft.irfft(spectrum, axis=0)[: max(int(_LONGEST_MEMORY * rows), 2)]
+    correlation = correlation / np.maximum(correlation[0], 1e-300)
+    positive = np.cumprod(correlation > 0.05, axis=0)
+    return np.asarray(np.maximum(2 * (correlation * positive).sum(0) - 1, 1.0))
+
+
+def _first_scales(question: Question, layout: _Layout) -> Array:
+    """Return starting scales (k,): what free linear fits of the channels leave over."""
+    motion, force = question.seen(layout.delays(layout.start, question))
+    residual = free_residual(question.wrench, features(motion, force))
+    scales = 1.4826 * np.median(np.abs(residual), axis=0)
+    if force is not None and motion.gravity is not None:
+        steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
+        scales = np.append(
+            scales, 1.4826 * np.median(np.abs(free_residual(force, steady)), axis=0).mean() * np.ones(3)
+        )
+    sizes = question.wrench.std(0)
+    if len(scales) > 6 and force is not None:
+        sizes = np.append(sizes, np.full(3, force.std()))
+    return np.asarray(np.maximum(scales, _FINEST * sizes + 1e-12))
+
+
+def _weights(residual: Array, sigma: Array) -> Array:
+    """Return weights (N, k): 1/sigma^2, less for rows beyond three sigma (Huber on the row's norm)."""
+    scaled = residual / sigma
+    out = np.empty_like(residual)
+    for part in (slice(0, 6), slice(6, None)):
+        size = np.sqrt((scaled[:, part] ** 2).mean(1)) if scaled[:, part].size else np.zeros(len(scaled))
+        out[:, part] = np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))[:, None] / sigma[part] ** 2
+    return out
+
+
+def _block_std(question: Question, layout: _Layout, theta: Array, weights: Array) -> Array:
+    """Return standard deviations (P,) by the sandwich over time blocks, which sees correlated residuals."""
+    r, J = _jacobian(question, layout, theta)
+    prior = np.diag(1 / layout.width**2)
+    H, scores = _normal(J, weights, r, 1 / layout.width**2)
+    block = np.minimum((np.arange(len(r)) * _BLOCKS) // max(len(r), 1), _BLOCKS - 1)
+    sums = np.stack([np.bincount(block, s, _BLOCKS) for s in scores.T], 1)
+    back = np.linalg.inv(H)
+    cov = back @ (sums.T @ sums) @ back * _BLOCKS / (_BLOCKS - 1) + back @ prior @ back
+    return np.sqrt(np.maximum(np.diag(cov), 0))
