@@ -14,6 +14,7 @@ from steelyard.findings import Finding
 from steelyard.identify import noise_cost
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
+from steelyard.identify.linear import inverse_scaled, nonnegative
 from steelyard.identify.problem import Problem
 from steelyard.inertia import InertialParameters, forms
 
@@ -25,42 +26,32 @@ SMALLEST_RADIUS = 0.02
 LOST_MASS, LOST_COM = 0.5, 2.5
 # A direction counts toward the rank when the data fix it to half its natural size.
 RANK_INFORMATION = 4.0
-UNSEEN = 1e-9
+# Below this information (a third of the natural size to the power -2), or below this share of the best seen direction,
+# a direction is open.
+OPEN, UNSEEN = 0.1, 1e-12
 
 
 @dataclass(frozen=True, eq=False)
 class Solution:
-    """Linear parameters [phi (10), bias (0 or 6)], d phi / d coordinates (10, 10), prior Hessian in them (10, 10)."""
+    """Linear parameters (p,), d phi / d coordinates (10, 10), prior Hessian in them (10, 10).
+
+    aware   whether noise in the regressor was allowed for; the plain normal matrix is that of the others
+    """
 
     linear: Array
     jacobian: Array
     prior: Array
+    aware: bool = True
 
     @classmethod
     def unconstrained(cls, linear: Array) -> Solution:
         """Return a solution whose coordinates are the parameters themselves, without a prior."""
-        return cls(linear, np.eye(10), np.zeros((10, 10)))
+        return cls(linear, np.eye(10), np.zeros((10, 10)), aware=False)
 
     @property
     def bias(self) -> Array:
         """The wrench bias (6,) [tau, f]; zero where it was not estimated."""
         return self.linear[10:16] if len(self.linear) > 10 else np.zeros(6)
-
-
-@numba.njit(cache=True)
-def _inverse_scaled(matrix: Array) -> Array:
-    """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal."""
-    size = matrix.shape[0]
-    scale = np.ones(size)
-    for i in range(size):
-        if matrix[i, i] > 0.0:
-            scale[i] = 1 / np.sqrt(matrix[i, i])
-    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-    inverse = np.zeros(size)
-    for i in range(size):
-        if values[i] > 1e-12 * values[-1]:
-            inverse[i] = 1 / values[i]
-    return (vectors * inverse) @ vectors.T * np.outer(scale, scale)
 
 
 @numba.njit(cache=True)
@@ -72,7 +63,7 @@ def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
     A, score = J.T @ H @ J, J.T @ V @ J
     A[:10, :10] += prior
     score[:10, :10] += prior
-    bread = J @ _inverse_scaled(A)
+    bread = J @ inverse_scaled(A)
     return bread @ score @ bread.T
 
 
@@ -84,13 +75,15 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
     """
     K = problem.residual_map(solution.linear)
     data = (K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    H, extra, _ = noise_cost.information(*data)
+    H, extra, plain = noise_cost.information(*data)
+    H = nonnegative(H, plain)
     chi2 = noise_cost.value(*data[:1], *data[2:]) / max(6 * problem.samples - len(solution.linear), 1.0)
     V = score if score is not None else max(chi2, 1.0) * (H + extra)
+    bread = H if solution.aware else plain
     if problem.with_bias:
-        H[10:16, 10:16] += problem.bias_prior.precision
-        V[10:16, 10:16] += problem.bias_prior.precision
-    covariance = _sandwich(H, V, solution.jacobian, solution.prior)
+        for matrix in (H, plain, V):
+            matrix[10:16, 10:16] += problem.bias_prior.precision
+    covariance = _sandwich(bread, V, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
     sight = _sight(H, V, solution.linear[:10])
     _require_answer(sight, problem)
@@ -107,7 +100,7 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
         covariance[10:16, 10:16] if problem.with_bias else np.zeros((6, 6)),
         covariance[:10, 10:16] if problem.with_bias else np.zeros((10, 6)),
     )  # fmt: skip
-    left_out = leave_one_out(problem, solution.linear, H, solution.jacobian, solution.prior)
+    left_out = leave_one_out(problem, solution.linear, bread, solution.jacobian, solution.prior)
     return replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))
 
 
@@ -143,15 +136,17 @@ def _sight(H: Array, V: Array, phi: Array) -> Sight:
     natural = mass * np.repeat([1.0, radius, radius**2], [1, 3, 6])
     F, G = _without_bias(H, V)
     values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
-    floor = max(UNSEEN, UNSEEN * float(values[-1]))
     people = np.zeros((10, 10))
     people[0, 0], people[1:] = 1, forms.com_jacobian(phi)
     directions = people @ (natural[:, None] * vectors)
-    bread = (directions / np.maximum(values, floor)) @ vectors.T * natural
-    std = np.sqrt(np.maximum(((bread @ G) * bread).sum(1), 0))
+    # Directions that the data leave open may be off by several times their natural size, not by anything at all.
+    hidden = values < max(OPEN, UNSEEN * float(values[-1]))
+    bread = (directions[:, ~hidden] / values[~hidden]) @ vectors[:, ~hidden].T * natural
+    variance = ((bread @ G) * bread).sum(1)
     sizes = np.repeat([mass, radius, max(trace, mass * SMALLEST_RADIUS**2)], [1, 3, 6])
-    hidden = np.abs(directions[:, values < floor]) > 1e-4 * sizes[:, None]
-    std[hidden.any(1)] = np.inf
+    open_end = (directions[:, hidden] ** 2).sum(1) / OPEN
+    std = np.sqrt(np.maximum(variance, 0) + open_end)
+    std[open_end > sizes**2] = np.inf
     fixed = values > RANK_INFORMATION
     condition = float(np.sqrt(values[-1] / values[fixed][0])) if fixed.any() else np.inf
     return Sight(int(fixed.sum()), condition, std, sizes)
@@ -161,7 +156,7 @@ def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
     """Return information and score variance (10, 10) of phi with the bias projected out."""
     if len(H) == 10:
         return H, V
-    project = np.concatenate([np.eye(10), -H[:10, 10:] @ _inverse_scaled(H[10:, 10:])], 1)
+    project = np.concatenate([np.eye(10), -H[:10, 10:] @ inverse_scaled(H[10:, 10:])], 1)
     return project @ H[:, :10], project @ V @ project.T
 
 

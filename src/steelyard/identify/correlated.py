@@ -12,11 +12,11 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
 from steelyard.identify.conclude import Solution
+from steelyard.identify.linear import nonnegative
 from steelyard.identify.problem import Problem
 from steelyard.logs.log import MotionLog
 
@@ -53,7 +53,8 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
     # The fit has taken its share of the slow part of the noise out of the residual.
     lost = len(H) * max(memory, 1.0) / (6 * len(log))
     variance = variance / (1 - min(lost, 0.5)) + squares * (extra - (plain - H))
-    return _at_least(variance, LEAST_SHARE * (H + extra))
+    floor = LEAST_SHARE * nonnegative(H + extra, plain)
+    return np.asarray(floor + nonnegative(variance - floor, plain))
 
 
 def _by_blocks(log: MotionLog, K: Array, problem: Problem) -> Array:
@@ -121,10 +122,3 @@ def _convolved(values: Array, kernel: Array) -> Array:
     both[-len(kernel) + 1 :] = kernel[:0:-1]
     spectrum = np.fft.rfft(both).real[:, None] * np.fft.rfft(values, size, axis=0)
     return np.asarray(np.fft.irfft(spectrum, size, axis=0)[: len(values)])
-
-
-def _at_least(variance: Array, floor: Array) -> Array:
-    """Return the symmetric matrix with no direction below that of `floor`."""
-    values, vectors = eigh(0.5 * (variance + variance.T), floor + 1e-14 * np.trace(floor) * np.diag(np.diag(floor) > 0))
-    back = np.linalg.inv(vectors)
-    return np.asarray((back.T * np.maximum(values, 1.0)) @ back)

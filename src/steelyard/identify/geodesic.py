@@ -73,7 +73,7 @@ class Geodesic:
             step = solve_scaled(hessian, -gradient)
             decrement = -float(gradient @ step)
             if decrement < CONVERGED:
-                return Solution(x + step, np.eye(10), gamma * metric)
+                return Solution(x + step, np.eye(10), gamma * metric, aware=False)
             x = self._shorten(x, step, decrement, 0.5 * x @ H @ x - g @ x + gamma * value, H, g, gamma, prior)
         raise CannotAnswer(f"The geodesic fit did not settle in {ITERATIONS} steps; give a prior nearer to the object.")
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
+from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.problem import Problem
 from steelyard.inertia import forms
 
@@ -55,8 +56,7 @@ def _without(
     _, gradient, _ = noise_cost.derivatives(*data)
     _, _, plain = noise_cost.information(*data)
     rest = full - J.T @ plain @ J
-    scale = 1 / np.sqrt(np.maximum(np.diag(rest), 1e-12 * np.diag(full) + 1e-300))
-    step = scale * (np.linalg.pinv(rest * np.outer(scale, scale), rcond=1e-9, hermitian=True) @ (scale * (J.T @ gradient / 2)))
+    step = inverse_scaled(rest) @ (J.T @ gradient / 2)
     moved = linear + J @ step
     K = problem.residual_map(moved)
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)

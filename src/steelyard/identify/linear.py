@@ -65,3 +65,36 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
         H, g = normal_equations(T, scatter, weights)
         linear = solve_scaled(H, g)
     return linear
+
+
+@numba.njit(cache=True)
+def inverse_scaled(matrix: Array) -> Array:
+    """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal."""
+    size = matrix.shape[0]
+    scale = np.ones(size)
+    for i in range(size):
+        if matrix[i, i] > 0.0:
+            scale[i] = 1 / np.sqrt(matrix[i, i])
+    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
+    inverse = np.zeros(size)
+    for i in range(size):
+        if values[i] > RANK_TOLERANCE * values[-1]:
+            inverse[i] = 1 / values[i]
+    return (vectors * inverse) @ vectors.T * np.outer(scale, scale)
+
+
+@numba.njit(cache=True)
+def nonnegative(matrix: Array, reference: Array) -> Array:
+    """Return a symmetric matrix with negative eigenvalues set to zero, scaled by the diagonal of `reference`.
+
+    Noise taken out of a scatter matrix leaves directions that the log does not excite slightly below zero.
+    """
+    scale = np.ones(matrix.shape[0])
+    for i in range(matrix.shape[0]):
+        if reference[i, i] > 0.0:
+            scale[i] = np.sqrt(reference[i, i])
+    outer = np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T) / outer)
+    if values[0] >= 0.0:
+        return matrix
+    return (vectors * np.maximum(values, 0.0)) @ vectors.T * outer

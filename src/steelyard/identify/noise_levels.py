@@ -18,6 +18,8 @@ from steelyard.logs.moments import Moments
 ROWS_PER_AXIS = 3000
 # The wrench keeps at least this share of the residual variance that noise in the motion could also explain.
 LEAST_SHARE = 0.1
+# No class of rows is quieter than this share of the average over all.
+QUIETEST = 0.25
 # Start of the iteration: force in N and torque in N m of an everyday wrist sensor.
 FIRST_GUESS = np.repeat(np.square([0.02, 0.5]), 3)
 SMALLEST = np.repeat(np.square([1e-7, 1e-6]), 3)
@@ -67,7 +69,7 @@ def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
     """Return wrench variances (C, 6) per class from the residuals of the current weighted solution."""
     moments = Moments.of_log(log, by_block=False)
     noise = log.noise or ()
-    out = np.tile(SMALLEST, (len(noise), 1))
+    out, shares = np.tile(SMALLEST, (len(noise), 1)), np.zeros(len(noise))
     T = design(with_bias)
     acceleration = np.stack([noise[c].acceleration for c in moments.noise_class])
     wrench = np.stack([noise[c].wrench for c in moments.noise_class])
@@ -80,7 +82,9 @@ def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
         miss = np.diag(K @ moments.scatter[group] @ K.T) / (rows * (1 - lost))
         explained = (K[:, :6] ** 2) @ acceleration[group]
         out[c] = np.maximum(_pooled(np.maximum(miss - explained, LEAST_SHARE * miss), int(rows)), SMALLEST)
-    return out
+        shares[c] = rows / moments.samples
+    # A few rows in one pose can be fitted without any residual; they are not better than the sensor is elsewhere.
+    return np.maximum(out, QUIETEST * shares @ out)
 
 
 def _pooled(variance: Array, rows: int) -> Array:

@@ -62,6 +62,10 @@ class Problem:
         scatter = np.zeros((len(classes), *moments.scatter.shape[1:]))
         np.add.at(scatter, label, moments.scatter)
         acceleration = np.stack([moments.noise[c].acceleration for c in classes])
+        # A reading scatters at least as much as its noise: more noise than that was declared for another motion, and
+        # would reward the fit for inertia about axes that nothing turns.
+        seen = np.einsum("cii->ci", scatter)[:, :3] / scatter[:, 18, 18, None]
+        acceleration[:, :3] = np.minimum(acceleration[:, :3], seen)
         wrench = np.stack([moments.noise[c].wrench for c in classes])
         if (wrench <= 0).any():
             raise BadValue("Wrench noise must be above zero on every axis; a zero variance would weigh infinitely.")
