@@ -1,0 +1,7 @@
+"""Sanity: is the log what its description says, and does the answer look like one?"""
+
+from steelyard.sanity.after import after
+from steelyard.sanity.before import examine
+from steelyard.sanity.contact import untouched
+
+__all__ = ["after", "examine", "untouched"]

@@ -1,0 +1,169 @@
+"""After the fit: what the residuals and the evidence give away."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.identify.estimate import Estimate
+from steelyard.logs.alignment import Aligned
+from steelyard.logs.conditioning import noise_std
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording
+from steelyard.sanity.coverage import coverage
+from steelyard.sanity.full_fit import Rows
+from steelyard.sanity.glance import channel
+from steelyard.spatial import Rotation
+
+# chi^2 per degree of freedom outside these is far from one.
+CHI2 = (0.4, 2.5)
+# A tilt counts beyond 2 degrees and four standard deviations, where it takes 30 % of the squared residual away.
+TILT, SURE, TILT_SHARE = np.radians(2.0), 4.0, 0.7
+# A drift counts beyond 2 % of the weight (at 0.1 m for torques), where it takes 20 % of the squared residual away.
+DRIFT_WEIGHT, DRIFT_ARM, DRIFT_SHARE = 0.02, 0.1, 0.8
+# The prior dominates where it brings a standard deviation below half of what the data alone give.
+PRIOR_SHARE = 0.5
+_ROUNDS = 4
+_FEWEST_ROWS = 8
+
+
+def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recording) -> tuple[Finding, ...]:
+    """Return findings about the rows `log` that were fitted, which `aligned` gave.
+
+    Too few directions, nearly planar, base tilted, bias drift, declared noise off, an answer that is mostly the prior.
+    """
+    known = {f.code for f in aligned.findings}
+    seen = tuple(f for f in coverage(log.gravity) if f.code not in known)
+    rotation = _rotation(log, aligned)
+    tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
+    drift = () if tilted else bias_drift(log)
+    return (*seen, *tilted, *drift, *_noise_level(estimate, recording), *_prior(estimate))
+
+
+def base_tilted(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> tuple[Finding, ...]:
+    """Return `base-tilted` where another direction of gravity in W explains the wrench clearly better.
+
+    rotation (N, 3, 3) S to W at the rows of the log; gravity (3,) [m/s^2] in W as it was used. The fit is linearised
+    anew about each direction found. An accelerometer's a - g knows nothing of W: then gravity alone is compared.
+    """
+    if len(log) < _FEWEST_ROWS:
+        return ()
+    if acceleration_from == "specific_force":
+        log = replace(log, acceleration=np.zeros_like(log.acceleration))
+    given, pick = Rows.of(log)
+    R = rotation[pick]
+    level = given.solve()
+    found, phi = gravity, level.solution[:10]
+    turn, spread, left = np.zeros(3), np.zeros(3), level.left
+    for _ in range(_ROUNDS):
+        rows = _with_gravity(given, R, found)
+        columns, axes = _visible(rows, rows.tilting(phi, R, found))
+        if columns is None:
+            return ()
+        fit = rows.solve(columns, jackknife=True)
+        turn, spread, left = axes @ fit.solution[16:], np.abs(axes) @ fit.spread[16:], fit.left
+        found, phi = Rotation.exp(turn).apply(found), fit.solution[:10]
+        if np.linalg.norm(turn) < 1e-4:
+            break
+    angle = float(np.arccos(np.clip(found @ gravity / (gravity @ gravity), -1, 1)))
+    sure = angle > max(TILT, SURE * float(np.linalg.norm(spread)))
+    if not (sure and left < TILT_SHARE * level.left):
+        return ()
+    along = ", ".join(f"{v:.3f}" for v in found / np.linalg.norm(found) + 0.0)
+    message = (
+        f"Gravity fits {np.degrees(angle):.1f} ± {np.degrees(np.linalg.norm(spread)):.1g} degrees off the direction given, "
+        f"along ({along}) of W, with {100 * (1 - left / level.left):.0f} % less squared residual; the answer uses the one given."
+    )
+    return (Finding.of("base-tilted", message),)
+
+
+def bias_drift(log: MotionLog) -> tuple[Finding, ...]:
+    """Return `bias-drift` where a bias that grows with time explains much of the residual."""
+    if log.time is None or len(log) < _FEWEST_ROWS:
+        return ()
+    rows, _ = Rows.of(log)
+    steady, moving = rows.solve(), rows.solve(rows.drifting(), jackknife=True)
+    weight = abs(float(steady.solution[0])) * float(np.linalg.norm(log.gravity, axis=1).mean())
+    drift, spread = moving.solution[16:], moving.spread[16:]
+    sizes = np.array([np.linalg.norm(drift[:3]), np.linalg.norm(drift[3:])])
+    errors = np.array([np.linalg.norm(spread[:3]), np.linalg.norm(spread[3:])])
+    large = sizes > np.maximum(5 * errors, DRIFT_WEIGHT * weight * np.array([DRIFT_ARM, 1.0]))
+    if not large.any() or moving.left > DRIFT_SHARE * steady.left:
+        return ()
+    message = (
+        f"The bias drifts by {sizes[1]:.2g} ± {errors[1]:.1g} N and {sizes[0]:.2g} ± {errors[0]:.1g} N m over "
+        f"{log.time[-1] - log.time[0]:.0f} s; a line in time takes {100 * (1 - moving.left / steady.left):.0f} % of the "
+        "squared residual away."
+    )
+    return (Finding.of("bias-drift", message),)
+
+
+def _rotation(log: MotionLog, aligned: Aligned) -> Array | None:
+    """Return rotations (N, 3, 3) S to W at the rows of a log that may hold fewer rows than `aligned` gave."""
+    if aligned.rotation is None:
+        return None
+    matrix = aligned.rotation.matrix
+    if len(log) == len(matrix):
+        return matrix
+    if log.time is None or aligned.log.time is None:
+        return None
+    index = np.searchsorted(aligned.log.time, log.time)
+    return np.asarray(matrix[np.minimum(index, len(matrix) - 1)])
+
+
+def _with_gravity(rows: Rows, rotation: Array, gravity: Array) -> Rows:
+    """Return the rows for another gravity in W, with the weights kept."""
+    turned = np.swapaxes(rotation, 1, 2) @ gravity
+    return replace(rows, columns=Rows.columns_of(replace(rows.log, gravity=turned)))
+
+
+def _visible(rows: Rows, columns: Array) -> tuple[Array | None, Array]:
+    """Return tilt columns (N, 6, k) along the axes (3, k) that the log shows beside a free bias."""
+    centred = (columns - columns.mean(0)) * np.sqrt(rows.weights)[:, :, None]
+    scatter = np.einsum("nik,nil->kl", centred, centred)
+    values, axes = np.linalg.eigh(scatter)
+    kept = axes[:, values > 0.02 * max(float(values[-1]), 1e-12)]
+    return (columns @ kept, kept) if kept.shape[1] else (None, kept)
+
+
+def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...]:
+    """Return `noise-level-off` where declared wrench noise and residuals disagree."""
+    chi2 = estimate.evidence.chi2_per_dof
+    declared = {q: recording.noise[q] for q in ("force", "torque") if q in recording.noise}
+    if chi2 is None or not declared or CHI2[0] <= chi2 <= CHI2[1]:
+        return ()
+    if chi2 < 1 and not any(_too_large(recording, q, std) for q, std in declared.items()):
+        return ()
+    what = " and ".join(f"{q} {std:g} {'N' if q == 'force' else 'N m'}" for q, std in declared.items())
+    message = (
+        f"chi^2 per degree of freedom is {chi2:.2g}: the residuals are {np.sqrt(chi2):.2g} times what the declared noise "
+        f"({what}) and the model explain."
+    )
+    return (Finding.of("noise-level-off", message),)
+
+
+def _too_large(recording: Recording, quantity: str, std: float) -> bool:
+    """Tell whether a declared standard deviation is twice the raw channel's own; a low-pass alone lowers chi^2 too."""
+    levels = [float(noise_std(v).mean()) for s, _, v in channel(recording, quantity) if s.time is not None]
+    return not levels or std > 2 * max(levels)
+
+
+def _prior(estimate: Estimate) -> tuple[Finding, ...]:
+    """Return `prior-dominated` where a number called identified owes its precision to the prior."""
+    spread = estimate.evidence.spread
+    if spread is None:
+        return ()
+    alone = spread / 2
+    names = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
+    led = estimate.identified & (estimate.std < PRIOR_SHARE * alone)
+    if not led.any():
+        return ()
+    worst = int(np.argmax(np.where(led, alone / np.maximum(estimate.std, 1e-300), 0)))
+    message = (
+        f"The prior decides {', '.join(n for n, own in zip(names, led, strict=True) if own)}: for {names[worst]} the data "
+        f"alone have a standard deviation {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the one shown."
+    )
+    return (Finding.of("prior-dominated", message),)

@@ -1,0 +1,250 @@
+"""Conventions: sign of the wrench, sense of the rotation, order of quaternions, direction of gravity, unit of torque.
+
+The log as given is fitted beside the log under each rival convention (see `glance`). A rival is claimed only where it
+
+* leaves less than a quarter of the force variance that the log as given leaves, and no more of the torque's;
+* explains at least half of the force variance, by a mass of the right sign beyond five jackknife standard deviations;
+* leaves less than half of what a freely tilted gravity would leave.
+
+Then it is no matter of noise, and the recording is returned as the rival reads it. All forces and torques scaled
+alike (lbf for N) fit as well as before, and so do the sign of the wrench and of gravity on a log at rest: no fit can
+tell them apart, and the messages say so.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.recording import Recording
+from steelyard.sanity.glance import Glance, channel, glance, rolled
+from steelyard.sanity.static_fit import StaticFit, fit, solve
+from steelyard.sanity.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
+from steelyard.sanity.units import scaled
+
+# A rival leaves less than this share of the force variance that the log as given leaves.
+MUCH_BETTER = 0.25
+# No hand holds a mass this far from its sensor [m].
+FURTHEST_ARM = 2.0
+# Gravity found this far off is corrected at once; beyond STEEP no base is that crooked [rad].
+CERTAIN_TILT, STEEP = np.radians(5.0), np.radians(60.0)
+# A sensor mounted this much askew is worth a word [rad].
+SENSOR_TURN = np.radians(10.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One way to read the recording: the code and words of what would be wrong, gravity, rotations, and its fit."""
+
+    code: str
+    words: str
+    gravity: Array
+    rotation: Array | None
+    fit: StaticFit
+    quaternion_shift: int = 0
+    transposed: bool = False
+
+
+def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording in the conventions that explain it, and a finding for each that was not as said."""
+    view = glance(recording)
+    if view is None:
+        return recording, ()
+    found: list[Finding] = []
+    reading = _reading(view, "", "", recording.gravity, view.rotation)
+    best = _best_rival(view, reading)
+    if best is not None:
+        found.append(_rival_finding(best, reading))
+        recording, reading = _as_read(recording, best), best
+    flipped, findings = _signs(recording, view, reading)
+    if findings:
+        reading = _reading(view, "", "", flipped.gravity, reading.rotation)
+    recording = flipped
+    found.extend(findings)
+    recording, findings = _lengths(recording, reading.fit)
+    found.extend(findings)
+    if best is None and reading.rotation is not None:
+        recording, findings = _level(recording, view, reading)
+        found.extend(findings)
+    return recording, tuple(found)
+
+
+def _reading(
+    view: Glance, code: str, words: str, gravity: Array, rotation: Array | None, shift: int = 0, transposed: bool = False
+) -> Reading:
+    """Return a reading with the better of two fits: with the measured acceleration and without."""
+    found = fit(*view.seen(gravity, rotation), view.block)
+    if view.acceleration is not None:
+        still = fit(*replace(view, acceleration=None).seen(gravity, rotation), view.block)
+        found = min(found, still, key=lambda f: f.force_share)
+    return Reading(code, words, gravity, rotation, found, shift, transposed)
+
+
+def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
+    """Yield the ways in which rotation or gravity are commonly misread."""
+    R = view.rotation
+    if R is None:
+        return
+    words = "rotation turns W into S, not S into W"
+    yield _reading(view, "gravity-frame", words, gravity, np.swapaxes(R, 1, 2), transposed=True)
+    for shift, order in ((-1, "w first where it is last"), (1, "w last where it is first")):
+        words = f"the four numbers of each quaternion were read with {order}"
+        yield _reading(view, "quaternion-order", words, gravity, rolled(R, shift), shift=shift)
+    size = float(np.linalg.norm(gravity))
+    for axis in range(3):
+        if abs(gravity[axis]) < 0.8 * size:
+            for sign in (-1, 1):
+                words = f"gravity points along {'+' if sign > 0 else '-'}{'xyz'[axis]} of W"
+                yield _reading(view, "gravity-frame", words, sign * size * np.eye(3)[axis], R)
+
+
+def _best_rival(view: Glance, given: Reading) -> Reading | None:
+    """Return the rival that beats the reading as given, if there is one."""
+    if view.rotation is None or given.fit.force_share < 1e-3:
+        return None
+    free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
+    bar = MUCH_BETTER * given.fit.force_share
+    able = [
+        r
+        for r in _rivals(view, given.gravity)
+        if r.fit.force_share < min(bar, 0.5)
+        and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
+        and r.fit.sign != 0
+        and _varies(view, r)
+        and (r.code != "gravity-frame" or r.transposed or free is None or r.fit.force_share < 2 * free.force_share + 1e-3)
+        and (not (r.transposed or r.quaternion_shift) or free is None or r.fit.force_share < 0.5 * free.force_share)
+    ]
+    # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
+    return min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
+
+
+def _varies(view: Glance, reading: Reading) -> bool:
+    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
+    _, pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation)
+    return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
+
+
+def _rival_finding(best: Reading, given: Reading) -> Finding:
+    message = (
+        f"{best.words[0].upper()}{best.words[1:]}; so read, {_percent(best.fit.force_share)} of the force variance is left "
+        f"unexplained instead of {_percent(given.fit.force_share)}. The answer assumes this."
+    )
+    return Finding.of(best.code, message)
+
+
+def _as_read(recording: Recording, best: Reading) -> Recording:
+    """Return the recording with its rotations and gravity as the reading has them."""
+
+    def corrected(values: Array) -> Array:
+        return np.swapaxes(values, 1, 2) if best.transposed else rolled(values, best.quaternion_shift)
+
+    if not (best.transposed or best.quaternion_shift):
+        return replace(recording, gravity=best.gravity)
+    streams = tuple(
+        replace(s, channels={q: corrected(v) if q == "rotation" else v for q, v in s.channels.items()})
+        for s in recording.streams
+    )
+    return replace(recording, streams=streams)
+
+
+def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the wrench or gravity turned round where the mass comes out negative."""
+    if reading.fit.sign >= 0 or view.sign_free:
+        return recording, ()
+    mass = f"The mass comes out as {reading.fit.mass:.3g} ± {reading.fit.mass_std:.2g} kg"
+    moved = _moved_sign(view, reading)
+    upside_down = moved > 0
+    if moved == 0 and reading.rotation is not None:
+        # Nothing but habit can tell: a world whose z points down is rarer than a wrench of the other sign.
+        upside_down = float(recording.gravity[2]) > 0.8 * float(np.linalg.norm(recording.gravity))
+    doubt = "" if moved else "; a log at rest cannot tell the sign of the wrench from the sign of gravity"
+    if upside_down:
+        message = f"{mass}, so gravity points the other way in W; it was turned round{doubt}."
+        return replace(recording, gravity=-recording.gravity), (Finding.of("gravity-frame", message),)
+    was, now = ("on-object", "on-sensor") if recording.wrench_sign > 0 else ("on-sensor", "on-object")
+    message = f'{mass}, so the wrench has the other sign; it was taken as "{now}" instead of "{was}"{doubt}.'
+    return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
+
+
+def _moved_sign(view: Glance, reading: Reading) -> int:
+    """Return the sign of the mass that the measured acceleration shows; 0 where none is measured or it is too weak."""
+    if view.acceleration is None or reading.rotation is None:
+        return 0
+    wrench, pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation)
+    _, slowed = view.seen(np.zeros(3), reading.rotation)
+    masses, spread, _ = solve(np.stack([-slowed, -pull], 2), wrench[:, 3:], view.block)
+    sure = abs(masses[0]) > 5 * spread[0] and 0.5 < abs(masses[0] / masses[1]) < 2
+    return int(np.sign(masses[0])) if sure else 0
+
+
+def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with torques in N m where the centre of mass lies metres away."""
+    size, spread = float(np.linalg.norm(found.moment)), float(np.linalg.norm(found.moment_std))
+    if not found.sign or found.arm < FURTHEST_ARM or size < 5 * spread or found.torque_share > 0.7:
+        return recording, ()
+    where = f"The centre of mass comes out {found.arm:.3g} m from the sensor, with a mass of {abs(found.mass):.3g} kg"
+    stream = next((s for s in recording.streams if "torque" in s.channels and "force" in s.channels), None)
+    if stream is None:
+        return recording, ()
+    if found.arm / 1000 < FURTHEST_ARM and abs(found.mass) < 0.02:
+        message = f"{where}: the force is a thousand times too small, as when kN are read as N; it was multiplied by 1000."
+        return scaled(recording, stream, ("force",), 1e3), (Finding.of("force-unit", message),)
+    if found.arm / 1000 < FURTHEST_ARM:
+        message = f"{where}: the torque is in N mm; it was divided by 1000."
+        return scaled(recording, stream, ("torque",), 1e-3), (Finding.of("length-in-mm", message),)
+    message = f"{where}: the units of force and torque do not belong together."
+    return recording, (Finding.of("force-unit", message),)
+
+
+def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with gravity along the direction that the wrench shows, where that is plainly another."""
+    tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
+    turned = turned_sensor(view, reading.gravity, reading.fit.mass)
+    if turned is not None and _sensor_turned(turned, tilt, reading.fit):
+        message = (
+            f"S seems turned by {np.degrees(turned.angle):.0f} degrees about ({_shown(turned.axis)}) of S against the frame "
+            f"whose rotation is given: so read, {_percent(turned.force_share)} of the force variance is left unexplained "
+            f"instead of {_percent(reading.fit.force_share)}; the answer does not assume this."
+        )
+        return recording, (Finding.of("gravity-frame", message),)
+    if tilt is None or not _plain(tilt, reading.fit):
+        return recording, ()
+    code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
+    message = (
+        f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction given, along "
+        f"({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction found"
+        f"{tilt.blind_words}."
+    )
+    return replace(recording, gravity=tilt.gravity), (Finding.of(code, message),)
+
+
+def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> bool:
+    """Tell whether a constant turn of S explains what neither the given nor a tilted gravity does."""
+    return (
+        turned.angle > SENSOR_TURN
+        and turned.force_share < min(MUCH_BETTER * given.force_share, 0.3)
+        and given.force_share > 1e-3
+        and (tilt is None or turned.force_share < 0.5 * tilt.force_share)
+    )
+
+
+def _plain(tilt: GlanceTilt, given: StaticFit) -> bool:
+    """Tell whether the tilt is large, sure, and explains most of what the given direction leaves."""
+    return (
+        tilt.angle > max(CERTAIN_TILT, 5 * tilt.angle_std)
+        and tilt.force_share < 0.4 * given.force_share
+        and tilt.force_share < 0.3
+        and tilt.torque_share < 1.1 * given.torque_share + 1e-3
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"
+
+
+def _shown(vector: Array) -> str:
+    return ", ".join(f"{v:.3f}" for v in vector + 0.0)

@@ -1,0 +1,128 @@
+"""Full fit: ten parameters and a bias by weighted least squares, with room for what a log should not contain.
+
+Extra columns (a drift, a tilt of gravity) are judged by how much they explain and by leaving out stretches of the log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import design, motion_map
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import features
+from steelyard.spatial import cross_matrix
+
+_MOST_ROWS = 3000
+_BLOCKS = 12
+_SMALLEST = 1e-9
+
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class FullFit:
+    """Weighted solution of a log.
+
+    solution  (p,) phi (10), bias (6), then the extra columns
+    spread    (p,) standard deviations by leaving out stretches
+    left      weighted sum of squares, over the same weights for every fit of one `Rows`
+    """
+
+    solution: Array
+    spread: Array
+    left: float
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A thinned log as a linear problem: columns (N, 6, 16), values (N, 6), weights (N, 6), block (N,)."""
+
+    log: MotionLog
+    columns: Array
+    values: Array
+    weights: Array
+    block: Integers
+
+    @classmethod
+    def of(cls, log: MotionLog) -> tuple[Rows, Integers]:
+        """Return the rows and which rows of the log they are; weights from the residuals of each class of rows."""
+        pick = np.unique(np.linspace(0, len(log) - 1, min(len(log), _MOST_ROWS)).astype(np.int64))
+        thin = log.rows(pick)
+        rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
+        for _ in range(2):
+            rows = replace(rows, weights=_weights(rows, rows.solve().solution))
+        return rows, pick
+
+    @staticmethod
+    def columns_of(log: MotionLog) -> Array:
+        """Return the regressor (N, 6, 16) of parameters and bias."""
+        return np.asarray(-np.einsum("pij,nj->nip", design(True), features(log), optimize=True))
+
+    def solve(self, extra: Array | None = None, jackknife: bool = False) -> FullFit:
+        """Return the solution with extra columns (N, 6, k)."""
+        X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
+        both = np.concatenate([X, self.values[:, :, None]], 2) * np.sqrt(self.weights)[:, :, None]
+        blocks = int(self.block.max()) + 1
+        scatter = np.stack([_gram(both[self.block == b]) for b in range(blocks)]) if jackknife else _gram(both)[None]
+        total, size = scatter.sum(0), X.shape[2]
+        solution = _solution(total, size)
+        left = float(total[size, size] - 2 * solution @ total[:size, size] + solution @ total[:size, :size] @ solution)
+        spread = np.zeros(size)
+        if jackknife and blocks > 2:
+            parts = np.stack([_solution(total - s, size) for s in scatter])
+            spread = np.sqrt((blocks - 1) / blocks * ((parts - solution) ** 2).sum(0))
+        return FullFit(solution, spread, max(left, 0.0))
+
+    def tilting(self, phi: Array, rotation: Array, gravity: Array) -> Array:
+        """Return the derivative (N, 6, 3) of the wrench by a small turn of gravity (3,) in W [rad]."""
+        return np.asarray(motion_map(phi)[:, 3:6] @ (np.swapaxes(rotation, 1, 2) @ cross_matrix(gravity)))
+
+    def drifting(self) -> Array:
+        """Return columns (N, 6, 6) of a bias that grows by one over the log."""
+        if self.log.time is None:
+            return np.zeros((len(self.values), 6, 6))
+        time = self.log.time
+        run = (time - time.mean()) / max(float(time[-1] - time[0]), _SMALLEST)
+        return np.asarray(run[:, None, None] * np.eye(6))
+
+
+def _gram(rows: Array) -> Array:
+    flat = rows.reshape(-1, rows.shape[2])
+    return np.asarray(flat.T @ flat)
+
+
+def _solution(scatter: Array, size: int) -> Array:
+    H, g = scatter[:size, :size], scatter[:size, size]
+    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    values, axes = np.linalg.eigh(H * np.outer(scale, scale))
+    inverse = np.where(values > 1e-9 * values[-1], 1 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * g)))))
+
+
+def _first_weights(log: MotionLog) -> Array:
+    spread = np.maximum(log.wrench.var(0), _SMALLEST)
+    return np.broadcast_to(1 / spread, log.wrench.shape).copy()
+
+
+def _weights(rows: Rows, solution: Array) -> Array:
+    """Return inverse variances (N, 6) of the residuals, by class of rows and kind of channel."""
+    miss = rows.values - rows.columns @ solution
+    out = np.empty_like(miss)
+    for kind in np.unique(rows.log.noise_class):
+        at = rows.log.noise_class == kind
+        variance = (1.4826 * np.median(np.abs(miss[at]), 0)) ** 2 + 0.01 * miss[at].var(0)
+        out[at] = 1 / np.maximum(np.repeat(variance.reshape(2, 3).mean(1), 3), _SMALLEST**2)
+    return out
+
+
+def _blocks(log: MotionLog) -> Integers:
+    """Return the stretch (N,) each row belongs to: even stretches of time, or the rows of a table one by one."""
+    if log.time is None:
+        return np.arange(len(log)) % min(len(log), 4 * _BLOCKS)
+    share = (log.time - log.time[0]) / max(float(log.time[-1] - log.time[0]), _SMALLEST)
+    block = np.minimum((share * _BLOCKS).astype(np.int64), _BLOCKS - 1)
+    return np.asarray(np.unique(block, return_inverse=True)[1].astype(np.int64))

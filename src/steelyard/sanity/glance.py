@@ -1,0 +1,209 @@
+"""Glance: a log at a few hertz, just good enough to compare conventions before anything is aligned.
+
+Clocks are taken as they are, the wrench is averaged over what a hundredth of a second holds, and everything is
+low-passed alike, so that a body at rest or in slow motion obeys f = m (a - g), tau = h x (a - g), each with a bias.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.conditioning import lowpass
+from steelyard.logs.imu import first_mount
+from steelyard.logs.recording import Recording, Stream
+from steelyard.spatial import Rotation
+
+CUTOFF_HZ = 3.0
+_RATE_HZ = 100.0
+_MOST_ROWS = 20_000
+_FEWEST_ROWS = 60
+_BLOCKS = 12
+
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class Glance:
+    """Rows of a recording on one even clock, or the rows of a table.
+
+    wrench        (N, 6) [tau (N m), f (N)] on-object, about the S origin, in S or (where `world`) in W axes
+    rotation      (N, 3, 3) S to W, averaged over a row; None without
+    pull          (N, 3) [m/s^2] gravity in S from a channel, where there is no rotation
+    acceleration  (N, 3) [m/s^2] of the S origin in W, without gravity; None where no channel tells it
+    block         (N,) number of the stretch (or the pose) a row belongs to, for the jackknife
+    rate          [Hz] of the rows; None for a table
+    world         the wrench is in W axes
+    sign_free     `pull` comes from an accelerometer whose mount the force itself decided, so that a mass has no sign
+    """
+
+    wrench: Array
+    rotation: Array | None
+    pull: Array | None
+    acceleration: Array | None
+    block: Integers
+    rate: float | None
+    world: bool = False
+    sign_free: bool = False
+
+    def __len__(self) -> int:
+        return len(self.wrench)
+
+    def smooth(self, values: Array) -> Array:
+        """Return values (N, k) through the common low-pass; the rows of a table as they are."""
+        return values if self.rate is None else lowpass(values, CUTOFF_HZ, self.rate, order=2)
+
+    def seen(self, gravity: Array, rotation: Array | None) -> tuple[Array, Array]:
+        """Return wrench (N, 6) and gravity less acceleration (N, 3), in S, for a gravity in W (3,) and rotations."""
+        if rotation is None:
+            pull = self.pull if self.pull is not None else np.zeros((len(self), 3))
+            return self.smooth(self.wrench), self.smooth(pull)
+        own = gravity if self.acceleration is None else gravity - self.acceleration
+        pull = np.einsum("nji,nj->ni", rotation, np.broadcast_to(own, (len(self), 3)))
+        wrench = self.wrench
+        if self.world:
+            wrench = np.concatenate(
+                [np.einsum("nji,nj->ni", rotation, part) for part in (wrench[:, :3], wrench[:, 3:])], 1
+            )
+        return self.smooth(wrench), self.smooth(pull)
+
+
+def glance(recording: Recording) -> Glance | None:
+    """Return the rows, or None where the recording has no wrench, no direction of gravity, or next to no rows."""
+    stream = next((s for s in recording.streams if {"force", "torque"} <= set(s.channels)), None)
+    if stream is None:
+        return None
+    return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
+
+
+def channel(recording: Recording, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
+    """Yield stream, quantity and values of every channel that holds one of the quantities."""
+    for quantity in quantities:
+        for stream in recording.streams:
+            if quantity in stream.channels:
+                yield stream, quantity, stream.channels[quantity]
+
+
+def resampled(time: Array, values: Array, grid: Array) -> Array:
+    """Return the mean of `values` (N, k) over each step of the even `grid` (M,) [s], linear between samples."""
+    flat = values.reshape(len(values), -1)
+    step = float(grid[1] - grid[0])
+    origin = flat.mean(0)
+    area = np.cumsum(0.5 * np.diff(time)[:, None] * (flat[1:] + flat[:-1] - 2 * origin), 0)
+    area = np.concatenate([np.zeros((1, flat.shape[1])), area])
+    low, high = np.clip(grid - step / 2, time[0], time[-1]), np.clip(grid + step / 2, time[0], time[-1])
+    edges = _area_at(time, flat - origin, area, np.concatenate([low, high]))
+    width = np.maximum(high - low, 1e-12)[:, None]
+    return np.asarray((edges[len(grid) :] - edges[: len(grid)]) / width + origin).reshape(len(grid), *values.shape[1:])
+
+
+def _area_at(time: Array, values: Array, area: Array, at: Array) -> Array:
+    """Return the integral (M, k) of the piecewise linear signal up to `at` (M,)."""
+    left = np.clip(np.searchsorted(time, at, "right") - 1, 0, len(time) - 2)
+    h = (at - time[left])[:, None]
+    slope = (values[left + 1] - values[left]) / np.maximum(time[left + 1] - time[left], 1e-12)[:, None]
+    return np.asarray(area[left] + h * values[left] + 0.5 * h**2 * slope)
+
+
+def _wrench(recording: Recording, stream: Stream) -> tuple[Array, bool]:
+    """Return [tau, f] (N, 6) on-object in the stream's axes turned into S, and whether they are W axes."""
+    torque, force = stream.channels["torque"], stream.channels["force"]
+    mount = stream.mount
+    world = stream.frames.get("force", "S") == "W"
+    if mount is not None and mount.rotation is not None and not world:
+        torque, force = mount.rotation.apply(torque), mount.rotation.apply(force)
+    if mount is not None and mount.position is not None and not world:
+        torque = torque + np.cross(mount.position, force)
+    return recording.wrench_sign * np.concatenate([torque, force], 1), world
+
+
+def _of_table(recording: Recording, stream: Stream) -> Glance | None:
+    wrench, world = _wrench(recording, stream)
+    rows = len(wrench)
+    if any(len(s) != rows for s in recording.streams) or rows < 3:
+        return None
+    rotation = next((v for _, _, v in channel(recording, "rotation")), None)
+    pull = None
+    if rotation is None:
+        pull = _pull_channel(recording, [v for _, _, v in channel(recording, "gravity", "specific_force")], wrench)
+        if pull is None:
+            return None
+    return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, rotation is None and _loose(recording))
+
+
+def _pull_channel(recording: Recording, values: list[Array], wrench: Array) -> Array | None:
+    """Return gravity in S from a gravity channel, else from an accelerometer whose mount is known or found."""
+    found = next(iter(channel(recording, "gravity", "specific_force")), None)
+    if found is None or not values:
+        return None
+    stream, quantity, _ = found
+    turn = None if stream.mount is None else stream.mount.rotation
+    if quantity == "gravity":
+        return values[0] if turn is None else turn.apply(values[0])
+    return -(turn or first_mount(values[0], None, wrench[:, 3:])).apply(values[0])
+
+
+def _loose(recording: Recording) -> bool:
+    """Tell whether gravity in S can come only from an accelerometer whose mount is not given."""
+    found = next(iter(channel(recording, "gravity", "specific_force")), None)
+    if found is None or found[1] == "gravity":
+        return False
+    mount = found[0].mount
+    return mount is None or mount.rotation is None
+
+
+def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
+    timed = [s for s in recording.streams if s.time is not None and len(s) > 3]
+    used = [s for s in timed if s is stream or {"rotation", "gravity", "specific_force", "position"} & set(s.channels)]
+    if stream not in used:
+        return None
+    start = max(float(s.time[0]) - (s.delay or 0.0) for s in used if s.time is not None)
+    end = min(float(s.time[-1]) - (s.delay or 0.0) for s in used if s.time is not None)
+    rate = min(_RATE_HZ, _MOST_ROWS / max(end - start, 1e-9))
+    rows = int((end - start) * rate)
+    if rows < _FEWEST_ROWS or rate < 4 * CUTOFF_HZ:
+        return None
+    grid = start + (np.arange(rows) + 0.5) / rate
+
+    def on_grid(s: Stream, values: Array) -> Array:
+        clock = np.asarray(s.time) - (s.delay or 0.0)
+        return resampled(clock, values, grid)
+
+    raw, world = _wrench(recording, stream)
+    wrench = on_grid(stream, raw)
+    rotation = next((on_grid(s, v) for s, _, v in channel(recording, "rotation") if s in used), None)
+    pull = None
+    if rotation is None:
+        values = [on_grid(s, v) for s, _, v in channel(recording, "gravity", "specific_force") if s in used]
+        pull = _pull_channel(recording, values, wrench)
+        if pull is None:
+            return None
+    acceleration = _acceleration(recording, rotation, on_grid, rate)
+    block = np.minimum(np.arange(rows) * _BLOCKS // rows, _BLOCKS - 1)
+    return Glance(wrench, rotation, pull, acceleration, block, rate, world, rotation is None and _loose(recording))
+
+
+def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, rate: float) -> Array | None:
+    """Return the acceleration (N, 3) of the S origin in W from the first channel that tells it."""
+    if rotation is None:
+        return None
+    for stream, quantity, values in channel(recording, "linear_acceleration", "linear_velocity", "position"):
+        if stream.time is None:
+            continue
+        smooth = lowpass(on_grid(stream, values), CUTOFF_HZ, rate, order=2)
+        if quantity != "position" and stream.frames.get(quantity, "S") == "S":
+            smooth = np.einsum("nij,nj->ni", rotation, smooth)
+        for _ in range({"linear_acceleration": 0, "linear_velocity": 1, "position": 2}[quantity]):
+            smooth = np.gradient(smooth, 1 / rate, axis=0)
+        return np.asarray(smooth)
+    return None
+
+
+def rolled(rotation: Array, places: int) -> Array:
+    """Return rotations (N, 3, 3) whose quaternions had their four numbers read `places` further on."""
+    quaternion = Rotation.nearest(rotation).quaternion_wxyz()
+    return Rotation.from_quaternion_wxyz(np.roll(quaternion, places, -1)).matrix

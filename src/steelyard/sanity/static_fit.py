@@ -1,0 +1,87 @@
+"""Static fit: mass and first moment of mass that explain a wrench by gravity, and how much they leave unexplained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.spatial import cross_matrix
+
+# A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
+LEAST_SHARE = 1e-4
+
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+
+@dataclass(frozen=True, eq=False)
+class StaticFit:
+    """What one set of conventions makes of a log.
+
+    mass, mass_std        [kg]; the standard deviation by leaving out one stretch or pose after the other
+    moment, moment_std    (3,) first moment of mass [kg m]
+    force_share, torque_share   variance left over the variance that a bias alone leaves
+    """
+
+    mass: float
+    mass_std: float
+    moment: Array
+    moment_std: Array
+    force_share: float
+    torque_share: float
+
+    @property
+    def cost(self) -> float:
+        """Logarithm of the product of both shares: differences are those of a profile likelihood per row and axis."""
+        return float(np.log(max(self.force_share, LEAST_SHARE)) + np.log(max(self.torque_share, LEAST_SHARE)))
+
+    @property
+    def arm(self) -> float:
+        """Distance of the centre of mass from the sensor [m]; infinite without mass."""
+        size = float(np.linalg.norm(self.moment))
+        return size / abs(self.mass) if self.mass else float("inf")
+
+    @property
+    def sign(self) -> int:
+        """Sign of the mass where it is beyond five standard deviations and explains something, else 0."""
+        sure = abs(self.mass) > 5 * self.mass_std and self.force_share < 0.7
+        return int(np.sign(self.mass)) if sure else 0
+
+
+def fit(wrench: Array, pull: Array, block: Integers) -> StaticFit:
+    """Fit f = -m pull + bias and tau = pull x h + bias to rows of wrench (N, 6) and pull = g - a (N, 3)."""
+    mass = solve(-pull[:, :, None], wrench[:, 3:], block)
+    moment = solve(cross_matrix(pull), wrench[:, :3], block)
+    return StaticFit(float(mass[0][0]), float(mass[1][0]), moment[0], moment[1], mass[2], moment[2])
+
+
+def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array, float]:
+    """Return least squares with a free bias: solution (k,), jackknife std (k,), share of variance left.
+
+    columns (N, 3, k), values (N, 3), block (N,)
+    """
+    count, size = len(values), columns.shape[2]
+    both = np.concatenate([columns, values[:, :, None]], 2)
+    both = both - both.mean(0)
+    per_row = np.einsum("nik,nil->nkl", both, both)
+    blocks = int(block.max()) + 1
+    scatter = np.zeros((blocks, size + 1, size + 1))
+    np.add.at(scatter, block, per_row)
+    total = scatter.sum(0)
+    solution = _least_norm(total[:size, :size], total[:size, size])
+    rest = total - scatter[np.bincount(block, minlength=blocks) > 0]
+    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
+    spread = np.sqrt((len(rest) - 1) / len(rest) * ((left_out - solution) ** 2).sum(0))
+    variance = float(total[size, size])
+    left = variance - float(solution @ total[:size, size])
+    freedom = max(3 * count - 3 - size, 1) / max(3 * count - 3, 1)
+    share = max(left, 0.0) / variance / freedom if variance > 0 else 1.0
+    return solution, spread, min(share, 1.0)
+
+
+def _least_norm(matrix: Array, vector: Array) -> Array:
+    values, axes = np.linalg.eigh(matrix)
+    inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray(axes @ (inverse * (axes.T @ vector)))

@@ -1,0 +1,129 @@
+"""Tilt: the direction of gravity in W taken from the wrench itself.
+
+Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone gives the direction without a start value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.sanity.glance import Glance
+from steelyard.sanity.static_fit import Integers, fit, solve
+
+# Directions of W that the rotations show this much less (in variance) than the best one are left as given.
+_BLIND = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class GlanceTilt:
+    """Gravity (3,) in W [m/s^2] that fits best, its angle to the given one and std [rad], and what it leaves.
+
+    blind   (3,) a direction of W along which gravity cannot be seen, None where all are
+    """
+
+    gravity: Array
+    angle: float
+    angle_std: float
+    force_share: float
+    torque_share: float
+    blind: Array | None = None
+
+    @property
+    def blind_words(self) -> str:
+        """Say which part of a tilt stays unseen."""
+        if self.blind is None:
+            return ""
+        axis = ", ".join(f"{v:.2f}" for v in self.blind * np.sign(self.blind[np.abs(self.blind).argmax()]) + 0.0)
+        return f"; a tilt toward ({axis}) of W cannot be seen in this motion"
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A constant turn between S and the frame whose rotation is given: angle [rad], axis (3,) in S, what it leaves."""
+
+    angle: float
+    axis: Array
+    force_share: float
+
+
+def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -> GlanceTilt | None:
+    """Return the gravity that fits best; None without rotations or where nothing is seen of it.
+
+    `mass` [kg] turns the measured acceleration into a force; its sign is taken from the fit as given.
+    """
+    if rotation is None:
+        return None
+    still = replace(view, acceleration=None)
+    wrench, _ = still.seen(gravity, rotation)
+    force = wrench[:, 3:]
+    if view.acceleration is not None:
+        force = force + mass * view.seen(np.zeros(3), rotation)[1]
+    turned = np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)
+    columns = -still.smooth(turned).reshape(-1, 3, 3)
+    sign = np.sign(mass) or 1.0
+    weight, spread, seen = free_direction(columns, force, view.block, sign * gravity)
+    if weight is None:
+        return None
+    found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
+    angle = angle_between(found, gravity)
+    best = fit(*(still if view.acceleration is None else view).seen(found, rotation), view.block)
+    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _blind_axis(seen))
+
+
+def free_direction(columns: Array, force: Array, block: Integers, gravity: Array) -> tuple[Array | None, float, Array]:
+    """Return u (3,) of f = columns u + bias, the jackknife std of its angle [rad], and what is seen (3, 3).
+
+    columns (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that the columns do not show.
+    """
+    centred = columns - columns.mean(0)
+    scatter = np.einsum("nik,nil->kl", centred, centred)
+    values, axes = np.linalg.eigh(scatter)
+    shown = axes[:, values > _BLIND * max(float(values[-1]), 1e-12)]
+    seen = shown @ shown.T
+    if values[-1] < 1e-4 * len(force):
+        return None, 0.0, seen
+
+    def solution(keep: np.ndarray) -> Array:  # type: ignore[type-arg]
+        X = columns[keep] @ shown
+        X, y = X - X.mean(0), force[keep] - force[keep].mean(0)
+        part = np.linalg.lstsq(X.reshape(-1, X.shape[2]), y.ravel(), rcond=None)[0]
+        u = shown @ part
+        # The unseen part of gravity keeps its share: the seen part gives the weight.
+        scale = np.linalg.norm(u) / max(float(np.linalg.norm(seen @ gravity)), 1e-9)
+        return np.asarray(u + scale * (gravity - seen @ gravity))
+
+    everything = solution(np.ones(len(force), bool))
+    parts = [solution(block != b) for b in np.unique(block)]
+    angles = np.array([angle_between(p, everything) for p in parts])
+    count = len(parts)
+    return everything, float(np.sqrt((count - 1) / count * (angles**2).sum())), seen
+
+
+def angle_between(a: Array, b: Array) -> float:
+    """Return the angle [rad] between two vectors (3,)."""
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
+def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
+    """Return the constant turn of S that explains the force best (Wahba), None without rotations."""
+    if view.rotation is None:
+        return None
+    wrench, pull = replace(view, acceleration=None).seen(gravity, view.rotation)
+    force, down = wrench[:, 3:] - wrench[:, 3:].mean(0), -(pull - pull.mean(0)) * (np.sign(mass) or 1.0)
+    u, _, vt = np.linalg.svd(force.T @ down)
+    u[:, 2] *= np.linalg.det(u @ vt)
+    X = u @ vt
+    axis = np.array([X[2, 1] - X[1, 2], X[0, 2] - X[2, 0], X[1, 0] - X[0, 1]]) / 2
+    angle = float(np.arctan2(np.linalg.norm(axis), (np.trace(X) - 1) / 2))
+    _, _, share = solve((down @ X.T)[:, :, None], force, view.block)
+    return Turn(angle, axis / max(float(np.linalg.norm(axis)), 1e-12), share)
+
+
+def _blind_axis(seen: Array) -> Array | None:
+    if np.trace(seen) > 2.5:
+        return None
+    values, axes = np.linalg.eigh(seen)
+    return np.asarray(axes[:, 0])
