@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -42,6 +43,32 @@ def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
         log = replace(log, noise=tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True)))
         levels = np.where(unknown, _wrench_levels(log, with_bias), levels)
     return replace(log, noise=tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True)))
+
+
+def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
+    """Return the log with declared standard deviations in place, and wrench noise that is not declared left open.
+
+    declared   any of force [N], torque [N m], acceleration [m/s^2], angular_acceleration [rad/s^2]
+    """
+    if log.noise is None:
+        log = _with_classes(log)
+    noise = tuple(
+        Noise(
+            _declared(n.acceleration, declared, ("angular_acceleration", "acceleration")),
+            _declared(np.zeros(6), declared, ("torque", "force")),
+        )
+        for n in log.noise or ()
+    )
+    return replace(log, noise=noise)
+
+
+def _declared(variance: Array, declared: Mapping[str, float], names: tuple[str, str]) -> Array:
+    """Return variances (6,) with the triples that are declared replaced."""
+    out = np.array(variance)
+    for k, name in enumerate(names):
+        if name in declared:
+            out[3 * k : 3 * k + 3] = declared[name] ** 2
+    return out
 
 
 def _with_classes(log: MotionLog) -> MotionLog:

@@ -18,6 +18,7 @@ from steelyard.identify.fit import Bias
 from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.noise_aware import NoiseAware
+from steelyard.identify.noise_levels import with_declared
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
@@ -62,7 +63,7 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     aligned = align(recording)
     bias = Bias(options.bias, drift=options.drift)
     keep, touched = untouched(aligned.log, bias.free)
-    log = aligned.log.rows(keep)
+    log = with_declared(aligned.log.rows(keep), recording.noise)
     estimator, notes = _estimator(options, log, bias)
     estimate = estimator.identify(log)
     if known is not None:
