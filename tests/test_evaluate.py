@@ -66,9 +66,7 @@ def test_riemannian_is_a_metric_that_does_not_see_frames():
     away = Pose(Rotation.exp([0.3, -0.5, 0.9]), np.array([0.3, 0.1, -0.7]))
     assert evaluate.riemannian(one.in_frame(away), two.in_frame(away)) == pytest.approx(here)
     stretch = np.diag([1000.0, 1000.0, 1000.0, 1.0])
-    scaled = (
-        InertialParameters.from_pseudo_inertia(stretch @ b.pseudo_inertia @ stretch) for b in (one, two)
-    )
+    scaled = (InertialParameters.from_pseudo_inertia(stretch @ b.pseudo_inertia @ stretch) for b in (one, two))
     assert evaluate.riemannian(*scaled) == pytest.approx(here)
 
 

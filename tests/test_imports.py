@@ -152,9 +152,7 @@ def test_no_printing_plotting_or_files_below_io() -> None:
         for node in ast.walk(trees()[name])
         if isinstance(node, ast.Call) and called(node) in FILE_CALLS and not is_resource(node)
     ]
-    offences += [
-        f"{name} imports {full}" for name in lower for full in imported(name) if unit(full) in PLOTTING
-    ]
+    offences += [f"{name} imports {full}" for name in lower for full in imported(name) if unit(full) in PLOTTING]
     assert offences == []
 
 
@@ -174,11 +172,7 @@ def test_errors_are_ours() -> None:
         for node in ast.walk(tree):
             if isinstance(node, ast.Assert):
                 offences.append(f"{name}:{node.lineno} asserts")
-            if (
-                isinstance(node, ast.Raise)
-                and is_builtin_exception(raised(node))
-                and raised(node) not in RAISABLE
-            ):
+            if isinstance(node, ast.Raise) and is_builtin_exception(raised(node)) and raised(node) not in RAISABLE:
                 offences.append(f"{name}:{node.lineno} raises {raised(node)}")
     assert offences == []
 

@@ -12,12 +12,13 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines import held_object
 
+DEFAULTS = held_object.Options()
 Log = str | Path | Recording | MotionLog
 
 
 def identify(
     log: Log,
-    options: held_object.Options = held_object.Options(),
+    options: held_object.Options = DEFAULTS,
     *,
     tool: str | Path | Recording | Estimate | None = None,
     data: str | Path | None = None,

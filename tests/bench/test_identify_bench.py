@@ -136,9 +136,7 @@ def test_unknown_method_is_refused(no_peers):
 def test_command_prints_one_json_object(no_peers, monkeypatch):
     for name in timing._THREAD_VARIABLES:
         monkeypatch.setenv(name, "1")
-    options = (
-        "identify --json --seeds 1 --objects hammer --motions stop_go --noise moderate --methods noise-aware"
-    )
+    options = "identify --json --seeds 1 --objects hammer --motions stop_go --noise moderate --methods noise-aware"
     done = CliRunner().invoke(bench, [*options.split(), "--no-million"])
     assert done.exit_code == 0
     found = json.loads(done.stdout)

@@ -54,9 +54,7 @@ def test_bodies_add_and_come_apart(batch: tuple[int, ...], data: st.DataObject) 
 
 @pytest.mark.parametrize("batch", BATCHES)
 @given(data=st.data())
-def test_change_of_frame_commutes_with_addition_and_composes(
-    batch: tuple[int, ...], data: st.DataObject
-) -> None:
+def test_change_of_frame_commutes_with_addition_and_composes(batch: tuple[int, ...], data: st.DataObject) -> None:
     a, b = data.draw(bodies(batch)), data.draw(bodies(batch))
     X, Y = data.draw(poses(batch)), data.draw(poses(batch))
     same((a + b).in_frame(X), a.in_frame(X) + b.in_frame(X))
@@ -170,9 +168,7 @@ def test_principal_moments_do_not_depend_on_the_frame(body: InertialParameters, 
 
 @pytest.mark.parametrize("batch", BATCHES)
 @given(data=st.data())
-def test_consistent_means_positive_definite_pseudo_inertia(
-    batch: tuple[int, ...], data: st.DataObject
-) -> None:
+def test_consistent_means_positive_definite_pseudo_inertia(batch: tuple[int, ...], data: st.DataObject) -> None:
     body = InertialParameters(np.array([1, 0, 0, 0, 1, 0, 0, 1, 0, 1]) + data.draw(numbers((*batch, 10))))
     margin = np.linalg.eigvalsh(body.pseudo_inertia)[..., 0].min()
     if abs(margin) > 1e-9:

@@ -124,8 +124,7 @@ def stack_of_disks(radius, low: float, high: float) -> InertialParameters:
     """Thin disks of radius(z) between two heights, by the midpoint rule."""
     edges = np.linspace(low, high, 801)
     disks = [
-        solids.cylinder(radius((a + b) / 2), b - a, DENSITY).in_frame(at(0, 0, (a + b) / 2))
-        for a, b in pairwise(edges)
+        solids.cylinder(radius((a + b) / 2), b - a, DENSITY).in_frame(at(0, 0, (a + b) / 2)) for a, b in pairwise(edges)
     ]
     return InertialParameters(np.sum([d.vector for d in disks], axis=0))
 

@@ -49,9 +49,7 @@ def swap(text: str, old: str, new: str) -> str:
 
 def with_matrix(rows: list[str]) -> tuple[str, str]:
     toml = swap(TOML, '["qw", "qx", "qy", "qz"], form = "quaternion-wxyz"', f'{MATRIX}, form = "matrix"')
-    return toml, "t,fx,fy,fz,tx,ty,tz," + TURN + "\n" + "".join(
-        f"{t},1,2,3,4,5,6,{r}\n" for t, r in enumerate(rows)
-    )
+    return toml, "t,fx,fy,fz,tx,ty,tz," + TURN + "\n" + "".join(f"{t},1,2,3,4,5,6,{r}\n" for t, r in enumerate(rows))
 
 
 def message(path: Path, error: type[BadInput] = BadInput, data: Path | None = None) -> str:
@@ -103,9 +101,7 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize(
-    ("old", "new", "text"), [d[1:] for d in DESCRIPTIONS], ids=[d[0] for d in DESCRIPTIONS]
-)
+@pytest.mark.parametrize(("old", "new", "text"), [d[1:] for d in DESCRIPTIONS], ids=[d[0] for d in DESCRIPTIONS])
 def test_description(tmp_path: Path, old: str, new: str, text: str) -> None:
     (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n")
     if text == "log.toml names a bag":
@@ -171,9 +167,7 @@ def test_rotation_that_is_a_mirror_image(tmp_path: Path) -> None:
     )
 
 
-def test_missing_data_file_names_the_searched_folders(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_missing_data_file_names_the_searched_folders(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setenv("STEELYARD_DATA", str(tmp_path / "env"))
     path = write(tmp_path, swap(TOML, '"a.csv"', '"b.csv"'))
     assert message(path, BadFile, tmp_path / "data") == (
@@ -188,10 +182,7 @@ def test_missing_description(tmp_path: Path) -> None:
 
 def test_not_toml(tmp_path: Path) -> None:
     path = write(tmp_path, "[log]\ngravity = [0, 0 -9.81]\n")
-    assert (
-        message(path, BadDescription)
-        == "DIR/log.toml: not valid TOML: Unclosed array (at line 2, column 17)."
-    )
+    assert message(path, BadDescription) == "DIR/log.toml: not valid TOML: Unclosed array (at line 2, column 17)."
 
 
 def test_binary_description(tmp_path: Path) -> None:
@@ -341,9 +332,7 @@ def garbage(path: Path, head: bytes) -> Path:
 @pytest.mark.parametrize("name", ["a.csv", "a.txt", "a.npz", "a.csv.gz", "a.toml"])
 @pytest.mark.parametrize("kind", ["zeros", "random", "letters"])
 def test_two_gigabytes_of_garbage(tmp_path: Path, name: str, kind: str) -> None:
-    head = {"zeros": b"", "random": np.random.default_rng(0).bytes(1 << 17), "letters": b"a" * (1 << 17)}[
-        kind
-    ]
+    head = {"zeros": b"", "random": np.random.default_rng(0).bytes(1 << 17), "letters": b"a" * (1 << 17)}[kind]
     text = message(garbage(tmp_path / name, head), BadFile)
     binary = "expected a text table; found binary data. Readable are text tables, .npz and .parquet."
     letters = "expected a table with one row per line; found no line end in the first 64 kB."

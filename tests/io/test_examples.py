@@ -37,9 +37,7 @@ def test_runs(data_dir: Path, examples_dir: Path, number: int, rows: list[int]) 
 
 
 def test_bare_file(data_dir: Path) -> None:
-    (stream,) = read_recording(
-        data_dir / "kuka-lbr-med14-ati-gamma-imu" / "0-calibration_fts-accel.csv"
-    ).streams
+    (stream,) = read_recording(data_dir / "kuka-lbr-med14-ati-gamma-imu" / "0-calibration_fts-accel.csv").streams
     assert stream.poses
     assert set(stream.channels) == {"force", "torque", "specific_force", "gravity", "rotation"}
 
@@ -82,7 +80,5 @@ def test_the_description_that_the_format_shows(data_dir: Path, tmp_path: Path) -
     assert recording.noise == {"force": 0.05}
     assert [stream.delay for stream in recording.streams] == [None, None, 0.0075]
     turned = recording.streams[2].channels["specific_force"] @ np.array([[0, -1, 0], [0, 0, 1], [-1, 0, 0]]).T
-    down = (
-        Rotation(recording.streams[1].channels["rotation"][:50]).inverse().apply(-recording.gravity).mean(0)
-    )
+    down = Rotation(recording.streams[1].channels["rotation"][:50]).inverse().apply(-recording.gravity).mean(0)
     assert float(np.abs(turned[:50].mean(0) - down).max()) < 1.0

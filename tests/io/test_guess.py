@@ -41,9 +41,7 @@ def test_usual_names(tmp_path: Path, wrench: str, turn: str) -> None:
     stream = bare(tmp_path, names, [0, *W, *Q], [0.01, *W, *Q])
     assert stream.channels["force"].tolist() == [W[:3]] * 2
     assert stream.channels["torque"].tolist() == [W[3:]] * 2
-    np.testing.assert_allclose(
-        stream.channels["rotation"][0], Rotation.from_quaternion_wxyz(Q).matrix, atol=1e-15
-    )
+    np.testing.assert_allclose(stream.channels["rotation"][0], Rotation.from_quaternion_wxyz(Q).matrix, atol=1e-15)
     assert stream.time is not None
     assert stream.time.tolist() == [0, 0.01]
     assert stream.name == "data.csv"
@@ -61,9 +59,7 @@ def test_units_in_names(tmp_path: Path) -> None:
     assert stream.time.tolist() == [0, 0.004]
 
 
-@pytest.mark.parametrize(
-    ("stamp", "step"), [(1708857503, 1), (1708857503931, 1e-3), (1708857503931759, 1e-6)]
-)
+@pytest.mark.parametrize(("stamp", "step"), [(1708857503, 1), (1708857503931, 1e-3), (1708857503931759, 1e-6)])
 def test_unix_stamps(tmp_path: Path, stamp: int, step: float) -> None:
     names = ["timestamp", *["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]]
     time = bare(tmp_path, names, [stamp, *W, *Q], [stamp + 1, *W, *Q]).time
@@ -103,9 +99,7 @@ def test_size_tells_accelerometer_gravity_and_gyro_apart(tmp_path: Path) -> None
     )
     assert set(stream.channels) == {"force", "torque", "specific_force", "angular_velocity", "position"}
     np.testing.assert_allclose(stream.channels["specific_force"][1], [0, 0, STANDARD_GRAVITY])
-    stream = bare(
-        tmp_path, names[:13], [0, *W, 0, 0, 9.8, 0, 0, -9.82][:13], [1, *W, 0, 0, 9.8, 0, 0, -9.82][:13]
-    )
+    stream = bare(tmp_path, names[:13], [0, *W, 0, 0, 9.8, 0, 0, -9.82][:13], [1, *W, 0, 0, 9.8, 0, 0, -9.82][:13])
     assert set(stream.channels) == {"force", "torque", "specific_force", "gravity"}
     assert stream.channels["specific_force"][1].tolist() == [0, 0, 9.8]
 
@@ -119,9 +113,7 @@ def test_rows_that_turn_far_without_a_clock_are_poses(tmp_path: Path) -> None:
 
 
 def test_length_of_gravity_is_taken_from_the_file(tmp_path: Path) -> None:
-    bare(
-        tmp_path, ["fx", "fy", "fz", "tx", "ty", "tz", "gx", "gy", "gz"], [*W, 0, 0, -9.82], [*W, 0, -9.82, 0]
-    )
+    bare(tmp_path, ["fx", "fy", "fz", "tx", "ty", "tz", "gx", "gy", "gz"], [*W, 0, 0, -9.82], [*W, 0, -9.82, 0])
     assert read_recording(tmp_path / "data.csv").gravity.tolist() == [0, 0, -9.82]
 
 

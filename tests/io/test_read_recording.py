@@ -95,9 +95,7 @@ def test_everything_a_description_can_say(tmp_path: Path) -> None:
     assert recording.tool == str(tmp_path / "tool.json")
     assert recording.object_pose is not None
     assert recording.object_pose.position.tolist() == [0, 0, 0.12]
-    np.testing.assert_allclose(
-        recording.object_pose.rotation.matrix, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15
-    )
+    np.testing.assert_allclose(recording.object_pose.rotation.matrix, [[1, 0, 0], [0, 0, -1], [0, 1, 0]], atol=1e-15)
     assert recording.object_pose_std == pytest.approx((0.002, np.pi / 180))
     stream = only(recording)
     assert stream.delay == 0.0075
@@ -131,9 +129,7 @@ def test_units(tmp_path: Path, quantity: str, unit: str, factor: float) -> None:
     }
     lines[quantity] = f'{quantity} = {{ columns = ["fx", "fy", "fz"], unit = "{unit}" }}'
     toml = "[log]\ngravity = [0, 0, -9.82]\n" + STREAM + TIME + TURN + "\n".join(lines.values())
-    np.testing.assert_allclose(
-        only(read(tmp_path, toml)).channels[quantity], np.multiply([FORCE] * 4, factor)
-    )
+    np.testing.assert_allclose(only(read(tmp_path, toml)).channels[quantity], np.multiply([FORCE] * 4, factor))
 
 
 def test_one_g_is_standard_gravity_where_the_log_is_not_on_earth(tmp_path: Path) -> None:
@@ -159,12 +155,7 @@ def test_forms_of_rotation(tmp_path: Path, form: str) -> None:
     }[form]
     names = [f"r{i}" for i in range(values.shape[1])]
     csv = table([*COLUMNS[:7], *names], np.hstack([ROWS[:, :7], values]))
-    toml = (
-        STREAM
-        + TIME
-        + WRENCH
-        + f'rotation = {{ columns = {names}, form = "{form.removesuffix("-deg")}"{unit} }}'
-    )
+    toml = STREAM + TIME + WRENCH + f'rotation = {{ columns = {names}, form = "{form.removesuffix("-deg")}"{unit} }}'
     rotation = Rotation(only(read(tmp_path, toml, a_csv=csv)).channels["rotation"])
     assert float((truth.inverse() @ rotation).angle().max()) < (2e-4 if form == "matrix" else 1e-11)
 
@@ -300,9 +291,7 @@ def test_columns_of_text_are_left_alone(tmp_path: Path) -> None:
 
 def test_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr("steelyard.io.text_blocks._BLOCK", 64)
-    rows = np.hstack(
-        [np.arange(50.0)[:, None], np.random.default_rng(0).normal(size=(50, 6)), np.eye(1, 4)[[0] * 50]]
-    )
+    rows = np.hstack([np.arange(50.0)[:, None], np.random.default_rng(0).normal(size=(50, 6)), np.eye(1, 4)[[0] * 50]])
     stream = only(read(tmp_path, STREAM + BY_NAME, a_csv=table(COLUMNS, rows)))
     np.testing.assert_allclose(stream.channels["force"], rows[:, 1:4], rtol=1e-11)
 
@@ -346,18 +335,14 @@ def test_parquet(tmp_path: Path) -> None:
     columns["t"] = np.array([1708857503931759 + i for i in range(4)])
     parquet.write_table(arrow.table(columns), tmp_path / "a.parquet")
     stream = only(
-        read(
-            tmp_path, (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["t"]', '["t"], unit = "us"')
-        )
+        read(tmp_path, (STREAM + BY_NAME).replace("a.csv", "a.parquet").replace('["t"]', '["t"], unit = "us"'))
     )
     assert stream.time is not None
     assert stream.time.tolist() == [0.931759, 0.931760, 0.931761, 0.931762]
     assert stream.channels["force"].tolist() == [FORCE] * 4
 
 
-def test_one_file_may_serve_two_streams_and_is_read_once(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_one_file_may_serve_two_streams_and_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     from steelyard.io.text_table import TextTable
 
     reads = []

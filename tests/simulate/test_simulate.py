@@ -132,16 +132,12 @@ def test_noise_has_the_declared_size_and_bias_is_added():
     (noise,) = noisy.noise
     np.testing.assert_allclose((noisy.wrench - clean.wrench).mean(0), bias, atol=0.02)
     np.testing.assert_allclose((noisy.wrench - clean.wrench).var(0), noise.wrench, rtol=0.05)
-    np.testing.assert_allclose(
-        (noisy.acceleration - clean.acceleration).var(0), noise.acceleration[3:], rtol=0.05
-    )
+    np.testing.assert_allclose((noisy.acceleration - clean.acceleration).var(0), noise.acceleration[3:], rtol=0.05)
     alpha = noisy.angular_acceleration - clean.angular_acceleration
     np.testing.assert_allclose(alpha.var(0), noise.acceleration[:3], rtol=0.05)
     np.testing.assert_array_equal(noisy.gravity, clean.gravity)
     np.testing.assert_array_equal(noisy.angular_velocity, clean.angular_velocity)
-    np.testing.assert_allclose(
-        replace(clean, wrench=np.zeros((20_000, 6))).predicted(body.vector), clean.wrench
-    )
+    np.testing.assert_allclose(replace(clean, wrench=np.zeros((20_000, 6))).predicted(body.vector), clean.wrench)
 
 
 def test_low_passed_noise_is_stationary_unit_and_below_two_hertz():

@@ -33,9 +33,7 @@ def test_group_laws(batch: tuple[int, ...], data: st.DataObject) -> None:
 
 @pytest.mark.parametrize("batch", BATCHES)
 @given(data=st.data())
-def test_apply_is_an_action_that_keeps_dot_and_cross_products(
-    batch: tuple[int, ...], data: st.DataObject
-) -> None:
+def test_apply_is_an_action_that_keeps_dot_and_cross_products(batch: tuple[int, ...], data: st.DataObject) -> None:
     a, b = data.draw(rotations(batch)), data.draw(rotations(batch))
     u, v = data.draw(numbers((*batch, 3))), data.draw(numbers((*batch, 3)))
     assert_allclose((a @ b).apply(u), a.apply(b.apply(u)), atol=TIGHT)

@@ -30,7 +30,7 @@ def run(samples: int, seed: int, repeats: int) -> dict[str, Any]:
     plays = max(1, samples // int(scenarios.bench()["samples"]))
     log, true = simulate_log(OBJECT, MOTION, NOISE, seed, shuffled=False, repeats=plays)
     estimator = NoiseAware(bias="none")
-    unmarked = replace(log, still=None, pose=None)
+    unmarked = replace(log, still=np.zeros(len(log), np.bool_), pose=np.full(len(log), -1))
     moments = Moments.of_log(log)
     found = estimator.solve(moments)
     pass_ms = thread_ms(lambda: Moments.of_log(unmarked), repeats)

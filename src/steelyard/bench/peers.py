@@ -146,9 +146,7 @@ def _log_cholesky(system: System) -> InertialParameters:
         return np.asarray(system.matrix @ phi - system.vector)
 
     def jacobian(theta: Array) -> Array:
-        return np.asarray(
-            system.matrix @ np.asarray(pinocchio.LogCholeskyParameters(theta).calculateJacobian())[order]
-        )
+        return np.asarray(system.matrix @ np.asarray(pinocchio.LogCholeskyParameters(theta).calculateJacobian())[order])
 
     with warnings.catch_warnings(), np.errstate(all="ignore"):
         warnings.simplefilter("ignore")

@@ -25,7 +25,13 @@ def bench() -> None:
 @click.option("--motions", multiple=True, help="Only these motions.")
 @click.option("--noise", "noises", multiple=True, help="Only these noise levels.")
 @click.option("--methods", multiple=True, help="Only these methods.")
-@click.option("--million", type=click.IntRange(min=0), default=1_000_000, show_default=True, help="Rows of the long log.")
+@click.option(
+    "--million",
+    type=click.IntRange(min=0),
+    default=1_000_000,
+    show_default=True,
+    help="Rows of the long log.",
+)
 @click.option("--data", type=click.Path(path_type=Path), help="Accepted and not needed: the bench makes its data.")
 @_JSON
 def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> None:
@@ -53,8 +59,9 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
     """Do 95 % intervals hold the truth 95 % of the time, white and correlated noise?"""
     from steelyard.bench import coverage as job
     from steelyard.bench.tables import coverage_table
+    from steelyard.simulate.noise import SPECTRA
 
-    spectra = ("white", "2hz") if spectrum == "both" else (spectrum,)
+    spectra = SPECTRA if spectrum == "both" else tuple(s for s in SPECTRA if s == spectrum)
     progress = progress_bar("bench coverage")
     result = job.run(seeds, spectra=spectra, declared=not noise_unknown, progress=progress, **choices)
     print_json(result) if as_json else click.echo(coverage_table(result))

@@ -21,9 +21,7 @@ def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
     from steelyard.io import read_result
 
     a, b = read_result(first), read_result(second)
-    found = same.compare(
-        a.parameters, a.covariance, b.parameters, b.covariance, a.identified & b.identified, any_grasp
-    )
+    found = same.compare(a.parameters, a.covariance, b.parameters, b.covariance, a.identified & b.identified, any_grasp)
     if as_json:
         print_json(asdict(found) | {"same": found.same})
         return

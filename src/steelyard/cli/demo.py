@@ -34,4 +34,6 @@ def demo(seed: int, keep: Path | None, as_json: bool) -> None:
         print_json(result_dict(estimate) | {"truth": made.truth.vector.tolist(), "seed": seed})
         return
     click.echo(estimate_table(estimate, f"A hammer of wood and steel, made log (seed {seed})", truth))
-    say(f"The log is in {keep}; identify it with: steelyard identify {log}" if keep else "Keep the log with --keep DIR.")
+    say(
+        f"The log is in {keep}; identify it with: steelyard identify {log}" if keep else "Keep the log with --keep DIR."
+    )

@@ -32,7 +32,9 @@ def doctor(as_json: bool) -> None:
             }
         )  # fmt: skip
     else:
-        click.echo(f"steelyard {__version__}, Python {platform.python_version()} on {platform.system()} {platform.machine()}")
+        click.echo(
+            f"steelyard {__version__}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
+        )
         for name in CORE:
             click.echo(f"  {name:8s} {versions[name]}")
         for name, extra in EXTRAS.items():
@@ -40,7 +42,9 @@ def doctor(as_json: bool) -> None:
             click.echo(f"  {name:8s} {hint}")
         click.echo(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
     if not healthy:
-        raise CannotAnswer(f"The known body came out wrong by {error:.2g} of its size: this installation cannot be trusted.")
+        raise CannotAnswer(
+            f"The known body came out wrong by {error:.2g} of its size: this installation cannot be trusted."
+        )
 
 
 def _version(name: str) -> str | None:

@@ -16,15 +16,31 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("log", required=False, type=click.Path(path_type=Path))
-@click.option("--data", type=click.Path(path_type=Path), help="Folder that relative paths in the description start from.")
+@click.option(
+    "--data",
+    type=click.Path(path_type=Path),
+    help="Folder that relative paths in the description start from.",
+)
 @click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="Estimator.")
-@click.option("--bias", type=click.Choice(["free", "none"]), default="free", show_default=True,
-              help="Estimate the sensor's bias, or trust that it is tared.")
+@click.option(
+    "--bias",
+    type=click.Choice(["free", "none"]),
+    default="free",
+    show_default=True,
+    help="Estimate the sensor's bias, or trust that it is tared.",
+)
 @click.option("--drift", is_flag=True, help="Let the bias grow linearly over the log.")
-@click.option("--tool", type=click.Path(path_type=Path),
-              help="Result (.json) or log of the gripper alone: taken away, sharing one sensor bias.")
-@click.option("--object-size", type=float, metavar="M",
-              help="Rough longest dimension of the object [m]; used only where the data leave the inertia open.")
+@click.option(
+    "--tool",
+    type=click.Path(path_type=Path),
+    help="Result (.json) or log of the gripper alone: taken away, sharing one sensor bias.",
+)
+@click.option(
+    "--object-size",
+    type=float,
+    metavar="M",
+    help="Rough longest dimension of the object [m]; used only where the data leave the inertia open.",
+)
 @click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")

@@ -12,10 +12,16 @@ from steelyard.errors import SteelyardError
 
 # Verb -> (module and function, one line of help).
 VERBS: dict[str, tuple[str, str]] = {
-    "identify": ("steelyard.cli.identify:identify", "Log -> mass, centre of mass, inertia, error bars, findings."),
+    "identify": (
+        "steelyard.cli.identify:identify",
+        "Log -> mass, centre of mass, inertia, error bars, findings.",
+    ),
     "compare": ("steelyard.cli.compare:compare", "Two results: the same object or not, with a p-value."),
     "demo": ("steelyard.cli.demo:demo", "A made hammer, its log and its answer against the truth."),
-    "doctor": ("steelyard.cli.doctor:doctor", "Versions, what is installed, a tiny identification with a known answer."),
+    "doctor": (
+        "steelyard.cli.doctor:doctor",
+        "Versions, what is installed, a tiny identification with a known answer.",
+    ),
     "bench": ("steelyard.cli.bench:bench", "Every number that the README claims, made again."),
 }
 

@@ -45,7 +45,7 @@ def estimate_table(estimate: Estimate, title: str, truth: Array | None = None) -
     return "\n".join(blocks)
 
 
-def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, ...]]:
+def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, str]]:
     """Return the rows name, value ± std, and truth."""
     body = estimate.parameters
     values = np.concatenate([[body.mass], body.com, body.inertia_com[np.triu_indices(3)]])
@@ -61,7 +61,7 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, ...]]
     jackknife = estimate.evidence.jackknife_people
     if jackknife is not None and truth is None:
         rows = [
-            (*row[:2], f"leave-one-out ± {j * s:.{decimals(j * s)}f}")
+            (row[0], row[1], f"leave-one-out ± {j * s:.{decimals(j * s)}f}")
             for row, j, s in zip(rows, jackknife, scales, strict=False)
         ]
     return rows
@@ -89,9 +89,13 @@ def _evidence_lines(estimate: Estimate) -> list[str]:
         + ("" if seen.chi2_per_dof is None else f"; chi² per degree of freedom {seen.chi2_per_dof:.2f}"),
     ]
     if seen.holdout_force_N is not None and seen.holdout_torque_Nm is not None:
-        lines.append(f"  left out   {seen.holdout_force_N:.3g} N, {seen.holdout_torque_Nm:.3g} N m rms when predicted unseen")
+        lines.append(
+            f"  left out   {seen.holdout_force_N:.3g} N, {seen.holdout_torque_Nm:.3g} N m rms when predicted unseen"
+        )
     if estimate.bias_covariance.any():
-        lines.append(f"  bias       force {_vector(force)} N, torque {_vector(torque)} N m (subtract from the raw channels)")
+        lines.append(
+            f"  bias       force {_vector(force)} N, torque {_vector(torque)} N m (subtract from the raw channels)"
+        )
     lines += [f"  delay      {1e3 * delay:+.2f} ms  {name}" for name, delay in estimate.delays_s.items() if delay]
     lines += [f"  note       {note}" for note in estimate.notes]
     return lines

@@ -112,7 +112,7 @@ def _residual(problem: Problem, K: Array) -> tuple[float, float]:
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """What the data alone see: rank, condition, std (10,) of mass, com, inertia about the CoM, and their natural sizes."""
+    """What the data alone see: rank, condition, std (10,) of mass, com, inertia about the CoM, and their sizes."""
 
     rank: int
     condition: float
@@ -165,7 +165,12 @@ def _require_answer(sight: Sight, problem: Problem) -> None:
     lost = sight.std[:4] > np.repeat([LOST_MASS, LOST_COM], [1, 3]) * sight.sizes[:4]
     if not lost.any():
         return
-    names = ("the mass", "the centre of mass along x", "the centre of mass along y", "the centre of mass along z")
+    names = (
+        "the mass",
+        "the centre of mass along x",
+        "the centre of mass along y",
+        "the centre of mass along z",
+    )
     poses = len(np.unique(problem.block_number[problem.block_number >= 0]))
     seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or time blocks" if poses else "")
     raise CannotAnswer(
@@ -185,8 +190,15 @@ def _findings(estimate: Estimate) -> list[Finding]:
         names = [n for n, gone in zip(("xx", "xy", "xz", "yy", "yz", "zz"), lost, strict=True) if gone]
         half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
         share = 50 * float(np.min(spread[4:][lost])) / max(half_trace, 1e-12)
-        least = f"one standard deviation is at least {share:.0f} % of half its trace" if share < 1e3 else "no rotation shows it"
+        least = (
+            f"one standard deviation is at least {share:.0f} % of half its trace"
+            if share < 1e3
+            else "no rotation shows it"
+        )
         out.append(
-            Finding.of("inertia-not-identified", f"The data do not fix the inertia entries {', '.join(names)}: {least}.")
+            Finding.of(
+                "inertia-not-identified",
+                f"The data do not fix the inertia entries {', '.join(names)}: {least}.",
+            )
         )
     return out

@@ -9,8 +9,6 @@ Source: Newey and West 1987 for the form; lag choice and flat-top taper Politis 
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
 from steelyard.check import Array
@@ -18,7 +16,7 @@ from steelyard.identify import noise_cost
 from steelyard.identify.conclude import Solution
 from steelyard.identify.linear import nonnegative
 from steelyard.identify.problem import Problem
-from steelyard.logs.log import MotionLog
+from steelyard.logs.log import Integers, MotionLog
 
 # Longer logs are judged by the scatter of scores summed over blocks of time; shorter ones have too few.
 FEWEST, LONGEST, BLOCKS = 50, 20_000, 200
@@ -38,11 +36,9 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
     log = log.rows(np.argsort(log.time, kind="stable"))
     if len(log) > LONGEST:
         return _by_blocks(log, K, problem)
-    H, extra, plain = noise_cost.information(
-        K, problem.T, problem.scatter, problem.acceleration, problem.wrench
-    )
+    H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
     residual, slope = _whitened(log, K, problem)
-    slot = _slots(log.time)
+    slot = _slots(np.asarray(log.time))
     variance, squares, memory = np.zeros_like(H), 0.0, 0.0
     for channel in range(6):
         kernel = _autocovariance(_placed(residual[:, channel], slot), len(log))
@@ -81,17 +77,17 @@ def _whitened(log: MotionLog, K: Array, problem: Problem) -> tuple[Array, Array]
     return residual, slope
 
 
-def _slots(time: Array) -> np.ndarray[Any, np.dtype[np.int64]]:
+def _slots(time: Array) -> Integers:
     """Return the place of each row on an even clock, so that left-out rows leave gaps; row numbers if it is uneven."""
     step = float(np.median(np.diff(time)))
     if step > 0:
-        slot = np.rint((time - time[0]) / step).astype(np.int64)
+        slot: Integers = np.rint((time - time[0]) / step).astype(np.int64)
         if (np.diff(slot) > 0).all() and slot[-1] < MOST_GAPS * len(time):
             return slot
     return np.arange(len(time))
 
 
-def _placed(values: Array, slot: np.ndarray[Any, np.dtype[np.int64]]) -> Array:
+def _placed(values: Array, slot: Integers) -> Array:
     """Return the values on the even clock, zero in the gaps."""
     out = np.zeros((int(slot[-1]) + 1, *values.shape[1:]))
     out[slot] = values

@@ -1,6 +1,6 @@
 """Geodesic: weighted least squares with a pull toward a prior body, measured on the cone of bodies (the GEO baseline).
 
-Source: Lee, Wensing, Park 2019, "Geometric robot dynamic identification", eq. 21 (entropic) and eq. 18 (Riemannian); the
+Source: Lee, Wensing, Park 2019, "Geometric robot dynamic identification", eq. 21 (entropic), eq. 18 (Riemannian); the
 strength is their gamma = alpha tr(A^T Sigma^-1 A). The prior adds no second parallel-axis term.
 """
 
@@ -78,7 +78,15 @@ class Geodesic:
         raise CannotAnswer(f"The geodesic fit did not settle in {ITERATIONS} steps; give a prior nearer to the object.")
 
     def _shorten(
-        self, x: Array, step: Array, decrement: float, cost: float, H: Array, g: Array, gamma: float, prior: Array
+        self,
+        x: Array,
+        step: Array,
+        decrement: float,
+        cost: float,
+        H: Array,
+        g: Array,
+        gamma: float,
+        prior: Array,
     ) -> Array:
         """Return the first of x + step, x + step/2, ... that is a body and lowers the cost."""
         for halving in range(60):

@@ -20,7 +20,7 @@ FEWEST_BLOCKS = 4
 
 
 def leave_one_out(problem: Problem, linear: Array, H: Array, jacobian: Array, prior: Array) -> dict[str, Any]:
-    """Return holdout_force_N, holdout_torque_Nm, jackknife (10,) and jackknife_people (10,), or nothing with few blocks."""
+    """Return the hold-out errors and jackknife deviations of `Evidence` by name, or nothing where blocks are few."""
     numbers = np.unique(problem.block_number[problem.block_number >= 0])
     if len(numbers) < FEWEST_BLOCKS:
         return {}
@@ -74,4 +74,4 @@ def _people(phi: Array) -> Array:
 def _jackknife(refits: Array) -> Array:
     """Return the jackknife standard deviation (10,) of leave-one-out refits (B, 10)."""
     blocks = len(refits)
-    return np.sqrt((blocks - 1) / blocks * ((refits - refits.mean(0)) ** 2).sum(0))
+    return np.asarray(np.sqrt((blocks - 1) / blocks * ((refits - refits.mean(0)) ** 2).sum(0)))

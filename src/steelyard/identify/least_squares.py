@@ -1,7 +1,7 @@
 """LeastSquares: ordinary, weighted and total least squares on the statistic (the OLS baseline).
 
-Source: Atkeson, An, Hollerbach 1986, eq. 6-12 (ordinary); Van Huffel and Vandewalle 1991, section 3.5 (total, with exact
-columns). None of the three keeps the answer a rigid body: `Estimate.parameters.validity()` says when it is not.
+Source: Atkeson, An, Hollerbach 1986, eq. 6-12 (ordinary); Van Huffel and Vandewalle 1991, section 3.5 (total, some
+columns exact). None of the three keeps the answer a rigid body: `Estimate.parameters.validity()` says when it is not.
 """
 
 from __future__ import annotations

@@ -80,7 +80,8 @@ def inverse_scaled(matrix: Array) -> Array:
     for i in range(size):
         if values[i] > RANK_TOLERANCE * values[-1]:
             inverse[i] = 1 / values[i]
-    return (vectors * inverse) @ vectors.T * np.outer(scale, scale)
+    out: Array = (vectors * inverse) @ vectors.T * np.outer(scale, scale)
+    return out
 
 
 @numba.njit(cache=True)
@@ -97,4 +98,5 @@ def nonnegative(matrix: Array, reference: Array) -> Array:
     values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T) / outer)
     if values[0] >= 0.0:
         return matrix
-    return (vectors * np.maximum(values, 0.0)) @ vectors.T * outer
+    out: Array = (vectors * np.maximum(values, 0.0)) @ vectors.T * outer
+    return out

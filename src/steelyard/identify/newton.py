@@ -19,7 +19,7 @@ from steelyard.identify.noise_cost import derivatives, value
 # steps end at rounding, where a line search could only see noise.
 NEAR = 1e-4
 
-# theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each of the last six sits in U.
+# theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each sits in U.
 _ROW = np.array([0, 0, 1, 2, 0, 1, 0, 0, 1, 2])
 _COLUMN = np.array([0, 0, 1, 2, 1, 2, 2, 3, 3, 3])
 
@@ -175,7 +175,7 @@ def cost(
     total = 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u[:10], gamma, log_size, precision)[0]
     if len(u) > 10:
         off = u[10:16] - bias
-        total += 0.5 * off @ (bias_precision @ off)
+        total += 0.5 * float(off @ (bias_precision @ off))
     return total
 
 
@@ -199,7 +199,7 @@ def cost_derivatives(
     total = 0.5 * Q + prior
     if size > 10:
         pull = bias_precision @ (u[10:16] - bias)
-        total += 0.5 * (u[10:16] - bias) @ pull
+        total += 0.5 * float((u[10:16] - bias) @ pull)
         gradient[10:16] += pull
         hessian[10:16, 10:16] += bias_precision
     return total, gradient, hessian
@@ -221,7 +221,8 @@ def _downhill(gradient: Array, hessian: Array) -> Array:
                 if total < 1e-9:
                     values, vectors = np.linalg.eigh(scaled)
                     curvature = np.maximum(np.abs(values), 1e-9)
-                    return -scale * (vectors @ ((vectors.T @ (scale * gradient)) / curvature))
+                    turned: Array = -scale * (vectors @ ((vectors.T @ (scale * gradient)) / curvature))
+                    return turned
                 low[i, i] = np.sqrt(total)
             else:
                 low[i, j] = total / low[j, j]
@@ -269,7 +270,7 @@ def minimise(
                 break
             step *= 0.5
         if not moved:
-            return u, current, decrement < 1e-3
+            return u, current, bool(decrement < 1e-3)
         u = u + step
         current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
     return u, current, False

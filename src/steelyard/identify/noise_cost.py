@@ -97,9 +97,7 @@ def value(K: Array, scatter: Array, acceleration: Array, wrench: Array) -> float
 
 
 @numba.njit(cache=True)
-def derivatives(
-    K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
-) -> tuple[float, Array, Array]:
+def derivatives(K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[float, Array, Array]:
     """Return Q, its gradient (p,) and exact Hessian (p, p) in the linear parameters, for the design T (p, 6, Z)."""
     size = T.shape[0]
     total, gradient, hessian = 0.0, np.zeros(size), np.zeros((size, size))
@@ -139,9 +137,7 @@ def derivatives(
 
 
 @numba.njit(cache=True)
-def information(
-    K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
-) -> tuple[Array, Array, Array]:
+def information(K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[Array, Array, Array]:
     """Return the parts of the sandwich (p, p): expected H, the extra score variance D, and the uncorrected H.
 
     H_pq = tr(W T_p (S - n Sigma_a) T_q^T) is the information about the true accelerations;

@@ -111,11 +111,11 @@ def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
         out[c] = np.maximum(_pooled(np.maximum(miss - explained, LEAST_SHARE * miss), int(rows)), SMALLEST)
         shares[c] = rows / moments.samples
     # A few rows in one pose can be fitted without any residual; they are not better than the sensor is elsewhere.
-    return np.maximum(out, QUIETEST * shares @ out)
+    return np.asarray(np.maximum(out, QUIETEST * shares @ out))
 
 
 def _pooled(variance: Array, rows: int) -> Array:
     """Return the variances, with each triple of axes at its mean where the rows are few."""
     if rows >= ROWS_PER_AXIS:
         return variance
-    return np.repeat(variance.reshape(2, 3).mean(1), 3)
+    return np.asarray(np.repeat(variance.reshape(2, 3).mean(1), 3))

@@ -10,8 +10,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.linear import normal_equations
 from steelyard.identify.regressor import design
-from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import Integers, Moments, features
+from steelyard.logs.log import Integers, MotionLog
+from steelyard.logs.moments import Moments, features
 
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
@@ -90,9 +90,7 @@ class Problem:
         T = np.zeros((len(self.T) + 6, 6, 20))
         T[: len(self.T), :, :19] = self.T
         T[len(self.T) :, :, 19] = -np.eye(6)
-        return replace(
-            self, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2]
-        )
+        return replace(self, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2])
 
     def residual_map(self, linear: Array) -> Array:
         """Return K (6, Z), so that the wrench residual of a row is K z."""

@@ -55,9 +55,7 @@ def compare(
     scale = 1 / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
     whitened = np.linalg.pinv(covariance * np.outer(scale, scale), hermitian=True, rcond=1e-10)
     chi2 = float((scale * gap) @ whitened @ (scale * gap))
-    shown = tuple(
-        (n, float(g), float(s)) for n, g, s in zip(np.array(names)[chosen], gap, 1 / scale, strict=True)
-    )
+    shown = tuple((n, float(g), float(s)) for n, g, s in zip(np.array(names)[chosen], gap, 1 / scale, strict=True))
     return Comparison(float(gammaincc(len(gap) / 2, chi2 / 2)), chi2, len(gap), shown)
 
 

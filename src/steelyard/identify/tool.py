@@ -22,7 +22,7 @@ def bias_prior(tool: Estimate) -> BiasPrior | None:
     """Return what a tool-only run shows of the wrench bias, or None where it did not estimate one."""
     if not tool.bias_covariance.any():
         return None
-    return BiasPrior(tool.wrench_bias, np.linalg.pinv(tool.bias_covariance, hermitian=True))
+    return BiasPrior(tool.wrench_bias, np.asarray(np.linalg.pinv(tool.bias_covariance, hermitian=True), np.float64))
 
 
 def shares_bias(tool: Estimate, load: Estimate) -> tuple[bool, float]:
@@ -51,7 +51,9 @@ def without_tool(load: Estimate, tool: Estimate, shared: bool) -> Estimate:
             f"After taking the tool ({tool.mass:.4g} kg) away {body[0]:.4g} kg are left, with a standard deviation of "
             f"{std:.2g} kg: no object was held, or the tool is not the one that was recorded."
         )
-    message = f"A tool of {tool.mass:.4g} kg was taken away from a load of {load.mass:.4g} kg; the rest is the object alone."
+    message = (
+        f"A tool of {tool.mass:.4g} kg was taken away from a load of {load.mass:.4g} kg; the rest is the object alone."
+    )
     return replace(
         load,
         parameters=InertialParameters(body),
@@ -64,7 +66,8 @@ def without_tool(load: Estimate, tool: Estimate, shared: bool) -> Estimate:
 def different_bias(p: float) -> Finding:
     """Return the finding that two runs do not share their bias."""
     return Finding.of(
-        "bias-drift", f"The sensor's bias changed between the tool's run and this one (p = {p:.1g}); it was not shared."
+        "bias-drift",
+        f"The sensor's bias changed between the tool's run and this one (p = {p:.1g}); it was not shared.",
     )
 
 

@@ -66,9 +66,7 @@ class InertialParameters:
         """Return the body of point masses (n,) [kg] at points (n, 3) [m] in the frame."""
         m, p = check.finite("masses", masses), check.vectors("points", points)
         if m.ndim != 1 or p.shape != (*m.shape, 3):
-            raise BadValue(
-                f"masses and points must have shapes (n,) and (n, 3); got {m.shape} and {p.shape}."
-            )
+            raise BadValue(f"masses and points must have shapes (n,) and (n, 3); got {m.shape} and {p.shape}.")
         homogeneous = np.column_stack([p, np.ones(len(p))])
         return cls(forms.from_pseudo_inertia((m * homogeneous.T) @ homogeneous))
 

@@ -41,9 +41,7 @@ def report(phi: Array) -> ValidityReport:
         return ValidityReport(())
     offenders = np.flatnonzero(~sound)
     worst = int(offenders[np.argmin(_margin(bodies[offenders]))])
-    return ValidityReport(
-        (_where(worst, phi.shape[:-1], offenders.size) + _law(mass[worst], moments[worst]),)
-    )
+    return ValidityReport((_where(worst, phi.shape[:-1], offenders.size) + _law(mass[worst], moments[worst]),))
 
 
 def _margin(bodies: Array) -> Array:

@@ -47,9 +47,7 @@ class ArrayTable:
                 names += [f"{key}[{i}]" for i in range(width)]
                 sources += [(key, i) for i in range(width)]
         if not names:
-            raise BadFile(
-                f"{path}: no array with rows is in this NPZ. Save one array per quantity, rows first."
-            )
+            raise BadFile(f"{path}: no array with rows is in this NPZ. Save one array per quantity, rows first.")
         return cls(path, Header(tuple(names), len(names), groups), tuple(sources))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
@@ -97,9 +95,7 @@ def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
             read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
             shape, _, dtype = read(member)
         except _DAMAGED:
-            raise BadFile(
-                f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.'
-            ) from None
+            raise BadFile(f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.') from None
         size = archive.getinfo(name).file_size
     if dtype.hasobject:
         raise BadFile(
@@ -107,7 +103,5 @@ def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
             "it was not opened. Save it as plain numbers (float64)."
         )
     if dtype.itemsize * math.prod(shape) > size:
-        raise BadFile(
-            f'{path}: array "{key}" is damaged (shorter than its header says). Save the file again.'
-        )
+        raise BadFile(f'{path}: array "{key}" is damaged (shorter than its header says). Save the file again.')
     return tuple(shape)

@@ -63,6 +63,5 @@ def require_one_length(lengths: Mapping[str, int], where: str) -> None:
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"{name} {length}" for name, length in lengths.items())
         raise BadValue(
-            f"{where}: the lengths differ: {shown} rows. "
-            "Each quantity of a stream must have one row per sample."
+            f"{where}: the lengths differ: {shown} rows. Each quantity of a stream must have one row per sample."
         )

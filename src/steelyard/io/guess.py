@@ -79,9 +79,7 @@ def describe(table: Table) -> tuple[Description, Cells]:
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     exact = [] if stamps is None else [stamps]
     cells = table.read(sorted({*map(int, wanted), *exact}), exact)
-    specs = [
-        spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))
-    ]
+    specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
     _require(table, [spec.name for spec in specs])
     time = None if stamps is None else TimeSpec(stamps, _time_unit(table, names, stamps, cells), 0.0, "time")
@@ -130,9 +128,7 @@ def _array_names(header: Header) -> dict[str, int]:
 def _vector(names: _Names, quantity: str) -> tuple[int, ...]:
     for stem in _STEMS[quantity]:
         for joint in ("", "_"):
-            found = names.all_of(
-                [f"{stem}{joint}{axis}" for axis in "xyz"] if stem else list("xyz"), len(stem) < 3
-            )
+            found = names.all_of([f"{stem}{joint}{axis}" for axis in "xyz"] if stem else list("xyz"), len(stem) < 3)
             if found:
                 return found
     return ()
@@ -181,9 +177,7 @@ def _vector_spec(
     """Return the vector with its unit, None where its size does not tell what it is."""
     unit = names.units.get(numbers[0])
     if unit is not None and unit not in UNITS[quantity]:
-        raise _cannot_tell(
-            table, f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
-        )
+        raise _cannot_tell(table, f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}')
     if unit is None:
         unit = _unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
     return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)

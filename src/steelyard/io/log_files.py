@@ -58,8 +58,7 @@ def _open_all(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> l
     for spec in specs:
         if spec.topic is not None:
             raise BadFile(
-                f'{spec.where}: "topic" belongs to bags, which are not supported yet. '
-                "Export the topic to CSV."
+                f'{spec.where}: "topic" belongs to bags, which are not supported yet. Export the topic to CSV.'
             )
         if spec.path not in opened:
             opened[spec.path] = open_table(find_file(spec.path, folder, data))
@@ -158,9 +157,7 @@ def _times(
             if spec.time is not None:
                 clocks[i] = Clock(mine[number], TIME[spec.time.unit], spec.time.where)
     origin = common_origin(list(clocks.values()))
-    seconds: list[Array | None] = [
-        clocks[i].seconds_after(origin) if i in clocks else None for i in range(len(specs))
-    ]
+    seconds: list[Array | None] = [clocks[i].seconds_after(origin) if i in clocks else None for i in range(len(specs))]
     start = min((float(s[0]) for s in seconds if s is not None), default=0.0)
     for i, spec in enumerate(specs):
         if spec.time is not None and spec.time.column is None:

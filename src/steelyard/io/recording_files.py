@@ -32,7 +32,7 @@ def write_recording(recording: Recording, folder: Path) -> Path:
         raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
     gravity = ", ".join(f"{g:g}" for g in recording.gravity)
-    text = [f"[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = \"{sign}\"\n"]
+    text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
     for stream in recording.streams:
         text.append(_described(stream))
         write_text(folder / stream.name, _csv(stream))

@@ -14,9 +14,7 @@ def require_answerable(specs: Sequence[StreamSpec], name: str) -> None:
     given = [quantity for spec in specs for quantity in spec.names]
     for quantity in given:
         if given.count(quantity) > 1:
-            raise BadDescription(
-                f'{name}: "{quantity}" is given by {given.count(quantity)} streams. Give it in one.'
-            )
+            raise BadDescription(f'{name}: "{quantity}" is given by {given.count(quantity)} streams. Give it in one.')
     shown = ", ".join(quantity for quantity in QUANTITIES if quantity in given)
     missing = [quantity for quantity in ("force", "torque") if quantity not in given]
     if missing:
@@ -44,6 +42,4 @@ def require_matched_rows(streams: Sequence[Stream], name: str) -> None:
         )
     if len({len(stream) for stream in streams}) > 1:
         shown = ", ".join(f'"{stream.name}" {len(stream)}' for stream in streams)
-        raise BadValue(
-            f"{name}: streams without time are matched by row, but their lengths differ: {shown} rows."
-        )
+        raise BadValue(f"{name}: streams without time are matched by row, but their lengths differ: {shown} rows.")

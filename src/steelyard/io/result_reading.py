@@ -61,9 +61,7 @@ def _identified(path: Path, values: dict[str, Any]) -> np.ndarray[Any, np.dtype[
 
 def _findings(path: Path, values: dict[str, Any]) -> tuple[Finding, ...]:
     try:
-        return tuple(
-            Finding(str(f["code"]), str(f["message"]), str(f["remedy"])) for f in values.get("findings") or ()
-        )
+        return tuple(Finding(str(f["code"]), str(f["message"]), str(f["remedy"])) for f in values.get("findings") or ())
     except (KeyError, TypeError):
         raise BadFile(f'{path}: "findings" must be a list of objects with code, message and remedy.') from None
 

@@ -81,18 +81,12 @@ def parse_stream(entry: Entry) -> StreamSpec:
         _quantity(entry, name) for name in QUANTITIES if name in entry and not (zero and name == "torque")
     )
     if not quantities:
-        raise entry.error(
-            'no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }'
-        )
+        raise entry.error('no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }')
     kind = entry.text("kind")
     if kind not in (None, "poses"):
-        raise entry.error(
-            f'unknown kind "{kind}". Leave it out, or write kind = "poses" for a table of still poses.'
-        )
+        raise entry.error(f'unknown kind "{kind}". Leave it out, or write kind = "poses" for a table of still poses.')
     if kind == "poses" and "time" in entry:
-        raise entry.error(
-            'kind = "poses" is a table of still poses without time; leave out "time" or "kind".'
-        )
+        raise entry.error('kind = "poses" is a table of still poses without time; leave out "time" or "kind".')
     return StreamSpec(
         path,
         quantities,
@@ -141,9 +135,7 @@ def _rotation(entry: Entry) -> QuantitySpec:
 def _columns(entry: Entry, count: int) -> tuple[Column, ...]:
     """Return `count` column names or numbers; one alone may name an NPZ array that holds all of them."""
     value = entry.require("columns", f"columns = [..] with {count} names")
-    good = isinstance(value, list) and all(
-        isinstance(c, str | int) and not isinstance(c, bool) for c in value
-    )
+    good = isinstance(value, list) and all(isinstance(c, str | int) and not isinstance(c, bool) for c in value)
     if not good or any(isinstance(c, int) and c < 0 for c in value):
         raise entry.error(f'"columns" must be a list of names or of numbers from 0; got {value!r}.')
     if len(value) not in (1, count):

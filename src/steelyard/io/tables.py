@@ -129,8 +129,7 @@ def _find(header: Header, column: Column, where: str) -> tuple[int, ...]:
         return (header.names.index(column),)
     if found:
         raise BadDescription(
-            f'{where}: the name "{column}" stands over {found} columns. '
-            "Rename all but one, or give column numbers."
+            f'{where}: the name "{column}" stands over {found} columns. Rename all but one, or give column numbers.'
         )
     there = header.shown()
     raise BadDescription(

@@ -40,9 +40,7 @@ def head_lines(path: Path) -> list[str]:
     if len(head) == _HEAD:
         text = text[: text.rfind("\n") + 1]
         if not text:
-            raise BadFile(
-                f"{path}: expected a table with one row per line; found no line end in the first 64 kB."
-            )
+            raise BadFile(f"{path}: expected a table with one row per line; found no line end in the first 64 kB.")
     return text.split("\n")
 
 
@@ -50,9 +48,7 @@ def _require_text(path: Path, block: bytes) -> None:
     if block.startswith((b"\xff\xfe", b"\xfe\xff")):
         raise BadFile(f"{path}: the text is in UTF-16. Save it in UTF-8.")
     if b"\0" in block or _CONTROL.search(block, 0, _HEAD):
-        raise BadFile(
-            f"{path}: expected a text table; found binary data. Readable are text tables, .npz and .parquet."
-        )
+        raise BadFile(f"{path}: expected a text table; found binary data. Readable are text tables, .npz and .parquet.")
 
 
 def blocks(path: Path, skip: int) -> Iterator[str]:

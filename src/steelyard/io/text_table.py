@@ -86,9 +86,7 @@ class TextTable:
         try:
             with warnings.catch_warnings():
                 warnings.simplefilter("error", DeprecationWarning)  # an integer that is written as 1.5
-                rows = np.loadtxt(
-                    lines, kind, comments, self.delimiter, usecols=order, ndmin=1, quotechar=quote
-                )
+                rows = np.loadtxt(lines, kind, comments, self.delimiter, usecols=order, ndmin=1, quotechar=quote)
         except (ValueError, OverflowError, DeprecationWarning) as error:
             if integers:
                 return self._parse(block, order, set(), line)
@@ -140,9 +138,7 @@ def split(line: str, delimiter: str | None) -> tuple[str, ...]:
     """Return the cells of a line without blanks and quotes around them."""
     if delimiter is None:
         return tuple(word.strip('"') for word in _WORDS.findall(line))
-    return tuple(
-        cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True))
-    )
+    return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)))
 
 
 def _holds_row(line: str) -> bool:

@@ -26,6 +26,7 @@ from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
 _FEWEST_ROWS = 12
+_INTERPOLATION = 0.01  # of a sampling step
 
 
 @dataclass(frozen=True)
@@ -86,9 +87,7 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
         return Aligned(log, findings=findings, rotation=rotation, acceleration_from=source)
     if len(timed) < len(recording.streams):
         other = next(s for s in recording.streams if s not in timed)
-        raise BadDescription(
-            f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock."
-        )
+        raise BadDescription(f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock.")
     return _align_timed(_prepare(recording, options or AlignOptions()))
 
 
@@ -135,9 +134,7 @@ def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
     """Smooth the motion, low-pass the rest, and turn the wrench into S."""
     source = _wrench_stream(recording)
     lag = source.delay or 0.0
-    streams = tuple(
-        replace(s, time=_time(s) - lag, delay=0.0) if s is source else s for s in recording.streams
-    )
+    streams = tuple(replace(s, time=_time(s) - lag, delay=0.0) if s is source else s for s in recording.streams)
     wrench_stream = next(s for s in streams if s.name == source.name and "force" in s.channels)
     cutoff = _cutoff(streams, wrench_stream, options)
     moving = kinematics(streams, recording.gravity, cutoff)
@@ -147,9 +144,7 @@ def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
         sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
     used = {*moving.streams, *([sensor.name] if sensor is not None else [])} - {wrench_stream.name}
     known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
-    sought = (
-        [s.name for s in streams if s.name in used and s.delay is None] if options.estimate_delays else []
-    )
+    sought = [s.name for s in streams if s.name in used and s.delay is None] if options.estimate_delays else []
     rotation = None
     if any(wrench_stream.frames.get(q, "S") == "W" for q in ("force", "torque")):
         rotation = moving.at(_time(wrench_stream), known).rotation
@@ -258,23 +253,27 @@ def _clocks(given: _Prepared, time: Array, wrench: Array) -> tuple[Clocks, tuple
         ok = inner[0] & inner[1]
     pick = np.flatnonzero(ok)
     if len(pick) < _FEWEST_ROWS:
-        raise CannotAnswer(
-            f"the streams share only {len(pick)} rows in time; record a longer stretch on all."
-        )
+        raise CannotAnswer(f"the streams share only {len(pick)} rows in time; record a longer stretch on all.")
     pick = pick[:: max(len(pick) // _FIT_ROWS, 1)]
-    question = Question(
-        time[pick], wrench[pick], given.kinematics, given.imu, given.unknown, given.known, reach
-    )
+    question = Question(time[pick], wrench[pick], given.kinematics, given.imu, given.unknown, given.known, reach)
     clocks = refine(question, {**given.known, **scan(question)})
+    clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
     least = given.options.smallest_delay_s
     late = tuple(n for n in given.unknown if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
     if len(late) < len(given.unknown):
         none = {n: 0.0 for n in given.unknown if n not in late}
         fixed = replace(question, unknown=late, known={**given.known, **none}, _cache={})
         again = refine(fixed, {**clocks.delays_s, **none})
-        spread = {**clocks.delays_std_s, **{n: again.delays_std_s[n] for n in late}}
+        found = _with_interpolation(given, again.delays_std_s)
+        spread = {**clocks.delays_std_s, **{n: found[n] for n in late}}
         clocks = replace(again, delays_std_s=spread)
     return clocks, late
+
+
+def _with_interpolation(given: _Prepared, stds: Mapping[str, float]) -> dict[str, float]:
+    """Return standard deviations that allow for interpolation: a hundredth of a stream's step."""
+    steps = {s.name: 1 / sampling_rate(_time(s)) for s in given.recording.streams}
+    return {n: float(np.hypot(v, _INTERPOLATION * steps[n])) if v > 0 else v for n, v in stds.items()}
 
 
 def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[MotionLog, Motion]:
@@ -289,9 +288,7 @@ def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[
         arm = float(clocks.mounting.position @ clocks.mounting.position)
         variance = given.imu.noise_std**2 + arm * motion.alpha_variance
     if gravity is None:
-        raise BadDescription(
-            "no stream tells where gravity points: give rotation, gravity or specific_force."
-        )
+        raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
     bare = MotionLog(wrench, gravity, acceleration, motion.omega, motion.alpha)
     still = still_rows(time, motion.omega, motion.velocity, wrench)
     index = classes(still, motion.alpha_variance)
@@ -301,9 +298,7 @@ def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[
         index, motion.alpha_variance, variance, residual - np.median(residual, 0), clocks.body,
         noise_std(given.wrench) ** 2 * share, given.recording.noise,
     )  # fmt: skip
-    log = replace(
-        bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise
-    )
+    log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
     return log, motion
 
 

@@ -33,9 +33,7 @@ def mount_findings(imu: Imu | None, mounting: Mounting | None) -> tuple[Finding,
         return ()
     out = []
     if imu.factor != 1.0:
-        message = (
-            f"The numbers of '{imu.name}' only fit gravity when multiplied by {imu.factor:.4g}; they were."
-        )
+        message = f"The numbers of '{imu.name}' only fit gravity when multiplied by {imu.factor:.4g}; they were."
         out.append(Finding.of("gravity-in-g", message))
     angle = float(mounting.rotation.angle())
     std = 0.0 if mounting.rotation_std is None else float(np.max(mounting.rotation_std))
@@ -53,9 +51,7 @@ def tap_findings(taps: Array, start: float, rows: int, total: int) -> tuple[Find
     if not len(taps):
         return ()
     at = ", ".join(f"{t - start:.2f}" for t in taps.mean(1)[:8]) + (", ..." if len(taps) > 8 else "")
-    bursts = (
-        "one short burst (tap or knock)" if len(taps) == 1 else f"{len(taps)} short bursts (taps or knocks)"
-    )
+    bursts = "one short burst (tap or knock)" if len(taps) == 1 else f"{len(taps)} short bursts (taps or knocks)"
     return (Finding.of("outliers", f"Found {bursts} at {at} s; {rows} of {total} rows were left out."),)
 
 
@@ -102,7 +98,6 @@ def notes(clocks: Clocks, acceleration_from: str) -> tuple[str, ...]:
         out.append("the accelerometer's mount rotation is not fixed about every axis by this motion")
     if acceleration_from == "none":
         out.append(
-            "no stream measures the acceleration of S: it is taken as zero, "
-            "with a spread that grows with turning"
+            "no stream measures the acceleration of S: it is taken as zero, with a spread that grows with turning"
         )
     return tuple(out)

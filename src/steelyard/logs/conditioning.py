@@ -69,9 +69,7 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
     from scipy.signal import butter, sosfiltfilt
 
     if not 0 < cutoff_hz < rate_hz / 2:
-        raise BadValue(
-            f"cut-off must be between 0 and half the rate ({rate_hz / 2:.6g} Hz); got {cutoff_hz:.6g} Hz."
-        )
+        raise BadValue(f"cut-off must be between 0 and half the rate ({rate_hz / 2:.6g} Hz); got {cutoff_hz:.6g} Hz.")
     sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
     pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
     return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=pad))
@@ -80,9 +78,7 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
 def central_difference(time: Array, values: Array) -> Array:
     """Return the derivative (N, D) by second-order central differences (one-sided at the ends), as the
     papers do."""
-    return np.asarray(
-        np.gradient(check.finite("values", values), check.finite("time", time), axis=0, edge_order=2)
-    )
+    return np.asarray(np.gradient(check.finite("values", values), check.finite("time", time), axis=0, edge_order=2))
 
 
 def tare(wrench: Array, rows: Any) -> tuple[Array, Array]:

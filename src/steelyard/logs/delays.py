@@ -71,7 +71,7 @@ def scan(question: Question, rows: int = 3000) -> dict[str, float]:
     best."""
     thin = _thinned(question, rows)
     delays = {**question.known, **dict.fromkeys(question.unknown, 0.0)}
-    names = sorted(question.unknown, key=lambda n: question.imu is not None and n == question.imu.name)
+    names = sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name)
     grid = np.arange(-question.max_delay_s, question.max_delay_s + 1e-9, 0.004)
     grid = grid[np.argsort(np.abs(grid), kind="stable")]  # ties go to no delay
     for name in names:
@@ -85,7 +85,16 @@ def _scan_cost(question: Question, delays: Mapping[str, float], name: str) -> fl
     motion, force = question.seen(delays)
     own = force is not None and question.imu is not None and name == question.imu.name
     chosen = [np.ones((len(force), 1)), force] if own and force is not None else features(motion, None)
-    left = (free_residual(question.wrench, chosen) ** 2).mean(0) / (question.wrench.var(0) + 1e-30)
+    cost = _log_share(question.wrench, chosen)
+    if force is not None and not own and motion.gravity is not None:
+        # The accelerometer feels gravity turn as well, and no hand on the object disturbs it.
+        cost += _log_share(force, chosen)
+    return cost
+
+
+def _log_share(values: Array, chosen: list[Array]) -> float:
+    """Return the sum of the logs of what free linear fits leave of the channels' variance."""
+    left = (free_residual(values, chosen) ** 2).mean(0) / (values.var(0) + 1e-30)
     return float(np.log(left + 1e-9).sum())
 
 

@@ -21,6 +21,9 @@ _PRIOR_BODY = np.array([30.0, 3, 3, 3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3])
 _STEP = 1e-4
 _LONGEST_STEP = 0.01  # [s] a delay may move at once
 _FINEST = 1e-4  # of a channel's spread: no residual is trusted below
+_SPOILED = 1.2  # times the accelerometer's residual with the mount that gravity tells
+_HELD = 1e-9
+_GRAVITY_CLOCK = 0.015  # [s] std of a delay told by comparing an accelerometer with orientations
 _LONGEST_MEMORY = 0.1  # of the rows: how far the correlation of residuals is followed
 
 
@@ -34,9 +37,7 @@ class _Layout:
     mount: Rotation | None
 
     @classmethod
-    def of(
-        cls, question: Question, delays: Mapping[str, float], mount: Rotation | None, centre: bool
-    ) -> _Layout:
+    def of(cls, question: Question, delays: Mapping[str, float], mount: Rotation | None, centre: bool) -> _Layout:
         names, start, width = [], [], []
 
         def add(name: str, value: Array, spread: Array) -> None:
@@ -61,6 +62,21 @@ class _Layout:
         ends = np.cumsum([k for _, k in names])
         slices = {name: slice(int(e) - k, int(e)) for (name, k), e in zip(names, ends, strict=True)}
         return cls(slices, np.concatenate(start), np.concatenate(width), mount)
+
+    def held(self, *names: str) -> _Layout:
+        """Return the layout with these blocks held where they start."""
+        width = self.width.copy()
+        for name in names:
+            width[self.slices[name]] = _HELD
+        return replace(self, width=width)
+
+    def held_clocks(self, question: Question) -> _Layout:
+        """Return the layout with every delay but the accelerometer's held where it starts."""
+        width = self.width.copy()
+        for i, name in enumerate(question.unknown):
+            if question.imu is None or name != question.imu.name:
+                width[self.slices["delay"].start + i] = _HELD
+        return replace(self, width=width)
 
     def get(self, theta: Array, name: str, default: Array) -> Array:
         """Return one block of theta."""
@@ -96,14 +112,17 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     if question.imu is not None and force is not None:
         mount = question.imu.rotation or first_mount(force, motion.gravity, question.wrench[:, 3:])
     layout = _Layout.of(question, delays, mount, centre=motion.gravity is not None and not motion.measured)
-    theta, sigma = layout.start.copy(), None
-    for _ in range(_ROUNDS):
-        theta, weights, sigma = _descend(question, layout, theta, sigma)
+    layout = _mount_by_gravity(question, layout)
+    theta, weights = _rounds(question, layout)
+    if _mount_spoiled(question, layout, theta):
+        layout = layout.held("rotation", "bias").held_clocks(question)
+        theta, weights = _rounds(question, layout)
     std = _block_std(question, layout, theta, weights)
     residual = _residual(question, layout, theta)[:, :6]
     found = layout.delays(theta, question)
     spread = dict.fromkeys(found, 0.0)
-    spread.update(zip(question.unknown, (float(v) for v in std[layout.slices["delay"]]), strict=True))
+    loose = np.where(layout.width[layout.slices["delay"]] < _HELD * 2, _GRAVITY_CLOCK, std[layout.slices["delay"]])
+    spread.update(zip(question.unknown, (float(v) for v in loose), strict=True))
     mounting = None
     if question.imu is not None:
         mounting = replace(
@@ -148,15 +167,54 @@ def _jacobian(question: Question, layout: _Layout, theta: Array) -> tuple[Array,
     return base, out
 
 
+def _rounds(question: Question, layout: _Layout) -> tuple[Array, Array]:
+    """Return the fit and its row weights: scales from the residuals, far rows first counted less, then let go."""
+    theta, sigma = layout.start.copy(), _first_scales(question, layout)
+    weights = np.zeros((0, 0))
+    for k in range(_ROUNDS):
+        theta, weights, sigma = _descend(question, layout, theta, sigma, power=1 if k < _ROUNDS // 2 else 2)
+    return theta, weights
+
+
+def _mount_spoiled(question: Question, layout: _Layout, theta: Array) -> bool:
+    """Say whether the wrench has turned the mount away from what gravity shows (a hand on the object does)."""
+    if "rotation" not in layout.slices:
+        return False
+    mounted = theta.copy()
+    for name in ("rotation", "bias"):
+        mounted[layout.slices[name]] = layout.start[layout.slices[name]]
+    sizes = [np.median(np.abs(_residual(question, layout, t)[:, 6:]).sum(1)) for t in (mounted, theta)]
+    return bool(sizes[1] > _SPOILED * sizes[0])
+
+
+def _mount_by_gravity(question: Question, layout: _Layout) -> _Layout:
+    """Return the layout started, and softly held, at the mount that gravity alone tells.
+
+    A hand on the object spoils the wrench for seconds; it cannot spoil this. Held at three standard deviations,
+    so that a clean wrench, which says it ten times better, has the last word.
+    """
+    if "rotation" not in layout.slices or question.seen(layout.delays(layout.start, question))[0].gravity is None:
+        return layout
+    alone = layout.held("delay")
+    sigma = _first_scales(question, layout)
+    sigma[:6] = np.inf
+    theta, weights, _ = _descend(question, alone, layout.start, sigma)
+    std = _block_std(question, alone, theta, weights)
+    start, width = layout.start.copy(), layout.width.copy()
+    for name, least in (("rotation", 0.01), ("bias", 0.02)):
+        part = layout.slices[name]
+        start[part], width[part] = theta[part], np.clip(3 * std[part], least, width[part])
+    return replace(layout, start=start, width=width)
+
+
 def _descend(
-    question: Question, layout: _Layout, theta: Array, sigma: Array | None
+    question: Question, layout: _Layout, theta: Array, sigma: Array, power: int = 1
 ) -> tuple[Array, Array, Array]:
     """Take Gauss-Newton steps at fixed scales; return theta, row weights (N, k) and new scales (k,)."""
-    sigma = _first_scales(question, layout) if sigma is None else sigma
     pull = 1 / layout.width**2
     for _ in range(_STEPS):
         r, J = _jacobian(question, layout, theta)
-        H, scores = _normal(J, _weights(r, sigma), r, pull)
+        H, scores = _normal(J, _weights(r, sigma, power), r, pull)
         step = -np.linalg.solve(H, scores.sum(0) + pull * (theta - layout.start))
         biggest = float(np.abs(step[layout.slices["delay"]]).max(initial=0.0))
         step = step * min(1.0, _LONGEST_STEP / max(biggest, 1e-12))
@@ -167,7 +225,8 @@ def _descend(
     least = _first_scales(question, layout)
     seen = np.clip(1.4826 * np.median(np.abs(r), axis=0), 0.3 * least, 3 * least)
     seen[6:] *= np.sqrt(_memory(r[:, 6:]))
-    return theta, _weights(r, seen), seen
+    seen[:6] = np.where(np.isfinite(sigma[:6]), seen[:6], np.inf)
+    return theta, _weights(r, seen, power), seen
 
 
 def _normal(J: Array, weights: Array, r: Array, pull: Array) -> tuple[Array, Array]:
@@ -197,22 +256,23 @@ def _first_scales(question: Question, layout: _Layout) -> Array:
     scales = 1.4826 * np.median(np.abs(residual), axis=0)
     if force is not None and motion.gravity is not None:
         steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
-        scales = np.append(
-            scales, 1.4826 * np.median(np.abs(free_residual(force, steady)), axis=0).mean() * np.ones(3)
-        )
+        scales = np.append(scales, 1.4826 * np.median(np.abs(free_residual(force, steady)), axis=0).mean() * np.ones(3))
     sizes = question.wrench.std(0)
     if len(scales) > 6 and force is not None:
         sizes = np.append(sizes, np.full(3, force.std()))
     return np.asarray(np.maximum(scales, _FINEST * sizes + 1e-12))
 
 
-def _weights(residual: Array, sigma: Array) -> Array:
-    """Return weights (N, k): 1/sigma^2, less for rows beyond three sigma (Huber on the row's norm)."""
+def _weights(residual: Array, sigma: Array, power: int) -> Array:
+    """Return weights (N, k): 1/sigma^2, less for rows beyond two sigma.
+
+    Judged by the rms of the row's wrench and of its accelerometer; power 1 = Huber, 2 lets far rows go.
+    """
     scaled = residual / sigma
     out = np.empty_like(residual)
     for part in (slice(0, 6), slice(6, None)):
         size = np.sqrt((scaled[:, part] ** 2).mean(1)) if scaled[:, part].size else np.zeros(len(scaled))
-        out[:, part] = np.minimum(1.0, 2.0 / np.maximum(size, 1e-12))[:, None] / sigma[part] ** 2
+        out[:, part] = (np.minimum(1.0, 2.0 / np.maximum(size, 1e-12)) ** power)[:, None] / sigma[part] ** 2
     return out
 
 

@@ -226,7 +226,5 @@ def _into_sensor(values: Array, channel: Channel, turn: Rotation | None) -> Arra
     if not channel.world:
         return values
     if turn is None:
-        raise BadDescription(
-            f"a channel of '{channel.stream}' is given in W, but there is no rotation of S in W."
-        )
+        raise BadDescription(f"a channel of '{channel.stream}' is given in W, but there is no rotation of S in W.")
     return turn.inverse().apply(values)

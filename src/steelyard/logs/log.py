@@ -12,6 +12,9 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.spatial import Pose, cross_matrix
 
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
 
 @dataclass(frozen=True, eq=False)
 class Noise:
@@ -32,9 +35,7 @@ class Noise:
             object.__setattr__(self, name, value)
 
     @classmethod
-    def of_std(
-        cls, angular_acceleration: float, acceleration: float, force: float, torque: float
-    ) -> Noise:
+    def of_std(cls, angular_acceleration: float, acceleration: float, force: float, torque: float) -> Noise:
         """Return equal noise on the three axes from standard deviations (rad/s^2, m/s^2, N, N m)."""
         pair = [[angular_acceleration, acceleration], [torque, force]]
         return cls(*(np.repeat(np.square(p), 3) for p in pair))
@@ -50,10 +51,10 @@ class MotionLog:
     angular_velocity      (N, 3) [rad/s]
     angular_acceleration  (N, 3) [rad/s^2]
     time                  (N,) [s] or None: rows then have no order and no neighbours
-    still                 (N,) rows known to be at rest
+    still                 (N,) rows known to be at rest; none by default
     pose                  (N,) number of the still pose or time block a row belongs to (for hold-out and jackknife);
-                          -1 = none
-    noise_class           (N,) index into `noise`
+                          -1 = none, the default
+    noise_class           (N,) index into `noise`; 0 by default
     noise                 one Noise per class; None = not known yet
     """
 
@@ -63,9 +64,10 @@ class MotionLog:
     angular_velocity: Array
     angular_acceleration: Array
     time: Array | None = None
-    still: np.ndarray[Any, np.dtype[np.bool_]] | None = None
-    pose: np.ndarray[Any, np.dtype[np.int64]] | None = None
-    noise_class: np.ndarray[Any, np.dtype[np.int64]] | None = None
+    # None stands for the default given above and is filled in at once.
+    still: Mask = None  # type: ignore[assignment]
+    pose: Integers = None  # type: ignore[assignment]
+    noise_class: Integers = None  # type: ignore[assignment]
     noise: tuple[Noise, ...] | None = None
 
     def __post_init__(self) -> None:
@@ -78,7 +80,7 @@ class MotionLog:
         defaults = {"still": (np.bool_, False), "pose": (np.int64, -1), "noise_class": (np.int64, 0)}
         for name, (kind, default) in defaults.items():
             given = getattr(self, name)
-            value = np.full(rows, default, kind) if given is None else np.asarray(given, kind)
+            value: np.ndarray[Any, Any] = np.full(rows, default, kind) if given is None else np.asarray(given, kind)
             value.flags.writeable = False
             object.__setattr__(self, name, value)
         self._check_lengths(rows)
@@ -127,7 +129,13 @@ class MotionLog:
         zero = np.zeros((len(wrench), 3))
         rows = len(wrench)
         return cls(
-            wrench, gravity, zero, zero, zero, still=np.ones(rows, np.bool_), pose=np.arange(rows, dtype=np.int64)
+            wrench,
+            gravity,
+            zero,
+            zero,
+            zero,
+            still=np.ones(rows, np.bool_),
+            pose=np.arange(rows, dtype=np.int64),
         )
 
     def predicted(self, phi: Array) -> Array:
@@ -141,5 +149,3 @@ class MotionLog:
         force = m * a - alpha @ H.T + turn
         torque = a @ H.T + alpha @ inertia + np.cross(omega, omega @ inertia)
         return np.concatenate([torque, force], 1)
-
-

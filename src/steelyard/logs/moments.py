@@ -2,7 +2,8 @@
 
 With z = [alpha (3), a - g (3), omega omega^T (xx xy xz yy yz zz), tau (3), f (3), 1] a group keeps sum z z^T. Ordinary,
 weighted and noise-aware least squares, part masses and a constant bias need nothing else, whatever the length of the
-log. A group is one noise class within one time block or still pose. Groups of logs of one body add; a stream forgets by scaling.
+log. A group is one noise class within one time block or still pose. Groups of logs of one body add; a stream forgets
+by scaling.
 """
 
 from __future__ import annotations
@@ -11,7 +12,6 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numba
 import numpy as np
@@ -19,16 +19,22 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 
 SIZE = 19
-ALPHA, ACCEL, OMEGA2, TORQUE, FORCE, ONE = slice(0, 3), slice(3, 6), slice(6, 12), slice(12, 15), slice(15, 18), 18
+ALPHA, ACCEL, OMEGA2, TORQUE, FORCE, ONE = (
+    slice(0, 3),
+    slice(3, 6),
+    slice(6, 12),
+    slice(12, 15),
+    slice(15, 18),
+    18,
+)
 MOTION, WRENCH = slice(0, 12), slice(12, 18)
 
 _CHUNK = 128
 # Runs of rows of one group shorter than this, on average, are sorted before the pass.
 SHORTEST_RUN = 16
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @numba.njit(cache=True, fastmath=True, nogil=True)
@@ -51,7 +57,14 @@ def _features(
 
 @numba.njit(cache=True, fastmath=True, nogil=True)
 def _scatter_pass(
-    alpha: Array, accel: Array, gravity: Array, omega: Array, wrench: Array, starts: Integers, group: Integers, out: Array
+    alpha: Array,
+    accel: Array,
+    gravity: Array,
+    omega: Array,
+    wrench: Array,
+    starts: Integers,
+    group: Integers,
+    out: Array,
 ) -> None:
     """Add z z^T of the rows starts[k]..starts[k+1] to out[group[k]] for every run k, in one pass over memory."""
     buffer = np.empty((SIZE, _CHUNK))
@@ -84,7 +97,7 @@ class Moments:
     scatter: Array
     noise_class: Integers
     block: Integers
-    still: np.ndarray[Any, np.dtype[np.bool_]]
+    still: Mask
     noise: tuple[Noise, ...] | None = None
 
     @classmethod
@@ -117,7 +130,7 @@ class Moments:
         """Return the statistic with every row weighted by `factor` (forgetting)."""
         return Moments(self.scatter * factor, self.noise_class, self.block, self.still, self.noise)
 
-    def where(self, keep: np.ndarray[Any, np.dtype[np.bool_]]) -> Moments:
+    def where(self, keep: Mask) -> Moments:
         """Return the statistic of the groups where `keep` (G,) is true."""
         return Moments(self.scatter[keep], self.noise_class[keep], self.block[keep], self.still[keep], self.noise)
 
@@ -175,7 +188,14 @@ def features(log: MotionLog) -> Array:
     """Return z (N, 19) of every row: for second passes; the statistic itself never stores them."""
     out = np.empty((SIZE, len(log)))
     _features(
-        log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench, 0, len(log), out
+        log.angular_acceleration,
+        log.acceleration,
+        log.gravity,
+        log.angular_velocity,
+        log.wrench,
+        0,
+        len(log),
+        out,
     )
     return out.T
 

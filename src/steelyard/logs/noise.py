@@ -18,9 +18,7 @@ def classes(still: Mask, alpha_variance: Array) -> Numbers:
     """Return a class (N,) per row: still rows, and moving rows binned by factors of four of their variance
     (N,)."""
     base = float(np.median(alpha_variance)) or 1.0
-    bins = np.clip(np.rint(np.log(np.maximum(alpha_variance, 1e-30) / base) / np.log(4.0)), -1, 3).astype(
-        np.int64
-    )
+    bins = np.clip(np.rint(np.log(np.maximum(alpha_variance, 1e-30) / base) / np.log(4.0)), -1, 3).astype(np.int64)
     label = np.where(still, -2, bins)
     # A bin with few rows joins the moving rows around the median.
     names, counts = np.unique(label, return_counts=True)

@@ -1,4 +1,7 @@
-"""Recording: what was read from files, before anything is aligned. Streams keep their own clocks and frames; units are SI."""
+"""Recording: what was read from files, before anything is aligned.
+
+Streams keep their own clocks and frames; units are SI.
+"""
 
 from __future__ import annotations
 

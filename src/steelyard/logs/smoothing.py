@@ -76,9 +76,7 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None) -> Smooth:
     back = (scale / step) ** np.arange(order)
     states, variance = states * back[:, None], np.einsum("nii->ni", cov) * back**2 * noise
     states[:, 0] += origin
-    return Smooth(
-        t, check.frozen(states[:, :3]), check.frozen(np.maximum(variance[:, :3], 0)), float(np.sqrt(noise))
-    )
+    return Smooth(t, check.frozen(states[:, :3]), check.frozen(np.maximum(variance[:, :3], 0)), float(np.sqrt(noise)))
 
 
 @dataclass(frozen=True, eq=False)

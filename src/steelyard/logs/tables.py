@@ -26,17 +26,13 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     lengths = {s.name: len(s) for s in streams}
     if len(set(lengths.values())) > 1:
         shown = ", ".join(f"'{n}' has {k}" for n, k in lengths.items())
-        raise BadDescription(
-            f"streams without time are matched by row, so they need one length; {shown} rows."
-        )
+        raise BadDescription(f"streams without time are matched by row, so they need one length; {shown} rows.")
     found = {q: (s, v) for s in reversed(streams) for q, v in s.channels.items()}
     if "force" not in found or "torque" not in found:
         raise BadDescription("a log needs force and torque.")
     rotation = Rotation.nearest(found["rotation"][1]) if "rotation" in found else None
     force, torque = found["force"][0], found["torque"][0]
-    merged = (
-        force if force is torque else Stream(force.name, {**force.channels, "torque": found["torque"][1]})
-    )
+    merged = force if force is torque else Stream(force.name, {**force.channels, "torque": found["torque"][1]})
     wrench = wrench_in_sensor(merged, recording.wrench_sign, rotation)
     gravity = _gravity(recording, rotation, wrench)
     if all(s.poses for s in streams):
@@ -45,9 +41,7 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     names = ", ".join(f"'{s.name}'" for s in streams)
     given = [q for q in ("linear_acceleration", "angular_acceleration") if q in found]
     what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"
-    finding = Finding.of(
-        "clock-missing", f"{names} has no clock: no delay or derivative can be found; {what}."
-    )
+    finding = Finding.of("clock-missing", f"{names} has no clock: no delay or derivative can be found; {what}.")
     return log, rotation, (finding,), "linear_acceleration" if "linear_acceleration" in found else "none"
 
 
@@ -62,9 +56,7 @@ def wrench_in_sensor(stream: Stream, sign: int, rotation: Rotation | None) -> Ar
         values = stream.channels[quantity]
         if stream.frames.get(quantity, "S") == "W":
             if rotation is None:
-                raise BadDescription(
-                    f"{quantity} of '{stream.name}' is given in W, but no stream gives the rotation."
-                )
+                raise BadDescription(f"{quantity} of '{stream.name}' is given in W, but no stream gives the rotation.")
             values = rotation.inverse().apply(values)
         elif stream.mount is not None and stream.mount.rotation is not None:
             values = stream.mount.rotation.apply(values)
@@ -108,9 +100,7 @@ def _log_of_rows(recording: Recording, wrench: Array, gravity: Array, rotation: 
         for stream, values in _with(quantity, recording):
             if stream.frames.get(quantity, "S") == "W":
                 if rotation is None:
-                    raise BadDescription(
-                        f"{quantity} of '{stream.name}' is given in W, but there is no rotation."
-                    )
+                    raise BadDescription(f"{quantity} of '{stream.name}' is given in W, but there is no rotation.")
                 values = rotation.inverse().apply(values)
             motion[quantity] = values
             break

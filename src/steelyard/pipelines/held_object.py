@@ -126,4 +126,3 @@ def _in_recording_sign(estimate: Estimate, recording: Recording) -> Estimate:
 
 
 _in_log_sign = _in_recording_sign
-

@@ -22,7 +22,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.glance import Glance, channel, glance, rolled
-from steelyard.sanity.static_fit import StaticFit, fit, solve
+from steelyard.sanity.static_fit import StaticFit, beside, fit, solve
 from steelyard.sanity.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
 from steelyard.sanity.units import scaled
 
@@ -74,12 +74,18 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
 
 
 def _reading(
-    view: Glance, code: str, words: str, gravity: Array, rotation: Array | None, shift: int = 0, transposed: bool = False
+    view: Glance,
+    code: str,
+    words: str,
+    gravity: Array,
+    rotation: Array | None,
+    shift: int = 0,
+    transposed: bool = False,
 ) -> Reading:
     """Return a reading with the better of two fits: with the measured acceleration and without."""
-    found = fit(*view.seen(gravity, rotation), view.block)
+    found = fit(view.seen(gravity, rotation), view.block)
     if view.acceleration is not None:
-        still = fit(*replace(view, acceleration=None).seen(gravity, rotation), view.block)
+        still = fit(replace(view, acceleration=None).seen(gravity, rotation), view.block)
         found = min(found, still, key=lambda f: f.force_share)
     return Reading(code, words, gravity, rotation, found, shift, transposed)
 
@@ -115,7 +121,9 @@ def _best_rival(view: Glance, given: Reading) -> Reading | None:
         and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
         and r.fit.sign != 0
         and _varies(view, r)
-        and (r.code != "gravity-frame" or r.transposed or free is None or r.fit.force_share < 2 * free.force_share + 1e-3)
+        and (
+            r.code != "gravity-frame" or r.transposed or free is None or r.fit.force_share < 2 * free.force_share + 1e-3
+        )
         and (not (r.transposed or r.quaternion_shift) or free is None or r.fit.force_share < 0.5 * free.force_share)
     ]
     # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
@@ -124,7 +132,7 @@ def _best_rival(view: Glance, given: Reading) -> Reading | None:
 
 def _varies(view: Glance, reading: Reading) -> bool:
     """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
-    _, pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation)
+    pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation).pull
     return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
 
 
@@ -174,9 +182,10 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
     """Return the sign of the mass that the measured acceleration shows; 0 where none is measured or it is too weak."""
     if view.acceleration is None or reading.rotation is None:
         return 0
-    wrench, pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation)
-    _, slowed = view.seen(np.zeros(3), reading.rotation)
-    masses, spread, _ = solve(np.stack([-slowed, -pull], 2), wrench[:, 3:], view.block)
+    seen = replace(view, acceleration=None).seen(reading.gravity, reading.rotation)
+    slowed = view.seen(np.zeros(3), reading.rotation).pull
+    columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)
+    masses, spread, _ = solve(columns, seen.wrench[:, 3:], view.block)
     sure = abs(masses[0]) > 5 * spread[0] and 0.5 < abs(masses[0] / masses[1]) < 2
     return int(np.sign(masses[0])) if sure else 0
 
@@ -191,7 +200,9 @@ def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[F
     if stream is None:
         return recording, ()
     if found.arm / 1000 < FURTHEST_ARM and abs(found.mass) < 0.02:
-        message = f"{where}: the force is a thousand times too small, as when kN are read as N; it was multiplied by 1000."
+        message = (
+            f"{where}: the force is a thousand times too small, as when kN are read as N; it was multiplied by 1000."
+        )
         return scaled(recording, stream, ("force",), 1e3), (Finding.of("force-unit", message),)
     if found.arm / 1000 < FURTHEST_ARM:
         message = f"{where}: the torque is in N mm; it was divided by 1000."

@@ -16,7 +16,7 @@ from steelyard.check import Array
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.imu import first_mount
 from steelyard.logs.recording import Recording, Stream
-from steelyard.spatial import Rotation
+from steelyard.spatial import Rotation, cross_matrix
 
 CUTOFF_HZ = 3.0
 _RATE_HZ = 100.0
@@ -57,19 +57,56 @@ class Glance:
         """Return values (N, k) through the common low-pass; the rows of a table as they are."""
         return values if self.rate is None else lowpass(values, CUTOFF_HZ, self.rate, order=2)
 
-    def seen(self, gravity: Array, rotation: Array | None) -> tuple[Array, Array]:
-        """Return wrench (N, 6) and gravity less acceleration (N, 3), in S, for a gravity in W (3,) and rotations."""
+    def seen(self, gravity: Array, rotation: Array | None) -> Seen:
+        """Return wrench and motion in S, low-passed, for a gravity in W (3,) [m/s^2] and rotations (N, 3, 3)."""
         if rotation is None:
             pull = self.pull if self.pull is not None else np.zeros((len(self), 3))
-            return self.smooth(self.wrench), self.smooth(pull)
+            return Seen(self.smooth(self.wrench), self.smooth(pull))
         own = gravity if self.acceleration is None else gravity - self.acceleration
-        pull = np.einsum("nji,nj->ni", rotation, np.broadcast_to(own, (len(self), 3)))
+        pull = _into_sensor(rotation, np.broadcast_to(own, (len(self), 3)))
         wrench = self.wrench
         if self.world:
-            wrench = np.concatenate(
-                [np.einsum("nji,nj->ni", rotation, part) for part in (wrench[:, :3], wrench[:, 3:])], 1
-            )
-        return self.smooth(wrench), self.smooth(pull)
+            wrench = np.concatenate([_into_sensor(rotation, wrench[:, :3]), _into_sensor(rotation, wrench[:, 3:])], 1)
+        if self.rate is None:
+            return Seen(wrench, pull)
+        lever, spin = _turning(rotation, self.rate)
+        flat = np.concatenate([wrench, pull, lever.reshape(-1, 9), spin.reshape(-1, 18)], 1)
+        parts = np.split(self.smooth(flat), [6, 9, 18], axis=1)
+        return Seen(parts[0], parts[1], parts[2].reshape(-1, 3, 3), parts[3].reshape(-1, 3, 6))
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """A glance in S under one set of conventions.
+
+    wrench  (N, 6) [tau, f] on-object
+    pull    (N, 3) gravity less acceleration [m/s^2]
+    lever   (N, 3, 3) what turning adds to the force per first moment of mass; None for tables
+    spin    (N, 3, 6) what turning adds to the torque per entry of the inertia
+    """
+
+    wrench: Array
+    pull: Array
+    lever: Array | None = None
+    spin: Array | None = None
+
+
+def _into_sensor(rotation: Array, vectors: Array) -> Array:
+    return np.asarray(np.einsum("nji,nj->ni", rotation, vectors))
+
+
+def _turning(rotation: Array, rate: float) -> tuple[Array, Array]:
+    """Return lever (N, 3, 3) and spin (N, 3, 6) of rotations (N, 3, 3) sampled at `rate` [Hz]."""
+    change = np.swapaxes(rotation, 1, 2) @ np.gradient(rotation, 1 / rate, axis=0)
+    omega = 0.5 * np.stack([change[:, i, j] - change[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1)
+    alpha = np.gradient(omega, 1 / rate, axis=0)
+    across = cross_matrix(omega)
+    lever = cross_matrix(alpha) + across @ across
+    entries = np.zeros((6, 3, 3))
+    for k, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
+        entries[k, i, j] = entries[k, j, i] = 1.0
+    spin = np.einsum("kij,nj->nik", entries, alpha) + across @ np.einsum("kij,nj->nik", entries, omega)
+    return lever, spin
 
 
 def glance(recording: Recording) -> Glance | None:
@@ -194,7 +231,7 @@ def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, ra
     for stream, quantity, values in channel(recording, "linear_acceleration", "linear_velocity", "position"):
         if stream.time is None:
             continue
-        smooth = lowpass(on_grid(stream, values), CUTOFF_HZ, rate, order=2)
+        smooth = on_grid(stream, values)
         if quantity != "position" and stream.frames.get(quantity, "S") == "S":
             smooth = np.einsum("nij,nj->ni", rotation, smooth)
         for _ in range({"linear_acceleration": 0, "linear_velocity": 1, "position": 2}[quantity]):

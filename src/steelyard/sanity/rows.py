@@ -40,7 +40,7 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
-        for step in (without_repeats, without_frozen, without_clipped):
+        for step in (without_repeats, without_clipped, without_frozen):
             stream, findings = step(stream)
             found.extend(findings)
         streams.append(_rising(stream))

@@ -3,17 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.sanity.glance import Integers, Seen
 from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
 LEAST_SHARE = 1e-4
 
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,11 +49,16 @@ class StaticFit:
         return int(np.sign(self.mass)) if sure else 0
 
 
-def fit(wrench: Array, pull: Array, block: Integers) -> StaticFit:
-    """Fit f = -m pull + bias and tau = pull x h + bias to rows of wrench (N, 6) and pull = g - a (N, 3)."""
-    mass = solve(-pull[:, :, None], wrench[:, 3:], block)
-    moment = solve(cross_matrix(pull), wrench[:, :3], block)
-    return StaticFit(float(mass[0][0]), float(mass[1][0]), moment[0], moment[1], mass[2], moment[2])
+def fit(seen: Seen, block: Integers) -> StaticFit:
+    """Fit f = -m pull + lever h' + bias and tau = pull x h + spin I + bias to a glance."""
+    mass, mass_std, force_share = solve(beside(-seen.pull[:, :, None], seen.lever), seen.wrench[:, 3:], block)
+    moment, moment_std, torque_share = solve(beside(cross_matrix(seen.pull), seen.spin), seen.wrench[:, :3], block)
+    return StaticFit(float(mass[0]), float(mass_std[0]), moment[:3], moment_std[:3], force_share, torque_share)
+
+
+def beside(columns: Array, more: Array | None) -> Array:
+    """Return columns (N, 3, k) with more of them behind, if there are any."""
+    return columns if more is None else np.concatenate([columns, more], 2)
 
 
 def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array, float]:
@@ -82,6 +86,8 @@ def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array,
 
 
 def _least_norm(matrix: Array, vector: Array) -> Array:
-    values, axes = np.linalg.eigh(matrix)
+    """Return the least-norm solution after scaling the columns to one."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * max(float(np.trace(matrix)), 1e-300)))
+    values, axes = np.linalg.eigh(matrix * np.outer(scale, scale))
     inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
-    return np.asarray(axes @ (inverse * (axes.T @ vector)))
+    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))

@@ -6,12 +6,13 @@ Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone giv
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.sanity.glance import Glance
-from steelyard.sanity.static_fit import Integers, fit, solve
+from steelyard.sanity.glance import Glance, Integers
+from steelyard.sanity.static_fit import beside, fit, solve
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
@@ -57,26 +58,30 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
     if rotation is None:
         return None
     still = replace(view, acceleration=None)
-    wrench, _ = still.seen(gravity, rotation)
-    force = wrench[:, 3:]
+    seen = still.seen(gravity, rotation)
+    force = seen.wrench[:, 3:]
     if view.acceleration is not None:
-        force = force + mass * view.seen(np.zeros(3), rotation)[1]
+        force = force + mass * view.seen(np.zeros(3), rotation).pull
     turned = np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)
     columns = -still.smooth(turned).reshape(-1, 3, 3)
     sign = np.sign(mass) or 1.0
-    weight, spread, seen = free_direction(columns, force, view.block, sign * gravity)
+    weight, spread, shown = free_direction(columns, seen.lever, force, view.block, sign * gravity)
     if weight is None:
         return None
     found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
     angle = angle_between(found, gravity)
-    best = fit(*(still if view.acceleration is None else view).seen(found, rotation), view.block)
-    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _blind_axis(seen))
+    best = fit(view.seen(found, rotation), view.block)
+    if view.acceleration is not None:
+        best = min(best, fit(still.seen(found, rotation), view.block), key=lambda f: f.force_share)
+    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _blind_axis(shown))
 
 
-def free_direction(columns: Array, force: Array, block: Integers, gravity: Array) -> tuple[Array | None, float, Array]:
-    """Return u (3,) of f = columns u + bias, the jackknife std of its angle [rad], and what is seen (3, 3).
+def free_direction(
+    columns: Array, lever: Array | None, force: Array, block: Integers, gravity: Array
+) -> tuple[Array | None, float, Array]:
+    """Return u (3,) of f = columns u + lever h + bias, the jackknife std of its angle [rad], and what is seen (3, 3).
 
-    columns (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that the columns do not show.
+    columns, lever (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that the columns do not show.
     """
     centred = columns - columns.mean(0)
     scatter = np.einsum("nik,nil->kl", centred, centred)
@@ -86,11 +91,11 @@ def free_direction(columns: Array, force: Array, block: Integers, gravity: Array
     if values[-1] < 1e-4 * len(force):
         return None, 0.0, seen
 
-    def solution(keep: np.ndarray) -> Array:  # type: ignore[type-arg]
-        X = columns[keep] @ shown
-        X, y = X - X.mean(0), force[keep] - force[keep].mean(0)
-        part = np.linalg.lstsq(X.reshape(-1, X.shape[2]), y.ravel(), rcond=None)[0]
-        u = shown @ part
+    def solution(keep: Any) -> Array:
+        X = beside(columns @ shown, lever)[keep]
+        X, y = (X - X.mean(0)).reshape(-1, X.shape[2]), force[keep] - force[keep].mean(0)
+        part = np.linalg.lstsq(X, y.ravel(), rcond=1e-6)[0]
+        u = shown @ part[: shown.shape[1]]
         # The unseen part of gravity keeps its share: the seen part gives the weight.
         scale = np.linalg.norm(u) / max(float(np.linalg.norm(seen @ gravity)), 1e-9)
         return np.asarray(u + scale * (gravity - seen @ gravity))
@@ -111,19 +116,20 @@ def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
     """Return the constant turn of S that explains the force best (Wahba), None without rotations."""
     if view.rotation is None:
         return None
-    wrench, pull = replace(view, acceleration=None).seen(gravity, view.rotation)
-    force, down = wrench[:, 3:] - wrench[:, 3:].mean(0), -(pull - pull.mean(0)) * (np.sign(mass) or 1.0)
+    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
+    force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
+    down = -pull * (np.sign(mass) or 1.0)
     u, _, vt = np.linalg.svd(force.T @ down)
     u[:, 2] *= np.linalg.det(u @ vt)
     X = u @ vt
     axis = np.array([X[2, 1] - X[1, 2], X[0, 2] - X[2, 0], X[1, 0] - X[0, 1]]) / 2
     angle = float(np.arctan2(np.linalg.norm(axis), (np.trace(X) - 1) / 2))
-    _, _, share = solve((down @ X.T)[:, :, None], force, view.block)
+    _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
     return Turn(angle, axis / max(float(np.linalg.norm(axis)), 1e-12), share)
 
 
 def _blind_axis(seen: Array) -> Array | None:
     if np.trace(seen) > 2.5:
         return None
-    values, axes = np.linalg.eigh(seen)
+    _, axes = np.linalg.eigh(seen)
     return np.asarray(axes[:, 0])

@@ -52,7 +52,9 @@ def _gravity_channel(recording: Recording) -> tuple[Recording, tuple[Finding, ..
     for stream, quantity, values in channel(recording, "gravity"):
         size = float(np.median(np.linalg.norm(values, axis=1)))
         if ONE_G[0] < size < ONE_G[1]:
-            message = f"Gravity in '{stream.name}' has the length {size:.3g}, so it is in g; it was multiplied by 9.80665."
+            message = (
+                f"Gravity in '{stream.name}' has the length {size:.3g}, so it is in g; it was multiplied by 9.80665."
+            )
             return scaled(recording, stream, (quantity,), STANDARD_GRAVITY), (Finding.of("gravity-in-g", message),)
     return recording, ()
 

@@ -29,9 +29,7 @@ class BoxUnion:
         object.__setattr__(self, "centre", check.vectors("box centres", self.centre))
         object.__setattr__(self, "density", check.vectors("box densities", self.density, len(self.size)))
         if self.size.shape != self.centre.shape or self.size.ndim != 2 or not len(self.size):
-            raise BadValue(
-                f"box sizes and centres must both be (K, 3); got {self.size.shape}, {self.centre.shape}."
-            )
+            raise BadValue(f"box sizes and centres must both be (K, 3); got {self.size.shape}, {self.centre.shape}.")
 
     def parameters(self) -> InertialParameters:
         """Return the ten parameters about the origin of S."""

@@ -120,4 +120,4 @@ def _exact(body: InertialParameters, seen: Kinematics, gravity: Array) -> Motion
 
 def _shuffled(log: MotionLog, rng: np.random.Generator) -> MotionLog:
     """Return the rows in random order, stripped of time and pose number."""
-    return replace(log.rows(rng.permutation(len(log))), time=None, pose=None)
+    return replace(log.rows(rng.permutation(len(log))), time=None, pose=np.full(len(log), -1))

@@ -149,9 +149,7 @@ class StopAndGo:
             Step(k * self.interval, self.duration, change)
             for k, change in enumerate(np.diff(self.keys, axis=0), start=1)
         )
-        pose = np.clip(np.floor((time - self.duration / 2) / self.interval), 0, len(self.keys) - 1).astype(
-            np.int64
-        )
+        pose = np.clip(np.floor((time - self.duration / 2) / self.interval), 0, len(self.keys) - 1).astype(np.int64)
         return _kinematics(time, _sum(turns, self.keys[0], time), _sum(self.moves, np.zeros(3), time), pose)
 
 

@@ -57,9 +57,7 @@ def _named(kind: str, name: str) -> Any:
 def body(name: str) -> BoxUnion:
     """Return the object `name`."""
     boxes = _named("objects", name)
-    columns = [
-        np.array([box[key] for box in boxes], float) for key in ("size_m", "centre_m", "density_kg_m3")
-    ]
+    columns = [np.array([box[key] for box in boxes], float) for key in ("size_m", "centre_m", "density_kg_m3")]
     return BoxUnion(*columns)
 
 

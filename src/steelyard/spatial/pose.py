@@ -30,8 +30,7 @@ class Pose:
         position = check.vectors("position", self.position)
         if position.shape[:-1] != self.rotation.batch:
             raise BadValue(
-                "rotation and position must have one batch shape; "
-                f"got {self.rotation.batch} and {position.shape[:-1]}."
+                f"rotation and position must have one batch shape; got {self.rotation.batch} and {position.shape[:-1]}."
             )
         object.__setattr__(self, "position", position)
 
@@ -80,9 +79,7 @@ class Pose:
         if isinstance(other, Twist):
             return self._move_twist(other)
         if isinstance(other, Acceleration):
-            raise BadValue(
-                "An acceleration moves with the angular velocity of its body: use move_acceleration."
-            )
+            raise BadValue("An acceleration moves with the angular velocity of its body: use move_acceleration.")
         return NotImplemented
 
     def _move_wrench(self, wrench: Wrench) -> Wrench:

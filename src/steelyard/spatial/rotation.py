@@ -58,9 +58,7 @@ class Rotation:
         sign = np.linalg.det(u @ vt)
         loose = s[..., 1] + sign * s[..., 2] <= _ZERO_NORM * s[..., 0]
         if loose.any():
-            raise BadValue(
-                f"matrix must have one nearest rotation; {int(loose.sum())} of {loose.size} do not."
-            )
+            raise BadValue(f"matrix must have one nearest rotation; {int(loose.sum())} of {loose.size} do not.")
         u[..., :, 2] *= sign[..., None]
         return cls._trusted(u @ vt)
 

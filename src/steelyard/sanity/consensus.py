@@ -1,0 +1,269 @@
+"""The largest set of time slices that one body explains: structured candidates, then refitting until nothing changes.
+
+A slice is the mean of z over 0.1 s or so; the residual of its six channels is linear in p parameters. Touch is
+contiguous in time, so every stretch of time, and every log less one stretch, is a candidate; each costs one p x p
+solution from running sums. The best are refined on all slices: scale learned from what is kept, kept slices by the
+cheapest path through touched and untouched, refit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.noise_cost import inverse_spd
+
+Mask = np.ndarray[Any, np.dtype[np.bool_]]
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+
+# Nodes of the candidates' time grid, and the smallest share of time a kept set may cover.
+NODES, LEAST_KEPT = 36, 0.25
+# Candidates made of several windows, beside the stretches: their number, windows each, and seed.
+MIXED, WINDOWS, SEED = 200, 3, 7
+REFINED, PASSES, APART = 24, 8, 4
+# A slice is touched where its squared residual (6 channels, in standard deviations) is above 2 OUT for a while.
+OUT, SWITCH = 6.0, 10.0
+# Leaving everything out would have to shrink the tolerance by e^FINE.
+FINE = 0.7
+# Model errors that no estimator can see: share of the wrench, delay [s], lever of torque errors [m].
+SHARE, DELAY, LEVER = 0.01, 0.004, 0.05
+LATEST = 0.03
+SMALLEST, SCALE = np.repeat([1e-4, 1e-3], 3), np.repeat([LEVER, 1.0], 3)
+
+
+@dataclass(frozen=True, eq=False)
+class Slices:
+    """F means over short times.
+
+    A       (F, 6, p) derivative of the predicted wrench by the p parameters [phi (10), bias (0 or 6)]
+    y       (F, 6) [tau N m, f N] measured wrench
+    time    (F,) [s] middle of the slice
+    weight  (F,) 1 for a full slice, less where rows are missing
+    ridge   (p,) weak pull of each parameter to zero, one over its largest thinkable size squared
+    """
+
+    A: Array
+    y: Array
+    time: Array
+    weight: Array
+    ridge: Array
+
+
+@dataclass(frozen=True, eq=False)
+class Consensus:
+    """A body and bias x (p,), the slices it explains (F,), its cost (less is better).
+
+    tolerance, residual  (F, 6); late (F, 6) the wrench that a delay between wrench and motion adds
+    """
+
+    x: Array
+    kept: Mask
+    tolerance: Array
+    residual: Array
+    late: Array
+    cost: float
+
+
+@numba.njit(cache=True)
+def solve(H: Array, g: Array) -> Array:
+    """Return x of H x = g for a small positive definite H."""
+    scale = np.empty(len(g))
+    for i in range(len(g)):
+        scale[i] = 1 / np.sqrt(H[i, i])
+    return scale * (inverse_spd(H * np.outer(scale, scale)) @ (scale * g))
+
+
+@numba.njit(cache=True)
+def _scan(H: Array, g: Array, c: Array, ridge: Array, masks: Mask, least: int, lost: float) -> tuple[Array, Array]:
+    """Return cost (M,) and solution (M, p) of the node sets `masks` (M, C); H (C, p, p), g (C, p), c (C,)."""
+    count, nodes = masks.shape
+    p = g.shape[1]
+    cost, found = np.empty(count), np.empty((count, p))
+    error = np.empty(nodes)
+    for k in range(count):
+        total, right = np.zeros((p, p)), np.zeros(p)
+        for i in range(p):
+            total[i, i] = ridge[i]
+        for n in range(nodes):
+            if masks[k, n]:
+                for i in range(p):
+                    right[i] += g[n, i]
+                    for j in range(p):
+                        total[i, j] += H[n, i, j]
+        x = solve(total, right)
+        found[k] = x
+        for n in range(nodes):
+            value = c[n]
+            for i in range(p):
+                row = -2 * g[n, i]
+                for j in range(p):
+                    row += H[n, i, j] * x[j]
+                value += x[i] * row
+            error[n] = max(value, 0.0)
+        cost[k] = _split(np.sort(error), least, lost)
+    return cost, found
+
+
+@numba.njit(cache=True)
+def _split(error: Array, least: int, lost: float) -> float:
+    """Return the least cost of calling the first k of sorted node errors one kind and the rest another."""
+    nodes = len(error)
+    total, below, best = error.sum(), 0.0, np.inf
+    for k in range(1, nodes + 1):
+        below += error[k - 1]
+        if k < least:
+            continue
+        inner = 1.0 + below / max(k - lost, 0.3 * k)
+        value = k * np.log(inner)
+        if k < nodes:
+            value += (nodes - k) * np.log(max((total - below) / (nodes - k), inner))
+        best = min(best, value)
+    return best
+
+
+@numba.njit(cache=True)
+def _path(square: Array, out: float, switch: float) -> Mask:
+    """Return which slices are untouched on the cheapest path; square (F,) costs half of itself, touch costs `out`."""
+    n = len(square)
+    back = np.zeros((n, 2), np.int8)
+    a, b = 0.0, 0.0
+    for i in range(n):
+        stay_a, come_a, stay_b, come_b = a, b + switch, b, a + switch
+        back[i, 0] = 0 if stay_a <= come_a else 1
+        back[i, 1] = 1 if stay_b <= come_b else 0
+        a, b = min(stay_a, come_a) + square[i] / 2, min(stay_b, come_b) + out
+    kept = np.zeros(n, np.bool_)
+    state = 0 if a <= b else 1
+    for i in range(n - 1, -1, -1):
+        kept[i] = state == 0
+        state = back[i, state]
+    return kept
+
+
+def fit(slices: Slices, kept: Mask, tolerance: Array, late: Array | float = 0.0) -> Array:
+    """Return x (p,) of the weighted solution over the kept slices, `late` taken off the wrench."""
+    scale = np.sqrt(slices.weight[kept])[:, None] / tolerance[kept]
+    A = (slices.A[kept] * scale[:, :, None]).reshape(-1, len(slices.ridge))
+    return np.asarray(solve(A.T @ A + np.diag(slices.ridge), A.T @ ((slices.y - late)[kept] * scale).ravel()))
+
+
+def sums(slices: Slices, tolerance: Array) -> tuple[Array, Array, Array]:
+    """Return H (F, p, p), g (F, p), c (F,) of each slice's squared residual in units of `tolerance` (F, 6)."""
+    A = slices.A * (np.sqrt(slices.weight)[:, None] / tolerance)[:, :, None]
+    y = slices.y * (np.sqrt(slices.weight)[:, None] / tolerance)
+    return A.swapaxes(1, 2) @ A, np.einsum("fcp,fc->fp", A, y), (y**2).sum(1)
+
+
+def _misfit(slices: Slices, x: Array, kept: Mask) -> tuple[Array, Array, Array]:
+    """Return residual, tolerance and late wrench (F, 6): noise as in what is kept, and errors of the model itself.
+
+    The model may be off by a share of the wrench, and by a delay; the delay that the kept slices show is taken out.
+    """
+    predicted = slices.A[:, :, :10] @ x[:10]
+    rate = np.gradient(predicted, slices.time, axis=0)
+    residual = slices.y - slices.A @ x
+    seen, by = rate[kept] / SCALE, residual[kept] / SCALE
+    late = rate * np.clip((seen * by).sum() / ((seen**2).sum() + 1e-12), -LATEST, LATEST)
+    residual = residual - late
+    return residual, _tolerance(slices, predicted, rate, residual, kept), late
+
+
+def _tolerance(slices: Slices, predicted: Array, rate: Array, residual: Array, kept: Mask) -> Array:
+    """Return the tolerance (F, 6), equal for the axes of force and of torque.
+
+    Its parts: the spread of the kept residuals, a share of the wrench, and what grows with the rate of the wrench, as
+    an unsteady delay does, learned from the kept residuals too.
+    """
+    size, speed, miss = ((v.reshape(-1, 2, 3) ** 2).sum(2) for v in (predicted, rate, residual))
+    size[:, 0] = np.maximum(size[:, 0], LEVER**2 * size[:, 1])
+    weight, fast, miss = slices.weight[kept, None], speed[kept], miss[kept] / 3
+    slow = fast <= np.median(fast, axis=0)
+    steady = (weight * slow * miss).sum(0) / (weight * slow).sum(0)
+    growth = (weight * fast * (miss - steady)).sum(0) / ((weight * fast**2).sum(0) + 1e-12)
+    growth = np.clip(growth, DELAY**2, LATEST**2)
+    spread = (weight * (miss - growth * fast)).sum(0) / weight.sum()
+    count = kept.sum()
+    spread = np.maximum(spread, steady) * count / max(count - slices.A.shape[2] / 6, 0.3 * count)
+    return np.asarray(np.repeat(np.sqrt(spread + growth * speed + SHARE**2 * size), 3, axis=1) + SMALLEST)
+
+
+def _grid(slices: Slices) -> tuple[Integers, Mask]:
+    """Return the node of every slice and all candidate sets of nodes (M, C)."""
+    count = len(slices.y)
+    nodes = min(NODES, count)
+    node = (np.arange(count) * nodes) // count
+    i, j = np.triu_indices(nodes + 1, 1)
+    inside = (np.arange(nodes) >= i[:, None]) & (np.arange(nodes) < j[:, None])
+    share = inside.mean(1)
+    rng = np.random.default_rng(SEED)
+    width = max(nodes // 9, 1)
+    start = rng.integers(0, nodes - width + 1, (MIXED, WINDOWS))
+    mixed = ((np.arange(nodes) >= start[..., None]) & (np.arange(nodes) < start[..., None] + width)).any(1)
+    return node, np.concatenate([inside[share >= 0.15], ~inside[share <= 1 - 0.15], mixed])
+
+
+def refine(slices: Slices, x: Array, kept: Mask) -> Consensus | None:
+    """Return the self-consistent set that grows from a candidate."""
+    for _ in range(PASSES):
+        residual, tolerance, late = _misfit(slices, x, kept)
+        square = ((residual / tolerance) ** 2).sum(1)
+        before, kept = kept, _path(square, OUT, SWITCH)
+        if kept.mean() < LEAST_KEPT:
+            return None
+        x = fit(slices, kept, tolerance, late)
+        if (kept == before).all():
+            break
+    residual, tolerance, late = _misfit(slices, x, kept)
+    return Consensus(x, kept, tolerance, residual, late, _cost(tolerance, kept))
+
+
+def _cost(tolerance: Array, kept: Mask) -> float:
+    """Return the mean log tolerance of all slices, and a fine per slice that is not kept."""
+    return float(np.log(tolerance).mean() + FINE * (~kept).mean())
+
+
+def largest(slices: Slices) -> Consensus:
+    """Return the best self-consistent set of slices."""
+    everything = np.ones(len(slices.y), np.bool_)
+    spread = np.maximum(np.std(slices.y, axis=0).reshape(2, 3).max(1), [1e-3, 1e-2])
+    spread[0] = max(spread[0], LEVER * spread[1])
+    first = np.tile(np.repeat(0.02 * spread, 3), (len(slices.y), 1))
+    node, masks = _grid(slices)
+    H, g, c = sums(slices, first)
+    begin = np.searchsorted(node, np.arange(node[-1] + 1))
+    H, g, c = (np.add.reduceat(v, begin) for v in (H, g, c))
+    size = 6 * np.add.reduceat(slices.weight, begin)
+    H, g, c = H / size[:, None, None], g / size[:, None], c / size
+    least = int(np.ceil(LEAST_KEPT * len(c)))
+    lost = slices.A.shape[2] / 6 * len(c) / len(slices.y)
+    cost, found = _scan(H, g, c, slices.ridge / size.mean(), masks, least, lost)
+    starts = [(fit(slices, everything, first), everything)]
+    chosen: list[Mask] = []
+    for k in np.argsort(cost):
+        if len(chosen) == REFINED:
+            break
+        if any((masks[k] != m).sum() <= APART for m in chosen):
+            continue
+        chosen.append(masks[k])
+        starts.append((found[k], _best_nodes(H, g, c, found[k], least, lost)[node]))
+    refined = [r for r in (refine(slices, *s) for s in starts) if r is not None]
+    return min(refined, key=lambda r: r.cost)
+
+
+def _best_nodes(H: Array, g: Array, c: Array, x: Array, least: int, lost: float) -> Mask:
+    """Return the nodes (C,) that the best split of x's errors keeps."""
+    error = np.maximum(c - 2 * g @ x + np.einsum("i,cij,j->c", x, H, x), 0)
+    order = np.argsort(error)
+    ranked = error[order]
+    below = np.cumsum(ranked)
+    k = np.arange(1, len(c) + 1)
+    inner = 1 + below / np.maximum(k - lost, 0.3 * k)
+    rest = np.maximum((below[-1] - below) / np.maximum(len(c) - k, 1), inner)
+    value = np.where(k < least, np.inf, k * np.log(inner) + (len(c) - k) * np.log(rest))
+    kept = np.zeros(len(c), np.bool_)
+    kept[order[: int(np.argmin(value)) + 1]] = True
+    return kept

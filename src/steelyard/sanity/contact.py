@@ -1,0 +1,227 @@
+"""Contact and load change: time in which the wrench is not that of one body held by the robot."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.stats import chi2
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.identify.regressor import design
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import features
+from steelyard.sanity import consensus
+from steelyard.sanity.consensus import Consensus, Integers, Mask, Slices
+from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, LoadChange, find_change
+
+# Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.
+SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
+# Contact: less likely than 10^-SURPRISE by chance, a squared misfit above RATIO, and above these [N m, N].
+SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
+# A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
+LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
+# A touch begins and ends gently: this share of its length is left out on either side, and one slice.
+GUARD = 0.05
+# A touched time that a jump of bias explains to this squared misfit might as well be the untouched one.
+SAME = 2.0
+
+
+@dataclass(frozen=True, eq=False)
+class Touch:
+    """Slices first..last - 1, and the largest extra force [N] and torque [N m] in them."""
+
+    first: int
+    last: int
+    force: float
+    torque: float
+
+
+def untouched(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
+    """Return the rows (N,) in which the robot alone held one body, and what was found in the others.
+
+    The rows kept are the largest set of stretches of time that one body and one bias explain; hand contact may cover
+    more than half of the log. Where the load changed, the longer part is kept. A log without time keeps all its rows.
+
+    log        in S, wrench as applied to the object; its declared noise is not used
+    with_bias  whether a constant wrench bias is free
+    """
+    everything = np.ones(len(log), np.bool_)
+    if log.time is None or len(log) < FEWEST_SLICES * FEWEST_ROWS:
+        return everything, ()
+    order = np.argsort(log.time, kind="stable")
+    kept, findings = _in_order(log.rows(order), with_bias)
+    mask = everything.copy()
+    mask[order] = kept
+    return mask, findings
+
+
+def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
+    """Return what `untouched` returns for rows that are in order of time."""
+    everything = np.ones(len(log), np.bool_)
+    slices, row = _slices(log, with_bias)
+    if len(slices.y) < FEWEST_SLICES:
+        return everything, ()
+    found = consensus.largest(slices)
+    memory = _memory(found)
+    touches = _touches(slices, found, memory)
+    if not touches:
+        return everything, ()
+    change = _explained(slices, found, touches, memory)
+    if change is not None:
+        return _after_change(log, with_bias, change, row)
+    touches = [t for t in touches if t.force > SMALLEST_FORCE or t.torque > SMALLEST_TORQUE]
+    guarded = _guarded(touches, len(slices.y))
+    if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
+        return everything, ()
+    return guarded[row], (_contact(slices, found, touches, guarded),)
+
+
+def _after_change(
+    log: MotionLog, with_bias: bool, change: LoadChange, row: Integers
+) -> tuple[Mask, tuple[Finding, ...]]:
+    """Return the longer side of a load change, less the time of the hands, searched for contact in its turn."""
+    time = log.time if log.time is not None else np.zeros(0)
+    early = change.time - time[0] >= time[-1] - change.time
+    side = time < change.time - HANDS / 2 if early else time > change.time + HANDS / 2
+    kept, more = untouched(log.rows(side), with_bias)
+    mask = side.copy()
+    mask[side] = kept
+    part = "before" if early else "after"
+    text = (
+        f"At {change.time:.1f} s the load changed from {change.before:.3g} to {change.after:.3g} kg; only the time "
+        f"{part} it was used ({100 * (1 - side.mean()):.0f} % of the rows were left out)."
+    )
+    return mask, (Finding.of("load-changed", text), *more)
+
+
+def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers]:
+    """Return the slices of an ordered log and the slice of each row (N,)."""
+    time = log.time if log.time is not None else np.zeros(0)
+    width = max(SLICE, FEWEST_ROWS * float(np.median(np.diff(time))), float(time[-1] - time[0]) / MOST_SLICES)
+    number = ((time - time[0]) / width).astype(np.int64)
+    edges = np.flatnonzero(np.diff(number, prepend=-1))
+    counts = np.diff(np.append(edges, len(log)))
+    z = np.add.reduceat(features(log), edges, axis=0) / counts[:, None]
+    T = design(with_bias)
+    wrench = z[:, 12:18]
+    weight = np.minimum(counts / np.median(counts), 1.0)
+    mass = np.linalg.norm(wrench[:, 3:] - np.median(wrench[:, 3:], axis=0), axis=1).max() / 9.8 + 0.1
+    size = mass * np.repeat([1e3, 1e1, 1e-1, 1e3], [1, 3, 6, 6])[: len(T)]
+    slices = Slices(
+        -np.tensordot(z, T, axes=(1, 2)).swapaxes(1, 2),
+        wrench,
+        time[0] + width * (number[edges] + 0.5),
+        weight,
+        size**-2,
+    )
+    return slices, np.repeat(np.arange(len(edges)), counts)
+
+
+def _memory(found: Consensus) -> float:
+    """Return how many slices in a row carry one independent squared residual."""
+    e = np.where(found.kept[:, None], found.residual / found.tolerance, 0.0)
+    power = np.abs(np.fft.rfft(e, 2 * len(e), axis=0)) ** 2
+    shared = np.fft.irfft(power.sum(1))[: max(len(e) // 8, 2)]
+    correlation = shared[1:] / max(float(shared[0]), 1e-300)
+    quiet = np.flatnonzero(correlation < 0.1)
+    return 1 + 2 * float((correlation[: quiet[0] if len(quiet) else None] ** 2).sum())
+
+
+def _runs(mask: Mask) -> list[tuple[int, int]]:
+    """Return first and last + 1 of each run of True."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
+
+
+def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
+    """Return the stretches left out that no one body, bias and slow drift explains together with what was kept."""
+    slices = _with_drift(slices, found.late)
+    H, g, c = consensus.sums(slices, found.tolerance)
+    base = _least(slices, H, g, c, found.kept)
+    out = []
+    for a, b in _runs(~found.kept):
+        both = found.kept.copy()
+        both[a:b] = True
+        gain = max(_least(slices, H, g, c, both) - base, 0.0)
+        freedom = 6 * float(slices.weight[a:b].sum())
+        surprise = -chi2.logsf(gain / memory, freedom / memory) / np.log(10)
+        extra = np.linalg.norm(found.residual[a:b].reshape(-1, 2, 3), axis=2).max(0)
+        if surprise > SURPRISE and gain > RATIO * freedom:
+            out.append(Touch(a, b, float(extra[1]), float(extra[0])))
+    return out
+
+
+def _possible(x: Array, touches: Sequence[Touch]) -> bool:
+    """Whether a robot may hold the body x and a hand may push so; if not, units or frames are wrong: no word on contact."""
+    body = x[0] > 0 and np.linalg.norm(x[1:4]) < LONGEST_LEVER * x[0]
+    return bool(body and all(t.torque < LONGEST_PUSH * t.force + LARGEST_TWIST for t in touches))
+
+
+def _with_drift(slices: Slices, late: Array) -> Slices:
+    """Return the slices less the late wrench, with a bias, if they have none, and its linear drift as more parameters."""
+    count, _, size = slices.A.shape
+    powers = (0, 1) if size == 10 else (1,)
+    columns = [np.linspace(-1, 1, count)[:, None, None] ** k * np.eye(6) for k in powers]
+    ridge = np.append(slices.ridge, np.full(6 * len(powers), slices.ridge.min()))
+    return Slices(np.concatenate([slices.A, *columns], 2), slices.y - late, slices.time, slices.weight, ridge)
+
+
+def _least(slices: Slices, H: Array, g: Array, c: Array, mask: Mask) -> float:
+    """Return the least squared residual of the slices in `mask`."""
+    right = g[mask].sum(0)
+    x = consensus.solve(H[mask].sum(0) + np.diag(slices.ridge), right)
+    return float(c[mask].sum() - right @ x)
+
+
+def _explained(slices: Slices, found: Consensus, touches: Sequence[Touch], memory: float) -> LoadChange | None:
+    """Return the load change that leaves nothing of the touches, if there is one."""
+    change = find_change(slices, found.tolerance, memory)
+    if change is None:
+        return None
+    square = ((change.residual / found.tolerance) ** 2).mean(1)
+    square[np.abs(slices.time - change.time) < HANDS] = 0.0
+    quiet = all(square[t.first : t.last].mean() < SAME for t in touches) and square[found.kept].mean() < SAME
+    return change if quiet else None
+
+
+def _guarded(touches: Sequence[Touch], count: int) -> Mask:
+    """Return the slices (F,) that are away from every touch."""
+    kept = np.ones(count, np.bool_)
+    for t in touches:
+        margin = 1 + int(np.ceil(GUARD * (t.last - t.first)))
+        kept[max(t.first - margin, 0) : t.last + margin] = False
+    return kept
+
+
+def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: Mask) -> Finding:
+    """Return the finding with the times, their share and the size of the extra wrench."""
+    half = float(np.median(np.diff(slices.time))) / 2
+    spans = [(slices.time[a] - half, slices.time[b - 1] + half) for a, b in _runs(~kept)]
+    named = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in spans[:5]) + (
+        f" and {len(spans) - 5} more" if len(spans) > 5 else ""
+    )
+    text = (
+        f"Something else than the robot touched the object at {named} s, with up to "
+        f"{max(t.force for t in touches):.2g} N and {max(t.torque for t in touches):.2g} N m; "
+        f"{100 * (1 - kept.mean()):.0f} % of the time was left out."
+    )
+    if _swappable(slices, found, touches):
+        text += (
+            " A constant wrench fits as well, so it may be these times that were free and the others that were touched;"
+            " mass and centre of mass are the same either way, the bias is not."
+        )
+    return Finding.of("contact", text)
+
+
+def _swappable(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> bool:
+    """Whether one constant wrench explains the touches, and they last at least half as long as what was kept."""
+    out = np.zeros(len(slices.y), np.bool_)
+    for t in touches:
+        out[t.first : t.last] = True
+    if slices.weight[out].sum() < 0.5 * slices.weight[found.kept].sum():
+        return False
+    rest = (found.residual[out] - np.median(found.residual[out], axis=0)) / found.tolerance[out]
+    return bool(np.median((rest**2).mean(1)) < SAME)
