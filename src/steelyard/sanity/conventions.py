@@ -28,6 +28,9 @@ from steelyard.sanity.units import scaled
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
 MUCH_BETTER = 0.25
+# A reading that leaves less than this share of the force variance has rotation and gravity right; a tilt of five
+# degrees leaves more than this.
+GOOD, LEVEL = 0.03, 1e-3
 # No hand holds a mass this far from its sensor [m].
 FURTHEST_ARM = 2.0
 # Gravity found this far off is corrected at once; beyond STEEP no base is that crooked [rad].
@@ -110,7 +113,7 @@ def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
 
 def _best_rival(view: Glance, given: Reading) -> Reading | None:
     """Return the rival that beats the reading as given, if there is one."""
-    if view.rotation is None or given.fit.force_share < 1e-3:
+    if view.rotation is None or given.fit.force_share < GOOD:
         return None
     free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
     bar = MUCH_BETTER * given.fit.force_share
@@ -213,6 +216,8 @@ def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[F
 
 def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with gravity along the direction that the wrench shows, where that is plainly another."""
+    if reading.fit.force_share < LEVEL:
+        return recording, ()
     tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
     turned = turned_sensor(view, reading.gravity, reading.fit.mass)
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):
@@ -238,7 +243,6 @@ def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> b
     return (
         turned.angle > SENSOR_TURN
         and turned.force_share < min(MUCH_BETTER * given.force_share, 0.3)
-        and given.force_share > 1e-3
         and (tilt is None or turned.force_share < 0.5 * tilt.force_share)
     )
 

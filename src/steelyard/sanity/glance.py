@@ -1,6 +1,6 @@
 """Glance: a log at a few hertz, just good enough to compare conventions before anything is aligned.
 
-Clocks are taken as they are, the wrench is averaged over what a hundredth of a second holds, and everything is
+Clocks are taken as they are, the wrench is averaged over a sixtieth of a second, and everything is
 low-passed alike, so that a body at rest or in slow motion obeys f = m (a - g), tau = h x (a - g), each with a bias.
 """
 
@@ -19,7 +19,7 @@ from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Rotation, cross_matrix
 
 CUTOFF_HZ = 3.0
-_RATE_HZ = 100.0
+_RATE_HZ = 60.0
 _MOST_ROWS = 20_000
 _FEWEST_ROWS = 60
 _BLOCKS = 12

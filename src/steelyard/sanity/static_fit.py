@@ -67,22 +67,28 @@ def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array,
     columns (N, 3, k), values (N, 3), block (N,)
     """
     count, size = len(values), columns.shape[2]
-    both = np.concatenate([columns, values[:, :, None]], 2)
-    both = both - both.mean(0)
-    per_row = np.einsum("nik,nil->nkl", both, both)
-    blocks = int(block.max()) + 1
-    scatter = np.zeros((blocks, size + 1, size + 1))
-    np.add.at(scatter, block, per_row)
-    total = scatter.sum(0)
-    solution = _least_norm(total[:size, :size], total[:size, size])
-    rest = total - scatter[np.bincount(block, minlength=blocks) > 0]
-    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
-    spread = np.sqrt((len(rest) - 1) / len(rest) * ((left_out - solution) ** 2).sum(0))
+    total, solution, left_out = leave_out(columns, values, block)
+    spread = np.sqrt((len(left_out) - 1) / len(left_out) * ((left_out - solution) ** 2).sum(0))
     variance = float(total[size, size])
     left = variance - float(solution @ total[:size, size])
     freedom = max(3 * count - 3 - size, 1) / max(3 * count - 3, 1)
     share = max(left, 0.0) / variance / freedom if variance > 0 else 1.0
     return solution, spread, min(share, 1.0)
+
+
+def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Array, Array]:
+    """Return the centred scatter (k+1, k+1), its solution (k,) and the solutions (B, k) without one block each."""
+    size = columns.shape[2]
+    both = np.concatenate([columns, values[:, :, None]], 2)
+    both = both - both.mean(0)
+    order = np.argsort(block, kind="stable")
+    starts = np.flatnonzero(np.diff(block[order], prepend=-1))
+    groups = np.split(both[order], starts[1:])
+    scatter = np.stack([g.reshape(-1, size + 1).T @ g.reshape(-1, size + 1) for g in groups])
+    total = scatter.sum(0)
+    rest = total - scatter
+    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
+    return total, _least_norm(total[:size, :size], total[:size, size]), left_out
 
 
 def _least_norm(matrix: Array, vector: Array) -> Array:

@@ -6,13 +6,12 @@ Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone giv
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.sanity.glance import Glance, Integers
-from steelyard.sanity.static_fit import beside, fit, solve
+from steelyard.sanity.static_fit import beside, fit, leave_out, solve
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
@@ -91,19 +90,18 @@ def free_direction(
     if values[-1] < 1e-4 * len(force):
         return None, 0.0, seen
 
-    def solution(keep: Any) -> Array:
-        X = beside(columns @ shown, lever)[keep]
-        X, y = (X - X.mean(0)).reshape(-1, X.shape[2]), force[keep] - force[keep].mean(0)
-        part = np.linalg.lstsq(X, y.ravel(), rcond=1e-6)[0]
-        u = shown @ part[: shown.shape[1]]
+    k = shown.shape[1]
+    _, all_rows, left_out = leave_out(beside(columns @ shown, lever), force, block)
+
+    def weight(part: Array) -> Array:
         # The unseen part of gravity keeps its share: the seen part gives the weight.
+        u = shown @ part[:k]
         scale = np.linalg.norm(u) / max(float(np.linalg.norm(seen @ gravity)), 1e-9)
         return np.asarray(u + scale * (gravity - seen @ gravity))
 
-    everything = solution(np.ones(len(force), bool))
-    parts = [solution(block != b) for b in np.unique(block)]
-    angles = np.array([angle_between(p, everything) for p in parts])
-    count = len(parts)
+    everything = weight(all_rows)
+    angles = np.array([angle_between(weight(part), everything) for part in left_out])
+    count = len(angles)
     return everything, float(np.sqrt((count - 1) / count * (angles**2).sum())), seen
 
 
