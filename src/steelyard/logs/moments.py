@@ -12,6 +12,7 @@ from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
+from zipfile import BadZipFile
 
 import numba
 import numpy as np
@@ -175,13 +176,18 @@ class Moments:
     def load(cls, path: Path) -> Moments:
         """Read what `save` wrote."""
         try:
-            with np.load(path, allow_pickle=False) as data:
+            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
                 pairs = zip(data["acceleration_variance"], data["wrench_variance"], strict=True)
                 noise = tuple(Noise(a, w) for a, w in pairs)
                 scatter = check.matrices("scatter", data["scatter"], SIZE, SIZE)
                 return cls(scatter, data["noise_class"], data["block"], data["still"], noise or None)
-        except (OSError, KeyError, ValueError) as error:
-            raise BadFile(f"{path} does not hold saved moments ({error}). Write one with Moments.save.") from None
+        except (OSError, EOFError, BadZipFile, KeyError, TypeError, ValueError) as error:
+            reason = "not an NPZ file"
+            if isinstance(error, OSError):
+                reason = error.strerror or reason
+            elif isinstance(error, KeyError):
+                reason = str(error.args[0])
+            raise BadFile(f"{path} does not hold saved moments ({reason}). Write one with Moments.save.") from None
 
 
 def features(log: MotionLog) -> Array:
