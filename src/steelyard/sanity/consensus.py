@@ -24,7 +24,7 @@ Integers = np.ndarray[Any, np.dtype[np.int64]]
 NODES, LEAST_KEPT = 36, 0.25
 # Candidates made of several windows, beside the stretches: their number, windows each, and seed.
 MIXED, WINDOWS, SEED = 200, 3, 7
-REFINED, PASSES, APART = 24, 8, 4
+REFINED, PASSES, APART = 16, 8, 4
 # A slice is touched where its squared residual (6 channels, in standard deviations) is above 2 OUT for a while.
 OUT, SWITCH = 6.0, 10.0
 # Leaving everything out would have to shrink the tolerance by e^FINE.

@@ -23,8 +23,8 @@ SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
 SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
 # A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
 LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
-# A touch begins and ends gently: this share of its length is left out on either side, and one slice.
-GUARD = 0.05
+# A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.
+GUARD, LONGEST_GUARD = 0.05, 10
 # A touched time that a jump of bias explains to this squared misfit might as well be the untouched one.
 SAME = 2.0
 
@@ -155,13 +155,13 @@ def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
 
 
 def _possible(x: Array, touches: Sequence[Touch]) -> bool:
-    """Whether a robot may hold the body x and a hand may push so; if not, units or frames are wrong: no word on contact."""
+    """Whether a robot may hold the body x and a hand may push so; if not, units or frames are wrong."""
     body = x[0] > 0 and np.linalg.norm(x[1:4]) < LONGEST_LEVER * x[0]
     return bool(body and all(t.torque < LONGEST_PUSH * t.force + LARGEST_TWIST for t in touches))
 
 
 def _with_drift(slices: Slices, late: Array) -> Slices:
-    """Return the slices less the late wrench, with a bias, if they have none, and its linear drift as more parameters."""
+    """Return the slices less the late wrench; a bias, where there is none, and its drift are more parameters."""
     count, _, size = slices.A.shape
     powers = (0, 1) if size == 10 else (1,)
     columns = [np.linspace(-1, 1, count)[:, None, None] ** k * np.eye(6) for k in powers]
@@ -191,7 +191,7 @@ def _guarded(touches: Sequence[Touch], count: int) -> Mask:
     """Return the slices (F,) that are away from every touch."""
     kept = np.ones(count, np.bool_)
     for t in touches:
-        margin = 1 + int(np.ceil(GUARD * (t.last - t.first)))
+        margin = min(1 + int(np.ceil(GUARD * (t.last - t.first))), LONGEST_GUARD)
         kept[max(t.first - margin, 0) : t.last + margin] = False
     return kept
 
