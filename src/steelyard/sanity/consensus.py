@@ -31,7 +31,8 @@ OUT, SWITCH = 6.0, 10.0
 FINE = 0.7
 # Model errors that no estimator can see: share of the wrench, delay [s], lever of torque errors [m].
 SHARE, DELAY, LEVER = 0.01, 0.004, 0.05
-LATEST = 0.03
+LATEST = 0.03  # [s] a longer delay is for others to find
+UNSEEN = 1e-12  # added to the unit diagonal of scaled normal equations
 SMALLEST, SCALE = np.repeat([1e-4, 1e-3], 3), np.repeat([LEVER, 1.0], 3)
 
 
@@ -70,11 +71,14 @@ class Consensus:
 
 @numba.njit(cache=True)
 def solve(H: Array, g: Array) -> Array:
-    """Return x of H x = g for a small positive definite H."""
+    """Return x of H x = g for a small positive definite H, held finite where directions are not seen."""
     scale = np.empty(len(g))
     for i in range(len(g)):
         scale[i] = 1 / np.sqrt(H[i, i])
-    return scale * (inverse_spd(H * np.outer(scale, scale)) @ (scale * g))
+    scaled = H * np.outer(scale, scale)
+    for i in range(len(g)):
+        scaled[i, i] += UNSEEN
+    return scale * (inverse_spd(scaled) @ (scale * g))
 
 
 @numba.njit(cache=True)
@@ -207,7 +211,7 @@ def _grid(slices: Slices) -> tuple[Integers, Mask]:
 
 
 def refine(slices: Slices, x: Array, kept: Mask) -> Consensus | None:
-    """Return the self-consistent set that grows from a candidate."""
+    """Return the self-consistent set that grows from a candidate, None where it withers."""
     for _ in range(PASSES):
         residual, tolerance, late = _misfit(slices, x, kept)
         square = ((residual / tolerance) ** 2).sum(1)
@@ -217,6 +221,10 @@ def refine(slices: Slices, x: Array, kept: Mask) -> Consensus | None:
         x = fit(slices, kept, tolerance, late)
         if (kept == before).all():
             break
+    return _consensus(slices, x, kept)
+
+
+def _consensus(slices: Slices, x: Array, kept: Mask) -> Consensus:
     residual, tolerance, late = _misfit(slices, x, kept)
     return Consensus(x, kept, tolerance, residual, late, _cost(tolerance, kept))
 
@@ -227,31 +235,38 @@ def _cost(tolerance: Array, kept: Mask) -> float:
 
 
 def largest(slices: Slices) -> Consensus:
-    """Return the best self-consistent set of slices."""
+    """Return the best self-consistent set of slices; all of them where no set is."""
     everything = np.ones(len(slices.y), np.bool_)
+    whole = fit(slices, everything, _first_tolerance(slices))
+    starts = [(whole, everything), *_starts(slices)]
+    refined = [r for r in (refine(slices, *s) for s in starts) if r is not None and np.isfinite(r.cost)]
+    return min(refined, key=lambda r: r.cost) if refined else _consensus(slices, whole, everything)
+
+
+def _first_tolerance(slices: Slices) -> Array:
+    """Return a tolerance (F, 6) of small shares of how far force and torque vary."""
     spread = np.maximum(np.std(slices.y, axis=0).reshape(2, 3).max(1), [1e-3, 1e-2])
     spread[0] = max(spread[0], LEVER * spread[1])
-    first = np.tile(np.repeat(0.02 * spread, 3), (len(slices.y), 1))
+    return np.tile(np.repeat(0.02 * spread, 3), (len(slices.y), 1))
+
+
+def _starts(slices: Slices) -> list[tuple[Array, Mask]]:
+    """Return parameters and kept slices of the best candidates that are not alike."""
     node, masks = _grid(slices)
-    H, g, c = sums(slices, first)
     begin = np.searchsorted(node, np.arange(node[-1] + 1))
-    H, g, c = (np.add.reduceat(v, begin) for v in (H, g, c))
     size = 6 * np.add.reduceat(slices.weight, begin)
+    H, g, c = (np.add.reduceat(v, begin) for v in sums(slices, _first_tolerance(slices)))
     H, g, c = H / size[:, None, None], g / size[:, None], c / size
     least = int(np.ceil(LEAST_KEPT * len(c)))
     lost = slices.A.shape[2] / 6 * len(c) / len(slices.y)
     cost, found = _scan(H, g, c, slices.ridge / size.mean(), masks, least, lost)
-    starts = [(fit(slices, everything, first), everything)]
-    chosen: list[Mask] = []
+    chosen: list[int] = []
     for k in np.argsort(cost):
         if len(chosen) == REFINED:
             break
-        if any((masks[k] != m).sum() <= APART for m in chosen):
-            continue
-        chosen.append(masks[k])
-        starts.append((found[k], _best_nodes(H, g, c, found[k], least, lost)[node]))
-    refined = [r for r in (refine(slices, *s) for s in starts) if r is not None]
-    return min(refined, key=lambda r: r.cost)
+        if all((masks[k] != masks[m]).sum() > APART for m in chosen):
+            chosen.append(int(k))
+    return [(found[k], _best_nodes(H, g, c, found[k], least, lost)[node]) for k in chosen]
 
 
 def _best_nodes(H: Array, g: Array, c: Array, x: Array, least: int, lost: float) -> Mask:

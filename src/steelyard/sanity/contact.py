@@ -15,7 +15,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.sanity import consensus
 from steelyard.sanity.consensus import Consensus, Integers, Mask, Slices
-from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, LoadChange, find_change
+from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, SHORTEST, LoadChange, find_change
 
 # Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.
 SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
@@ -25,6 +25,8 @@ SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
 LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
 # A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.
 GUARD, LONGEST_GUARD = 0.05, 10
+# Touches are alike where one body explains this share of them, with a tolerance no looser than by e^LOOSER.
+ALIKE, LOOSER = 0.9, 0.3
 # A touched time that a jump of bias explains to this squared misfit might as well be the untouched one.
 SAME = 2.0
 
@@ -71,7 +73,9 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
         return everything, ()
     change = _explained(slices, found, touches, memory)
     if change is not None:
-        return _after_change(log, with_bias, change, row)
+        return _after_change(log, with_bias, change)
+    found = _likelier(slices, found, touches)
+    touches = _touches(slices, found, memory)
     touches = [t for t in touches if t.force > SMALLEST_FORCE or t.torque > SMALLEST_TORQUE]
     guarded = _guarded(touches, len(slices.y))
     if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
@@ -79,9 +83,7 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
     return guarded[row], (_contact(slices, found, touches, guarded),)
 
 
-def _after_change(
-    log: MotionLog, with_bias: bool, change: LoadChange, row: Integers
-) -> tuple[Mask, tuple[Finding, ...]]:
+def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[Mask, tuple[Finding, ...]]:
     """Return the longer side of a load change, less the time of the hands, searched for contact in its turn."""
     time = log.time if log.time is not None else np.zeros(0)
     early = change.time - time[0] >= time[-1] - change.time
@@ -182,9 +184,28 @@ def _explained(slices: Slices, found: Consensus, touches: Sequence[Touch], memor
     if change is None:
         return None
     square = ((change.residual / found.tolerance) ** 2).mean(1)
-    square[np.abs(slices.time - change.time) < HANDS] = 0.0
-    quiet = all(square[t.first : t.last].mean() < SAME for t in touches) and square[found.kept].mean() < SAME
-    return change if quiet else None
+    away = np.abs(slices.time - change.time) > HANDS
+    parts = [square[t.first : t.last][away[t.first : t.last]] for t in touches]
+    quiet = all(part.mean() < SAME for part in parts if len(part)) and square[found.kept & away].mean() < SAME
+    lasting = max(map(len, parts)) * float(np.median(np.diff(slices.time))) > SHORTEST / 2
+    return change if quiet and lasting else None
+
+
+def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Consensus:
+    """Return the consensus of the times before and after what was kept, where one body explains both of them.
+
+    Two touches that happen to press alike are less likely than one touch between them, even a longer one.
+    """
+    out = np.zeros(len(slices.y), np.bool_)
+    for t in touches:
+        out[t.first : t.last] = True
+    if len(touches) < 2 or len(_runs(found.kept)) > 1:
+        return found
+    other = consensus.refine(slices, consensus.fit(slices, out, found.tolerance), out)
+    if other is None or (other.kept & out).sum() < ALIKE * out.sum():
+        return found
+    looser = float(np.log(other.tolerance / found.tolerance).mean())
+    return other if looser < LOOSER and len(_runs(~other.kept)) == 1 else found
 
 
 def _guarded(touches: Sequence[Touch], count: int) -> Mask:
