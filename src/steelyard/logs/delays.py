@@ -67,25 +67,38 @@ class Question:
 
 
 def scan(question: Question, rows: int = 3000) -> dict[str, float]:
-    """Return a first delay [s] for every unknown stream: the lag at which linear fits explain the wrench
-    best."""
-    thin = _thinned(question, rows)
+    """Return a first delay [s] for every unknown stream: the lag at which linear fits leave least.
+
+    The accelerometer's is told by the wrench; the others' by the wrench and the accelerometer.
+    """
     delays = {**question.known, **dict.fromkeys(question.unknown, 0.0)}
-    names = sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name)
-    grid = np.arange(-question.max_delay_s, question.max_delay_s + 1e-9, 0.004)
-    grid = grid[np.argsort(np.abs(grid), kind="stable")]  # ties go to no delay
-    for name in names:
-        cost = np.array([_scan_cost(thin, {**delays, name: float(d)}, name) for d in grid])
-        delays[name] = float(grid[int(np.argmin(cost))])
+    for name in sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name):
+        delays[name] = _best_lag(_thinned(question, rows), delays, name, by_wrench=True)
     return {n: delays[n] for n in question.unknown}
 
 
-def _scan_cost(question: Question, delays: Mapping[str, float], name: str) -> float:
+def scan_without_wrench(question: Question, delays: Mapping[str, float], rows: int = 3000) -> dict[str, float]:
+    """Return the delays with those of orientations and the like found against the accelerometer alone."""
+    out = dict(delays)
+    for name in question.unknown:
+        if question.imu is not None and name != question.imu.name:
+            out[name] = _best_lag(_thinned(question, rows), out, name, by_wrench=False)
+    return out
+
+
+def _best_lag(question: Question, delays: Mapping[str, float], name: str, by_wrench: bool) -> float:
+    grid = np.arange(-question.max_delay_s, question.max_delay_s + 1e-9, 0.004)
+    grid = grid[np.argsort(np.abs(grid), kind="stable")]  # ties go to no delay
+    cost = [_scan_cost(question, {**delays, name: float(d)}, name, by_wrench) for d in grid]
+    return float(grid[int(np.argmin(cost))])
+
+
+def _scan_cost(question: Question, delays: Mapping[str, float], name: str, by_wrench: bool) -> float:
     """Return the profile likelihood cost of free linear fits of the six channels."""
     motion, force = question.seen(delays)
     own = force is not None and question.imu is not None and name == question.imu.name
     chosen = [np.ones((len(force), 1)), force] if own and force is not None else features(motion, None)
-    cost = _log_share(question.wrench, chosen)
+    cost = _log_share(question.wrench, chosen) if by_wrench else 0.0
     if force is not None and not own and motion.gravity is not None:
         # The accelerometer feels gravity turn as well, and no hand on the object disturbs it.
         cost += _log_share(force, chosen)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.delays import Clocks, Question, features, free_residual, turning
+from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount, lever
 from steelyard.logs.log import MotionLog
 from steelyard.spatial import Rotation
@@ -103,19 +103,23 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     """Return the joint robust least-squares answer, started from `delays` [s].
 
     Residuals: the wrench of a free body with a free bias, and, where an accelerometer and gravity are there,
-    what the accelerometer shows against gravity and the measured acceleration (or a free centre of turning
-    where none is measured). Scales come from the residuals; rows far off count less; standard deviations
-    from time blocks.
+    what the accelerometer shows against gravity and the measured acceleration (or a free centre of
+    turning where none is measured). Scales come from the residuals; rows far off count less; standard
+    deviations from time blocks.
     """
     motion, force = question.seen(delays)
     mount = None
     if question.imu is not None and force is not None:
         mount = question.imu.rotation or first_mount(force, motion.gravity, question.wrench[:, 3:])
-    layout = _Layout.of(question, delays, mount, centre=motion.gravity is not None and not motion.measured)
+    free_centre = motion.gravity is not None and not motion.measured
+    layout = _Layout.of(question, delays, mount, centre=free_centre)
     layout = _mount_by_gravity(question, layout)
     theta, weights = _rounds(question, layout)
     if _mount_spoiled(question, layout, theta):
-        layout = layout.held("rotation", "bias").held_clocks(question)
+        # A hand on the object: what accelerometer and gravity tell alone is kept out of the wrench's reach.
+        calm = scan_without_wrench(question, layout.delays(theta, question))
+        layout = _Layout.of(question, calm, mount, centre=free_centre)
+        layout = _mount_by_gravity(question, layout).held("rotation", "bias").held_clocks(question)
         theta, weights = _rounds(question, layout)
     std = _block_std(question, layout, theta, weights)
     residual = _residual(question, layout, theta)[:, :6]

@@ -1,0 +1,74 @@
+"""The smoother: right on average, right about its own error, and blind to the choice of frames."""
+
+import numpy as np
+import pytest
+
+from steelyard.errors import BadValue
+from steelyard.logs.smoothing import smooth, smooth_rotations
+from steelyard.spatial import Rotation
+
+
+def wave(t, k=0):
+    w = np.array([1.1, 2.3, 3.1])
+    phase = np.array([0.0, 1.0, 2.0]) + k * np.pi / 2
+    return w**k * np.sin(w * t[:, None] + phase)
+
+
+@pytest.mark.parametrize("noise", [1e-5, 1e-3])
+@pytest.mark.parametrize("rate", [30.0, 200.0])
+def test_recovers_analytic_derivatives_within_its_own_error(noise, rate):
+    rng = np.random.default_rng(3)
+    t = np.cumsum(rng.uniform(0.7, 1.3, int(20 * rate)) / rate)
+    s = smooth(t, wave(t) + noise * rng.normal(size=(len(t), 3)))
+    assert s.noise_std == pytest.approx(noise, rel=0.1)
+    at = rng.uniform(t[0] + 1, t[-1] - 1, 1000)
+    states, variance = s.at(at)
+    for k in range(3):
+        chi2 = np.mean((states[:, k] - wave(at, k)) ** 2 / variance[:, k, None])
+        assert 0.2 < chi2 < 1.6  # smooth motion is easier than the model expects, never harder
+
+
+def test_variances_are_calibrated_on_signals_of_its_own_kind():
+    rng = np.random.default_rng(0)
+    scores = []
+    for _ in range(12):
+        dt, jerk = 0.01, 40.0
+        a = np.cumsum(jerk * np.sqrt(dt) * rng.normal(size=2000))
+        v = np.cumsum(a) * dt
+        x = np.cumsum(v) * dt
+        t = dt * np.arange(2000)
+        s = smooth(t, (x + 1e-3 * rng.normal(size=2000))[:, None])
+        error = s.states[100:-100, 2, 0] - a[101:-99]  # the second difference of x is one step ahead
+        scores.append(np.mean(error**2 / s.variance[100:-100, 2]))
+    assert np.mean(scores) == pytest.approx(1.0, abs=0.2)
+
+
+def test_rotation_smoothing_does_not_care_about_frames():
+    rng = np.random.default_rng(5)
+    t = np.arange(0, 6, 0.01)
+    R = Rotation.exp(0.9 * wave(t)) @ Rotation.exp(1e-3 * rng.normal(size=(len(t), 3)))
+    A, B = Rotation.exp([0.3, -2.0, 1.0]), Rotation.exp([2.5, 0.4, -0.2])
+    at = np.linspace(0.5, 5.5, 200)
+    R1, w1, a1, v1 = smooth_rotations(t, R).at(at)
+    R2, w2, a2, v2 = smooth_rotations(t, A @ R @ B).at(at)
+    assert np.allclose((A @ R1 @ B).matrix, R2.matrix, atol=1e-6)
+    assert np.allclose(B.inverse().apply(w1), w2, atol=1e-5)
+    assert np.allclose(B.inverse().apply(a1), a2, atol=1e-3)
+    assert np.allclose(v1, v2, rtol=1e-2)
+
+
+def test_angular_rates_of_a_known_spin():
+    t = np.arange(0, 8, 0.01)
+    spin = 0.8 * np.sin(1.5 * t)[:, None] * np.array([0.0, 1.0, 0.0])
+    rng = np.random.default_rng(1)
+    R = Rotation.exp(spin) @ Rotation.exp(1e-5 * rng.normal(size=(len(t), 3)))
+    _, omega, alpha, variance = smooth_rotations(t, R).at(t)
+    inner = slice(50, -50)
+    assert np.allclose(omega[inner, 1], (1.2 * np.cos(1.5 * t))[inner], atol=2e-3)
+    assert np.allclose(alpha[inner, 1], (-1.8 * np.sin(1.5 * t))[inner], atol=5 * np.sqrt(variance[:, 2].mean()))
+    assert np.abs(omega[inner][:, [0, 2]]).max() < 2e-3
+
+
+def test_too_few_samples_are_refused():
+    with pytest.raises(BadValue, match="at least 12 samples"):
+        smooth(np.arange(5.0), np.zeros((5, 1)))
