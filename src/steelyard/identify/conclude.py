@@ -73,11 +73,14 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
     `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
     Raises CannotAnswer where mass or centre of mass are not fixed.
     """
+    if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
+        raise _lost(np.ones(4, np.bool_), problem)
     K = problem.residual_map(solution.linear)
     data = (K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
     H, extra, plain = noise_cost.information(*data)
     H = nonnegative(H, plain)
     chi2 = noise_cost.value(*data[:1], *data[2:]) / max(6 * problem.samples - len(solution.linear), 1.0)
+    chi2 = max(float(chi2), 0.0)
     V = score if score is not None else max(chi2, 1.0) * (H + extra)
     bread = H if solution.aware else plain
     if problem.with_bias:
@@ -163,8 +166,12 @@ def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
 def _require_answer(sight: Sight, problem: Problem) -> None:
     """Raise CannotAnswer where mass or centre of mass are lost, saying what to add."""
     lost = sight.std[:4] > np.repeat([LOST_MASS, LOST_COM], [1, 3]) * sight.sizes[:4]
-    if not lost.any():
-        return
+    if lost.any():
+        raise _lost(lost, problem)
+
+
+def _lost(lost: np.ndarray[Any, np.dtype[np.bool_]], problem: Problem) -> CannotAnswer:
+    """Return the error that names which of mass, com x y z (4,) are lost, and what to add."""
     names = (
         "the mass",
         "the centre of mass along x",
@@ -173,7 +180,7 @@ def _require_answer(sight: Sight, problem: Problem) -> None:
     )
     poses = len(np.unique(problem.block_number[problem.block_number >= 0]))
     seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or time blocks" if poses else "")
-    raise CannotAnswer(
+    return CannotAnswer(
         f"The data do not fix {', '.join(n for n, gone in zip(names, lost, strict=True) if gone)} ({seen}). "
         "Add still poses that turn gravity to other axes of the sensor: at least three, more than 30 degrees apart, "
         "about two different axes"

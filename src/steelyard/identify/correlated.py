@@ -42,6 +42,8 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
     variance, squares, memory = np.zeros_like(H), 0.0, 0.0
     for channel in range(6):
         kernel = _autocovariance(_placed(residual[:, channel], slot), len(log))
+        if not kernel[0] > 0:  # a channel without any residual has none to be correlated
+            continue
         placed = _placed(slope[:, channel], slot)
         variance += placed.T @ _convolved(placed, kernel)
         squares += (2 * float((kernel[1:] ** 2).sum()) / kernel[0] ** 2 + 1) / 6
@@ -99,6 +101,8 @@ def _autocovariance(series: Array, rows: int) -> Array:
     size = 2 ** int(np.ceil(np.log2(2 * len(series))))
     power = np.abs(np.fft.rfft(series, size)) ** 2
     raw = np.fft.irfft(power, size)[: len(series) // 4] / rows
+    if not raw[0] > 0:
+        return np.zeros(1)
     correlation = raw / raw[0]
     quiet = np.abs(correlation[1:]) < SIGNIFICANT * np.sqrt(np.log10(rows) / rows)
     run = np.convolve(quiet, np.ones(QUIET_LAGS), "valid") >= QUIET_LAGS

@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Literal
 
-from steelyard.errors import BadValue
+import numpy as np
+
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import Solution, conclude
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
-from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem
+from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows
 from steelyard.identify.rest import at_rest
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -50,18 +53,34 @@ class Bias:
 Solver = Callable[[Problem], Solution]
 
 
+@contextmanager
+def _within_numbers() -> Iterator[None]:
+    """Turn a breakdown of the linear algebra into CannotAnswer: only rows that hold no body at all lead there."""
+    try:
+        with np.errstate(all="ignore"):
+            yield
+    except (np.linalg.LinAlgError, ZeroDivisionError):
+        raise CannotAnswer(
+            "The equations of this log cannot be solved: its channels are constant, or their sizes are far from those "
+            "of a held body. Check units and columns; `steelyard doctor` tells whether the installation is sound."
+        ) from None
+
+
+@_within_numbers()
 def fit_moments(moments: Moments, bias: Bias, solver: Solver, method: str) -> Estimate:
     """Return the estimate from a statistic that carries its noise."""
     problem = replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
     return conclude(problem, solver(problem), method)
 
 
+@_within_numbers()
 def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest: bool = False) -> Estimate:
     """Return the estimate of a log; noise that it does not declare is estimated, time order widens the error bars.
 
     `verify_rest` fuses the acceleration of resting rows with zero where the wrench agrees. Raises CannotAnswer where
     the data do not fix mass and centre of mass.
     """
+    require_rows(len(log))
     log = with_noise(log, bias.free)
     if verify_rest and log.still.any():
         first = solver(_problem(log, bias, by_block=False))

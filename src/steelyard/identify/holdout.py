@@ -38,8 +38,8 @@ def leave_one_out(problem: Problem, linear: Array, H: Array, jacobian: Array, pr
     square = np.sum(misses, axis=0) / rows
     phi = np.array(refits)[:, :10]
     return {
-        "holdout_force_N": float(np.sqrt(square[3:].mean())),
-        "holdout_torque_Nm": float(np.sqrt(square[:3].mean())),
+        "holdout_force_N": float(np.sqrt(max(square[3:].mean(), 0))),
+        "holdout_torque_Nm": float(np.sqrt(max(square[:3].mean(), 0))),
         "jackknife": _jackknife(phi),
         "jackknife_people": _jackknife(_people(phi)),
     }

@@ -22,6 +22,8 @@ from steelyard.identify.problem import Problem
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 
+# A column with less than this share of its size beside the bias is not excited.
+UNSEEN = 1e-14
 KINDS = ("ordinary", "weighted", "total")
 
 
@@ -77,10 +79,12 @@ def _total(problem: Problem) -> Array:
         noise[:10, :10] += S[18, 18] * np.einsum("pij,qij->pq", (W @ T[:10, :, :6]) * Sa, T[:10, :, :6])
         noise[10, 10] += S[18, 18] * float(np.diag(W) @ Sw)
     reduced = _project_out(data, 11)
-    scale = 1 / np.sqrt(np.maximum(np.diag(reduced), 1e-300))
+    # Columns that the log does not excite at all stay at zero.
+    seen = np.diag(reduced) > UNSEEN * np.diag(data)[:11]
+    scale = np.where(seen, 1 / np.sqrt(np.where(seen, np.diag(reduced), 1.0)), 0.0)
     # Noise against data, so that the matrix to factor is positive definite even where columns carry no noise.
-    regular = reduced * np.outer(scale, scale) + 1e-13 * np.eye(11)
-    _, vectors = eigh(noise * np.outer(scale, scale), regular)
+    regular = reduced * np.outer(scale, scale) + np.where(seen, 1e-13, 1.0) * np.eye(11)
+    _, vectors = eigh(noise * np.outer(scale, scale), regular, check_finite=False)
     x = scale * vectors[:, -1]
     x = x / x[10]
     if not problem.with_bias:

@@ -15,8 +15,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.noise_cost import derivatives, value
 
-# Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two full
-# steps end at rounding, where a line search could only see noise.
+# Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
+# full steps end at rounding, where a line search could only see noise.
 NEAR = 1e-4
 
 # theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each sits in U.

@@ -24,6 +24,8 @@ from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 
+# No search starts with a centre of mass further than this from the sensor [m].
+FURTHEST = 3.0
 # A body's radius of gyration per axis starts within these bounds [m]; the prior pulls it to that of a 5 cm ball.
 SMALLEST, LARGEST, NEUTRAL = 0.005, 0.2, 0.05 / np.sqrt(5)
 
@@ -75,6 +77,7 @@ class NoiseAware:
         """Yield starting points [theta, bias]: the linear solution made a body, then the neutral ball at its centre."""
         mass = max(float(linear[0]), 1e-3)
         com = linear[1:4] / mass
+        com = com * min(1.0, FURTHEST / max(float(np.linalg.norm(com)), FURTHEST))
         pseudo = forms.pseudo_inertia(linear[:10])
         values, axes = np.linalg.eigh(pseudo[:3, :3] / mass - np.outer(com, com))
         shape = (axes * np.clip(values, SMALLEST**2, LARGEST**2)) @ axes.T

@@ -54,18 +54,15 @@ class Problem:
         """Return the problem of a statistic whose noise is known."""
         if moments.noise is None:
             raise BadValue("The statistic must carry its noise; got none. Declare it, or use identify(log).")
-        if moments.samples < FEWEST_ROWS:
-            raise CannotAnswer(
-                f"The log has {int(moments.samples)} usable rows; at least {FEWEST_ROWS} are needed. Record more."
-            )
+        require_rows(int(moments.samples))
         classes, label = np.unique(moments.noise_class, return_inverse=True)
         scatter = np.zeros((len(classes), *moments.scatter.shape[1:]))
         np.add.at(scatter, label, moments.scatter)
         acceleration = np.stack([moments.noise[c].acceleration for c in classes])
         # A reading scatters at least as much as its noise: more noise than that was declared for another motion, and
         # would reward the fit for inertia about axes that nothing turns.
-        seen = np.einsum("cii->ci", scatter)[:, :3] / scatter[:, 18, 18, None]
-        acceleration[:, :3] = np.minimum(acceleration[:, :3], seen)
+        seen = np.einsum("cii->ci", scatter)[:, :6] / scatter[:, 18, 18, None]
+        acceleration = np.minimum(acceleration, seen)
         wrench = np.stack([moments.noise[c].wrench for c in classes])
         if (wrench <= 0).any():
             raise BadValue("Wrench noise must be above zero on every axis; a zero variance would weigh infinitely.")
@@ -120,6 +117,14 @@ class Problem:
         """Return z (N, Z) of the rows of a log, as wide as this problem's statistic."""
         z = features(log)
         return np.column_stack([z, _scaled_time(log)]) if self.T.shape[2] == 20 else z
+
+
+def require_rows(rows: int) -> None:
+    """Raise CannotAnswer where there are too few rows for anything."""
+    if rows < FEWEST_ROWS:
+        raise CannotAnswer(
+            f"The log has {rows} usable row{'s' * (rows != 1)}; at least {FEWEST_ROWS} are needed. Record more."
+        )
 
 
 def _scaled_time(log: MotionLog) -> Array:
