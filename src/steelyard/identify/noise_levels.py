@@ -12,11 +12,13 @@ from steelyard.identify.linear import reweighted
 from steelyard.identify.regressor import design, residual_map
 from steelyard.identify.rest import RIPPLE
 from steelyard.logs.log import MotionLog, Noise
-from steelyard.logs.moments import Moments
+from steelyard.logs.moments import Moments, features
 
 # Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
 # and an axis that looks quiet by chance would be over-weighted.
 ROWS_PER_AXIS = 3000
+# A median over fewer rows is too rough.
+FEWEST_FOR_MEDIAN = 60
 # The wrench keeps at least this share of the residual variance that noise in the motion could also explain.
 LEAST_SHARE = 0.1
 # No class of rows is quieter than this share of the average over all.
@@ -34,15 +36,58 @@ def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
     """
     if log.noise is None:
         log = _with_classes(log)
-    noise = log.noise or ()
+    noise = tuple(_no_more_than_rest_shows(log, c, n) for c, n in enumerate(log.noise or ()))
+    log = replace(log, noise=noise)
     unknown = np.stack([n.wrench for n in noise]) <= 0
     if not unknown.any():
         return log
     levels = np.where(unknown, FIRST_GUESS, np.stack([n.wrench for n in noise]))
+    trial, resting = _resting(log)
     for _ in range(5):
-        log = replace(log, noise=tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True)))
-        levels = np.where(unknown, _wrench_levels(log, with_bias), levels)
-    return replace(log, noise=tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True)))
+        trial = replace(trial, noise=_with_wrench(trial.noise or (), levels))
+        levels = np.where(unknown, _wrench_levels(trial, resting, with_bias), levels)
+    return replace(log, noise=_with_wrench(noise, levels))
+
+
+def _with_wrench(noise: tuple[Noise, ...], levels: Array) -> tuple[Noise, ...]:
+    """Return the noise with wrench variances `levels` (C, 6)."""
+    return tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True))
+
+
+def _resting(log: MotionLog) -> tuple[MotionLog, list[int]]:
+    """Return the log with zero acceleration in the classes that are all at rest, and their numbers.
+
+    There the wrench alone makes the residual; taking what acceleration noise explains away would leave next to nothing
+    of a small noise under a large one.
+    """
+    numbers = [
+        c for c in range(len(log.noise or ())) if (log.noise_class == c).any() and log.still[log.noise_class == c].all()
+    ]
+    rows = np.isin(log.noise_class, numbers)[:, None]
+    noise = tuple(
+        Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) if c in numbers else n
+        for c, n in enumerate(log.noise or ())
+    )
+    quiet = replace(
+        log,
+        angular_acceleration=np.where(rows, 0.0, log.angular_acceleration),
+        acceleration=np.where(rows, 0.0, log.acceleration),
+        noise=noise,
+    )
+    return quiet, numbers
+
+
+def _no_more_than_rest_shows(log: MotionLog, number: int, noise: Noise) -> Noise:
+    """Return the noise of a class with its acceleration no noisier than readings at rest scatter.
+
+    More would explain residuals that are the wrench's own, and leave it too little noise.
+    """
+    rows = log.noise_class == number
+    if not rows.any() or not log.still[rows].all():
+        return noise
+    readings = np.concatenate([log.angular_acceleration[rows], log.acceleration[rows]], 1)
+    seen = np.maximum((readings**2).mean(0), RIPPLE)
+    return Noise(np.minimum(noise.acceleration, seen), noise.wrench)
 
 
 def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
@@ -92,8 +137,11 @@ def _acceleration_levels(log: MotionLog) -> Array:
     return _pooled((differences**2).mean(0) / 70, len(log))
 
 
-def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
-    """Return wrench variances (C, 6) per class from the residuals of the current weighted solution."""
+def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array:
+    """Return wrench variances (C, 6) per class from the residuals of the current weighted solution.
+
+    Classes at rest are judged by their median, since a few of their rows may move; the others are no quieter.
+    """
     moments = Moments.of_log(log, by_block=False)
     noise = log.noise or ()
     out, shares = np.tile(SMALLEST, (len(noise), 1)), np.zeros(len(noise))
@@ -107,11 +155,19 @@ def _wrench_levels(log: MotionLog, with_bias: bool) -> Array:
     for group, c in enumerate(moments.noise_class):
         rows = moments.counts[group]
         miss = np.diag(K @ moments.scatter[group] @ K.T) / (rows * (1 - lost))
-        explained = (K[:, :6] ** 2) @ acceleration[group]
-        out[c] = np.maximum(_pooled(np.maximum(miss - explained, LEAST_SHARE * miss), int(rows)), SMALLEST)
+        if c in resting and rows >= FEWEST_FOR_MEDIAN:
+            residual = features(log.rows(log.noise_class == c)) @ K.T
+            left = np.minimum(np.square(1.4826 * np.median(np.abs(residual), axis=0)) / (1 - lost), miss)
+        else:
+            # What the motion's noise may explain is taken away; with a class at rest only a sure excess over it counts.
+            unsure = 2 * np.sqrt(2 / rows) if resting else 0.0
+            left = (1 - unsure) * miss - (K[:, :6] ** 2) @ acceleration[group]
+            left = np.maximum(left, 0.0 if resting else LEAST_SHARE * miss)
+        out[c] = np.maximum(_pooled(left, int(rows)), SMALLEST)
         shares[c] = rows / moments.samples
+    quiet = np.min(out[resting], axis=0) if resting else SMALLEST
     # A few rows in one pose can be fitted without any residual; they are not better than the sensor is elsewhere.
-    return np.asarray(np.maximum(out, QUIETEST * shares @ out))
+    return np.asarray(np.maximum(np.maximum(out, quiet), QUIETEST * shares @ out))
 
 
 def _pooled(variance: Array, rows: int) -> Array:

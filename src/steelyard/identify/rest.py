@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.log import Mask, MotionLog, Noise
 
 # What a robot that holds still does all the same: joint control ripple, rad/s^2 and m/s^2.
 RIPPLE = Noise.of_std(0.01, 0.002, 0.0, 0.0).acceleration
@@ -34,18 +34,27 @@ def at_rest(log: MotionLog, phi: Array, bias: Array) -> MotionLog:
     wrench_variance = np.stack([n.wrench for n in log.noise])[log.noise_class]
     miss = log.wrench - bias - quiet.predicted(phi)
     resting = log.still & ((miss**2 / wrench_variance).sum(1) < SURPRISE)
-    classes = len(log.noise)
+    settled = _settled(log, quiet, resting)
+    if log.time is None or log.acceleration.any() or log.angular_acceleration.any():
+        return settled
+    # Nobody measured the acceleration: rows that are not at rest after all say nothing.
+    return settled.rows(resting | ~log.still)
+
+
+def _settled(log: MotionLog, quiet: MotionLog, resting: Mask) -> MotionLog:
+    """Return the log with the resting rows of `quiet` in noise classes of their own."""
+    noise = log.noise or ()
     return replace(
         quiet,
         angular_acceleration=np.where(resting[:, None], quiet.angular_acceleration, log.angular_acceleration),
         acceleration=np.where(resting[:, None], quiet.acceleration, log.acceleration),
         still=resting,
-        noise_class=log.noise_class + classes * resting,
-        noise=log.noise + tuple(_resting(n) for n in log.noise),
+        noise_class=log.noise_class + len(noise) * resting,
+        noise=noise + tuple(_fused(n) for n in noise),
     )
 
 
-def _resting(noise: Noise) -> Noise:
+def _fused(noise: Noise) -> Noise:
     """Return the noise of a reading fused with zero."""
     fused = RIPPLE * noise.acceleration / np.maximum(RIPPLE + noise.acceleration, 1e-300)
     return Noise(fused, noise.wrench)

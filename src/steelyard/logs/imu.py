@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadDescription
 from steelyard.logs.conditioning import Signal, noise_std, sampling_rate, signal
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation
@@ -63,10 +64,11 @@ def lever(omega: Array, alpha: Array, p: Array) -> Array:
 def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     """Return the accelerometer of a timed stream; numbers that are plainly in g are turned into m/s^2."""
     values, time = stream.channels["specific_force"], stream.time
-    assert_time = np.arange(len(values), dtype=float) if time is None else time
+    if time is None:
+        raise BadDescription(f"'{stream.name}' has no time.")
     factor = unit_factor(values, gravity_size)
-    curve = signal(assert_time, values * factor, cutoff_hz)
-    rate = sampling_rate(assert_time)
+    curve = signal(time, values * factor, cutoff_hz)
+    rate = sampling_rate(time)
     share = 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate)
     noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * share))
     mount = stream.mount

@@ -94,10 +94,10 @@ class Kinematics:
 
     def _smooth(self, quantity: str, time: Array, delays: Delays) -> tuple[Array, Array]:
         channel = self.channels[quantity]
-        assert_curve = channel.curve
-        if not isinstance(assert_curve, Smooth):
+        curve = channel.curve
+        if not isinstance(curve, Smooth):
             raise BadDescription(f"{quantity} of '{channel.stream}' is not smoothed.")
-        return assert_curve.at(time + delays.get(channel.stream, 0.0))
+        return curve.at(time + delays.get(channel.stream, 0.0))
 
     def _vector(self, quantity: str, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
         """Return a channel's values in S, None where there is no such channel."""

@@ -19,15 +19,18 @@ from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.noise_levels import with_declared
+from steelyard.identify.rest import RIPPLE
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
-from steelyard.logs.alignment import align
-from steelyard.logs.log import MotionLog
+from steelyard.logs.alignment import Aligned, align
+from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import Recording
 from steelyard.sanity import after, examine, untouched
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
+# Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
+FEWEST_POSES = 4
 
 
 @dataclass(frozen=True)
@@ -63,13 +66,16 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     aligned = align(recording)
     bias = Bias(options.bias, drift=options.drift)
     keep, touched = untouched(aligned.log, bias.free)
-    log = with_declared(aligned.log.rows(keep), recording.noise)
+    log, unmeasured = _with_known_acceleration(aligned.log.rows(keep), aligned)
+    touched = () if unmeasured else touched
+    log = with_declared(log, recording.noise)
     estimator, notes = _estimator(options, log, bias)
     estimate = estimator.identify(log)
     if known is not None:
         estimate, shared = _with_tool(options, log, bias, estimate, _in_log_sign(known, recording))
         notes = (*notes, *shared)
     late = after(log, estimate, aligned, recording)
+    notes = (*notes, *unmeasured)
     return _in_recording_sign(
         replace(
             estimate.with_findings(*before, *aligned.findings, *touched, *late),
@@ -78,6 +84,22 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
         ),
         recording,
     )
+
+
+def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLog, tuple[str, ...]]:
+    """Return the rows whose acceleration is known, and a note where that leaves some out.
+
+    Without a measured acceleration only rows at rest are known; where they are in too few poses, all rows are taken as
+    if at rest and what that misses counts as noise of the wrench. A moving body then looks touched, but is not.
+    """
+    if aligned.acceleration_from != "none" or log.still.all():
+        return log, ()
+    if len(np.unique(log.pose[log.still])) >= FEWEST_POSES:
+        at_rest = log.rows(log.still)
+        at_rest = replace(at_rest, angular_acceleration=np.zeros_like(at_rest.angular_acceleration))
+        return at_rest, ("no stream measures the acceleration: only the rows at rest were used",)
+    quiet = None if log.noise is None else tuple(Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) for n in log.noise)
+    return replace(log, noise=quiet), ("no stream measures the acceleration: it was taken as zero throughout",)
 
 
 def _estimator(

@@ -18,8 +18,8 @@ from steelyard.sanity.full_fit import Rows
 from steelyard.sanity.glance import channel
 from steelyard.spatial import Rotation
 
-# chi^2 per degree of freedom outside these is far from one.
-CHI2 = (0.4, 2.5)
+# chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
+CHI2, NOISE_RATIO = 2.5, 2.5
 # A tilt counts beyond 2 degrees and four standard deviations, where it takes 30 % of the squared residual away.
 TILT, SURE, TILT_SHARE = np.radians(2.0), 4.0, 0.7
 # A drift counts beyond 2 % of the weight (at 0.1 m for torques), where it takes 20 % of the squared residual away.
@@ -74,8 +74,9 @@ def base_tilted(log: MotionLog, rotation: Array, gravity: Array, acceleration_fr
         return ()
     along = ", ".join(f"{v:.3f}" for v in found / np.linalg.norm(found) + 0.0)
     message = (
-        f"Gravity fits {np.degrees(angle):.1f} ± {np.degrees(np.linalg.norm(spread)):.1g} degrees off the direction given, "
-        f"along ({along}) of W, with {100 * (1 - left / level.left):.0f} % less squared residual; the answer uses the one given."
+        f"Gravity fits {np.degrees(angle):.1f} ± {np.degrees(np.linalg.norm(spread)):.1g} degrees off the direction "
+        f"given, along ({along}) of W, with {100 * (1 - left / level.left):.0f} % less squared residual; the answer "
+        "uses the direction given."
     )
     return (Finding.of("base-tilted", message),)
 
@@ -95,8 +96,8 @@ def bias_drift(log: MotionLog) -> tuple[Finding, ...]:
         return ()
     message = (
         f"The bias drifts by {sizes[1]:.2g} ± {errors[1]:.1g} N and {sizes[0]:.2g} ± {errors[0]:.1g} N m over "
-        f"{log.time[-1] - log.time[0]:.0f} s; a line in time takes {100 * (1 - moving.left / steady.left):.0f} % of the "
-        "squared residual away."
+        f"{log.time[-1] - log.time[0]:.0f} s; a line in time takes {100 * (1 - moving.left / steady.left):.0f} % of "
+        "the squared residual away."
     )
     return (Finding.of("bias-drift", message),)
 
@@ -130,25 +131,35 @@ def _visible(rows: Rows, columns: Array) -> tuple[Array | None, Array]:
 
 
 def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...]:
-    """Return `noise-level-off` where declared wrench noise and residuals disagree."""
+    """Return `noise-level-off` where declared noise is far above or below what the log shows.
+
+    A low-pass lowers the residuals, and with them chi^2, below the noise of the raw samples; too large a declaration is
+    therefore told by the raw channel and the residuals, too small a one by chi^2 or the raw channel.
+    """
     chi2 = estimate.evidence.chi2_per_dof
-    declared = {q: recording.noise[q] for q in ("force", "torque") if q in recording.noise}
-    if chi2 is None or not declared or CHI2[0] <= chi2 <= CHI2[1]:
+    out = []
+    residuals = {"force": estimate.evidence.residual_force_N, "torque": estimate.evidence.residual_torque_Nm}
+    for quantity, unit in (("force", "N"), ("torque", "N m")):
+        declared = recording.noise.get(quantity)
+        if declared is None:
+            continue
+        raw = max((_white(s.time, v) for s, _, v in channel(recording, quantity)), default=0.0)
+        most = float(np.hypot(raw, residuals[quantity]))
+        if declared > NOISE_RATIO * most or declared * NOISE_RATIO < raw:
+            shown = most if declared > most else raw
+            out.append(f"{declared:g} {unit} of {quantity} noise are declared, the log shows {shown:.2g} {unit}")
+    if not out and chi2 is not None and recording.noise and chi2 > CHI2:
+        out.append(f"the residuals are {np.sqrt(chi2):.2g} times what the declared noise explains")
+    if not out:
         return ()
-    if chi2 < 1 and not any(_too_large(recording, q, std) for q, std in declared.items()):
-        return ()
-    what = " and ".join(f"{q} {std:g} {'N' if q == 'force' else 'N m'}" for q, std in declared.items())
-    message = (
-        f"chi^2 per degree of freedom is {chi2:.2g}: the residuals are {np.sqrt(chi2):.2g} times what the declared noise "
-        f"({what}) and the model explain."
-    )
-    return (Finding.of("noise-level-off", message),)
+    message = "; ".join(out)
+    known = "" if chi2 is None else f" (chi^2 per degree of freedom {chi2:.2g})"
+    return (Finding.of("noise-level-off", f"{message[0].upper()}{message[1:]}{known}."),)
 
 
-def _too_large(recording: Recording, quantity: str, std: float) -> bool:
-    """Tell whether a declared standard deviation is twice the raw channel's own; a low-pass alone lowers chi^2 too."""
-    levels = [float(noise_std(v).mean()) for s, _, v in channel(recording, quantity) if s.time is not None]
-    return not levels or std > 2 * max(levels)
+def _white(time: Array | None, values: Array) -> float:
+    """Return the white noise of a timed channel per axis; zero for tables."""
+    return 0.0 if time is None else float(np.sqrt((noise_std(values) ** 2).mean()))
 
 
 def _prior(estimate: Estimate) -> tuple[Finding, ...]:
@@ -163,7 +174,7 @@ def _prior(estimate: Estimate) -> tuple[Finding, ...]:
         return ()
     worst = int(np.argmax(np.where(led, alone / np.maximum(estimate.std, 1e-300), 0)))
     message = (
-        f"The prior decides {', '.join(n for n, own in zip(names, led, strict=True) if own)}: for {names[worst]} the data "
-        f"alone have a standard deviation {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the one shown."
+        f"The prior decides {', '.join(n for n, own in zip(names, led, strict=True) if own)}: for {names[worst]} the "
+        f"data alone have {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the standard deviation shown."
     )
     return (Finding.of("prior-dominated", message),)

@@ -108,25 +108,21 @@ def _scan(H: Array, g: Array, c: Array, ridge: Array, masks: Mask, least: int, l
                     row += H[n, i, j] * x[j]
                 value += x[i] * row
             error[n] = max(value, 0.0)
-        cost[k] = _split(np.sort(error), least, lost)
+        cost[k] = _split(np.sort(error), least, lost)[0]
     return cost, found
 
 
 @numba.njit(cache=True)
-def _split(error: Array, least: int, lost: float) -> float:
-    """Return the least cost of calling the first k of sorted node errors one kind and the rest another."""
+def _split(error: Array, least: int, lost: float) -> tuple[float, int]:
+    """Return the least cost of keeping the first k of sorted node errors, and k."""
     nodes = len(error)
-    total, below, best = error.sum(), 0.0, np.inf
+    below, best, chosen = 0.0, np.inf, nodes
     for k in range(1, nodes + 1):
         below += error[k - 1]
-        if k < least:
-            continue
-        inner = 1.0 + below / max(k - lost, 0.3 * k)
-        value = k * np.log(inner)
-        if k < nodes:
-            value += (nodes - k) * np.log(max((total - below) / (nodes - k), inner))
-        best = min(best, value)
-    return best
+        value = nodes * np.log(1.0 + below / max(k - lost, 0.3 * k)) / 2 + FINE * (nodes - k)
+        if k >= least and value < best:
+            best, chosen = value, k
+    return best, chosen
 
 
 @numba.njit(cache=True)
@@ -273,12 +269,6 @@ def _best_nodes(H: Array, g: Array, c: Array, x: Array, least: int, lost: float)
     """Return the nodes (C,) that the best split of x's errors keeps."""
     error = np.maximum(c - 2 * g @ x + np.einsum("i,cij,j->c", x, H, x), 0)
     order = np.argsort(error)
-    ranked = error[order]
-    below = np.cumsum(ranked)
-    k = np.arange(1, len(c) + 1)
-    inner = 1 + below / np.maximum(k - lost, 0.3 * k)
-    rest = np.maximum((below[-1] - below) / np.maximum(len(c) - k, 1), inner)
-    value = np.where(k < least, np.inf, k * np.log(inner) + (len(c) - k) * np.log(rest))
     kept = np.zeros(len(c), np.bool_)
-    kept[order[: int(np.argmin(value)) + 1]] = True
+    kept[order[: _split(error[order], least, lost)[1]]] = True
     return kept

@@ -14,13 +14,15 @@ from steelyard.identify.regressor import design
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.sanity import consensus
-from steelyard.sanity.consensus import Consensus, Integers, Mask, Slices
+from steelyard.sanity.consensus import LEVER, Consensus, Integers, Mask, Slices
 from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, SHORTEST, LoadChange, find_change
 
 # Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.
 SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
 # Contact: less likely than 10^-SURPRISE by chance, a squared misfit above RATIO, and above these [N m, N].
 SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
+# ... and above this share of the weight: a base tilted by 2 degrees or 3 % of cross-talk look like less.
+LEAST_SHARE, GRAVITY = 0.1, 9.81
 # A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
 LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
 # A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.
@@ -76,7 +78,7 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
         return _after_change(log, with_bias, change)
     found = _likelier(slices, found, touches)
     touches = _touches(slices, found, memory)
-    touches = [t for t in touches if t.force > SMALLEST_FORCE or t.torque > SMALLEST_TORQUE]
+    touches = [t for t in touches if _large(found.x, t)]
     guarded = _guarded(touches, len(slices.y))
     if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
         return everything, ()
@@ -154,6 +156,14 @@ def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
         if surprise > SURPRISE and gain > RATIO * freedom:
             out.append(Touch(a, b, float(extra[1]), float(extra[0])))
     return out
+
+
+def _large(x: Array, touch: Touch) -> bool:
+    """Whether the extra wrench is more than small errors of model, base and calibration may leave on the body x."""
+    weight = GRAVITY * abs(float(x[0]))
+    lever = LEVER + float(np.linalg.norm(x[1:4])) / max(abs(float(x[0])), 1e-9)
+    least_force = max(SMALLEST_FORCE, LEAST_SHARE * weight)
+    return touch.force > least_force or touch.torque > max(SMALLEST_TORQUE, LEAST_SHARE * weight * lever)
 
 
 def _possible(x: Array, touches: Sequence[Touch]) -> bool:

@@ -21,20 +21,22 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
-from steelyard.sanity.glance import Glance, channel, glance, rolled
+from steelyard.sanity.glance import Glance, glance, rolled
 from steelyard.sanity.static_fit import StaticFit, beside, fit, solve
 from steelyard.sanity.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
 from steelyard.sanity.units import scaled
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
 MUCH_BETTER = 0.25
-# A reading that leaves less than this share of the force variance has rotation and gravity right; a tilt of five
-# degrees leaves more than this.
-GOOD, LEVEL = 0.03, 1e-3
+# A reading that leaves less than the first share of the force variance has rotation and gravity right but for a tilt;
+# one that leaves less than the second has the tilt right, too: two degrees leave more.
+GOOD, LEVEL = 0.03, 2e-4
+# With fewer poses or stretches than this, a direction of gravity fits by chance.
+FEWEST_BLOCKS = 6
 # No hand holds a mass this far from its sensor [m].
 FURTHEST_ARM = 2.0
 # Gravity found this far off is corrected at once; beyond STEEP no base is that crooked [rad].
-CERTAIN_TILT, STEEP = np.radians(5.0), np.radians(60.0)
+CERTAIN_TILT, STEEP = np.radians(2.0), np.radians(60.0)
 # A sensor mounted this much askew is worth a word [rad].
 SENSOR_TURN = np.radians(10.0)
 
@@ -133,6 +135,15 @@ def _best_rival(view: Glance, given: Reading) -> Reading | None:
     return min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
 
 
+def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
+    """Tell whether a freely tilted gravity explains no more (an axis: much more) than the rival does."""
+    if free is None:
+        return True
+    if rival.transposed or rival.quaternion_shift:
+        return rival.fit.force_share < 0.5 * free.force_share
+    return rival.fit.force_share < 2 * free.force_share + 1e-3
+
+
 def _varies(view: Glance, reading: Reading) -> bool:
     """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
     pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation).pull
@@ -216,23 +227,23 @@ def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[F
 
 def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with gravity along the direction that the wrench shows, where that is plainly another."""
-    if reading.fit.force_share < LEVEL:
+    if reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
         return recording, ()
     tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
     turned = turned_sensor(view, reading.gravity, reading.fit.mass)
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):
         message = (
-            f"S seems turned by {np.degrees(turned.angle):.0f} degrees about ({_shown(turned.axis)}) of S against the frame "
-            f"whose rotation is given: so read, {_percent(turned.force_share)} of the force variance is left unexplained "
-            f"instead of {_percent(reading.fit.force_share)}; the answer does not assume this."
+            f"S seems turned by {np.degrees(turned.angle):.0f} degrees about ({_shown(turned.axis)}) of S against the "
+            f"frame whose rotation is given: so read, {_percent(turned.force_share)} of the force variance is left "
+            f"unexplained instead of {_percent(reading.fit.force_share)}; the answer does not assume this."
         )
         return recording, (Finding.of("gravity-frame", message),)
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
     message = (
-        f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction given, along "
-        f"({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction found"
+        f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction given, "
+        f"along ({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction found"
         f"{tilt.blind_words}."
     )
     return replace(recording, gravity=tilt.gravity), (Finding.of(code, message),)

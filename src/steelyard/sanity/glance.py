@@ -204,7 +204,7 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     rows = int((end - start) * rate)
     if rows < _FEWEST_ROWS or rate < 4 * CUTOFF_HZ:
         return None
-    grid = start + (np.arange(rows) + 0.5) / rate
+    grid = np.asarray(start + (np.arange(rows) + 0.5) / rate, dtype=np.float64)
 
     def on_grid(s: Stream, values: Array) -> Array:
         clock = np.asarray(s.time) - (s.delay or 0.0)

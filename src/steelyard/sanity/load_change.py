@@ -14,7 +14,7 @@ GRID, HANDS = 60, 0.5
 # Either side must last this long [s].
 SHORTEST = 1.0
 # A change below this share of the mass, or of this many standard deviations, is none.
-SHARE, DEVIATIONS = 0.05, 6.0
+SHARE, DEVIATIONS = 0.08, 6.0
 # Another body must explain this much (chi-square) beyond what a jump of the bias would; and no lever beyond 1 m.
 BEYOND_BIAS, LONGEST_LEVER = 40.0, 1.0
 

@@ -62,32 +62,62 @@ def without_repeats(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     if count <= max(10, REPEATED_SHARE * len(stream)) and not _many(stamped):
         return stream, ()
     message = (
-        f"{count} of {len(stream)} rows of '{stream.name}' ({100 * count / len(stream):.0f} %) repeat the row before in "
-        f"every channel{_with_stamps(int(stamped.sum()), count)}; each was used once."
+        f"{count} of {len(stream)} rows of '{stream.name}' ({100 * count / len(stream):.0f} %) repeat the row before "
+        f"in every channel{_with_stamps(int(stamped.sum()), count)}; each was used once."
     )
     return _kept(stream, np.concatenate([[True], ~again])), (Finding.of("rows-duplicated", message),)
 
 
 def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
-    """Return the stream without stretches in which a channel stood still although it never else does."""
-    found, frozen = [], np.zeros(len(stream), bool)
+    """Return the stream without stretches in which a channel stood still although nothing else says rest."""
+    found: list[Finding] = []
     if stream.time is None or len(stream) < 4 * FROZEN_ROWS:
         return stream, ()
+    frozen = _hung_rows(stream)
+    if frozen.any():
+        found.append(
+            _stuck(
+                stream, "every channel", f"stands still in {int(frozen.sum())} of {len(frozen)} rows and jumps after"
+            )
+        )
     for quantity in (q for q in _NOISY if q in stream.channels):
         values = stream.channels[quantity]
-        noisy = _noise_shares(values) > NOISE_SHARE
+        same = values[1:] == values[:-1]
+        lively = (same.mean(0) < 0.3) & (_noise_shares(values) > NOISE_SHARE)
         for axis in range(3):
-            rows = _frozen_rows(values[:, axis], stream.time)
-            constant = bool((values[:, axis] == values[0, axis]).all())
-            if constant and noisy.any():
-                found.append(_stuck(stream, quantity, axis, "does not change at all while its neighbours do"))
-            elif rows.any() and noisy[axis]:
-                span = f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else; these were left out"
-                found.append(_stuck(stream, quantity, axis, span))
+            name = f"{quantity} {'xyz'[axis]}"
+            others = np.delete(np.arange(3), axis)
+            rows = _frozen_rows(values[:, axis], stream.time) & ~frozen
+            if (values[:, axis] == values[0, axis]).all() and lively[others].any():
+                found.append(_stuck(stream, name, "does not change at all while its neighbours do"))
+            elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
+                found.append(
+                    _stuck(stream, name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else")
+                )
                 frozen |= rows
     if frozen.mean() > 0.7:
         frozen[:] = False
     return _kept(stream, ~frozen) if frozen.any() else stream, tuple(found)
+
+
+def _hung_rows(stream: Stream) -> Mask:
+    """Return rows (N,) in which a noisy stream repeats one row for long and then jumps, as a hung driver does."""
+    values, none = _columns(stream), np.zeros(len(stream), bool)
+    if not set(_NOISY) & set(stream.channels) or stream.time is None or not values.shape[1]:
+        return none
+    same = (values[1:] == values[:-1]).all(1)
+    length = _run_length(same)
+    long = length >= _rows_needed(stream.time)
+    starts = np.flatnonzero(np.diff(long.astype(np.int8), prepend=0) == 1)
+    ends = np.flatnonzero(np.diff(long.astype(np.int8), append=0) == -1)
+    if not 1 <= len(starts) <= 3 or same[~long].mean() > 0.05:
+        return none
+    steps = np.abs(np.diff(values, axis=0))
+    typical = np.maximum(np.median(steps[~long], 0), 1e-300)
+    for start, end in zip(starts, ends, strict=True):
+        if end + 1 < len(steps) and (steps[end + 1] > 5 * typical).any():
+            none[start : end + 2] = True
+    return none
 
 
 def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
@@ -170,15 +200,18 @@ def _frozen_rows(column: Array, time: Array) -> Mask:
     """Return rows (N,) of runs of one value that are long, in a channel that moves on everywhere else."""
     same = column[1:] == column[:-1]
     length = _run_length(same)
-    rows_needed = max(FROZEN_ROWS, FROZEN_S * (len(time) - 1) / max(float(time[-1] - time[0]), 1e-9))
-    long = length >= rows_needed
+    long = length >= _rows_needed(time)
     if not long.any():
         return np.zeros(len(column), bool)
     elsewhere = same[~long]
     blocks = max(len(elsewhere) // FROZEN_ROWS, 1)
     if len(elsewhere) < FROZEN_ROWS or max(b.mean() for b in np.array_split(elsewhere, blocks)) > 0.5:
         return np.zeros(len(column), bool)
-    return np.concatenate([[False], long]) | np.concatenate([long, [False]])
+    return np.asarray(np.concatenate([[False], long]) | np.concatenate([long, [False]]))
+
+
+def _rows_needed(time: Array) -> float:
+    return max(FROZEN_ROWS, FROZEN_S * (len(time) - 1) / max(float(time[-1] - time[0]), 1e-9))
 
 
 def _noise_shares(values: Array) -> Array:
@@ -206,13 +239,14 @@ def _clipped_rows(column: Array, extreme: float) -> Mask:
     return at if len(entering) and float(np.median(entering)) > 3 * quantum else none
 
 
-def _stuck(stream: Stream, quantity: str, axis: int, what: str) -> Finding:
-    return Finding.of("channel-stuck", f"{quantity} {'xyz'[axis]} of '{stream.name}' {what}.")
+def _stuck(stream: Stream, name: str, what: str) -> Finding:
+    left_out = "" if "at all" in what else "; these rows were left out"
+    return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}{left_out}.")
 
 
 def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: Mask) -> Finding:
     message = (
-        f"{quantity} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {int(rows.sum())} of {len(rows)} rows; "
+        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {int(rows.sum())} of {len(rows)} rows; "
         "these were left out."
     )
     return Finding.of("channel-saturated", message)
@@ -247,8 +281,8 @@ def _repeated_in_tables(recording: Recording) -> tuple[Recording, tuple[Finding,
     rows = np.zeros(len(together), bool)
     rows[first] = True
     message = (
-        f"{count} of {len(together)} rows ({100 * count / len(together):.0f} %) repeat an earlier row in every channel; "
-        "each was used once."
+        f"{count} of {len(together)} rows ({100 * count / len(together):.0f} %) repeat an earlier row in every "
+        "channel; each was used once."
     )
     streams = tuple(_kept(s, rows) for s in recording.streams)
     return replace(recording, streams=streams), (Finding.of("rows-duplicated", message),)

@@ -14,7 +14,6 @@ from steelyard.spatial import cross_matrix
 LEAST_SHARE = 1e-4
 
 
-
 @dataclass(frozen=True, eq=False)
 class StaticFit:
     """What one set of conventions makes of a log.

@@ -78,7 +78,7 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
 def free_direction(
     columns: Array, lever: Array | None, force: Array, block: Integers, gravity: Array
 ) -> tuple[Array | None, float, Array]:
-    """Return u (3,) of f = columns u + lever h + bias, the jackknife std of its angle [rad], and what is seen (3, 3).
+    """Return u (3,) of f = columns u + lever h + bias, the jackknife std of its angle [rad], the part of W seen (3, 3).
 
     columns, lever (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that the columns do not show.
     """
