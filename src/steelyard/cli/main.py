@@ -53,10 +53,10 @@ def cli() -> None:
     """
 
 
-def main() -> None:
+def main(arguments: list[str] | None = None) -> None:
     """Run the command line; one clear line on stderr for every error that is ours."""
     try:
-        cli(standalone_mode=True)
+        cli(arguments, prog_name="steelyard")
     except SteelyardError as error:
         click.echo(f"steelyard: {error}", err=True)
         sys.exit(error.exit_status)
