@@ -175,6 +175,6 @@ def _prior(estimate: Estimate) -> tuple[Finding, ...]:
     worst = int(np.argmax(np.where(led, alone / np.maximum(estimate.std, 1e-300), 0)))
     message = (
         f"The prior decides {', '.join(n for n, own in zip(names, led, strict=True) if own)}: for {names[worst]} the "
-        f"data alone have {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the standard deviation shown."
+        f"data alone have {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the std shown."
     )
     return (Finding.of("prior-dominated", message),)

@@ -152,8 +152,8 @@ def _varies(view: Glance, reading: Reading) -> bool:
 
 def _rival_finding(best: Reading, given: Reading) -> Finding:
     message = (
-        f"{best.words[0].upper()}{best.words[1:]}; so read, {_percent(best.fit.force_share)} of the force variance is left "
-        f"unexplained instead of {_percent(given.fit.force_share)}. The answer assumes this."
+        f"{best.words[0].upper()}{best.words[1:]}; so read, {_percent(best.fit.force_share)} of the force variance is "
+        f"left unexplained instead of {_percent(given.fit.force_share)}. The answer assumes this."
     )
     return Finding.of(best.code, message)
 
@@ -242,8 +242,8 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
     message = (
-        f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction given, "
-        f"along ({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction found"
+        f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
+        f"given, along ({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction found"
         f"{tilt.blind_words}."
     )
     return replace(recording, gravity=tilt.gravity), (Finding.of(code, message),)

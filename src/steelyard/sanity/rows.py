@@ -246,7 +246,8 @@ def _stuck(stream: Stream, name: str, what: str) -> Finding:
 
 def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: Mask) -> Finding:
     message = (
-        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {int(rows.sum())} of {len(rows)} rows; "
+        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {int(rows.sum())} of "
+        f"{len(rows)} rows; "
         "these were left out."
     )
     return Finding.of("channel-saturated", message)

@@ -80,7 +80,7 @@ def free_direction(
 ) -> tuple[Array | None, float, Array]:
     """Return u (3,) of f = columns u + lever h + bias, the jackknife std of its angle [rad], the part of W seen (3, 3).
 
-    columns, lever (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that the columns do not show.
+    columns, lever (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that no column shows.
     """
     centred = columns - columns.mean(0)
     scatter = np.einsum("nik,nil->kl", centred, centred)

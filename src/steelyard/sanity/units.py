@@ -69,7 +69,8 @@ def _specific_force(recording: Recording) -> tuple[Recording, tuple[Finding, ...
             size = float(np.median(np.linalg.norm(values, axis=1)))
             message = (
                 f"The accelerometer of '{stream.name}' shows {size:.4g} m/s^2 in the median where gravity is "
-                f"{gravity:.4g}: {'its numbers are in g' if factor > 1 else 'g was applied twice'}; multiplied by {factor:.4g}."
+                f"{gravity:.4g}: {'its numbers are in g' if factor > 1 else 'g was applied twice'}; multiplied by "
+                f"{factor:.4g}."
             )
             return scaled(recording, stream, (quantity,), factor), (Finding.of("gravity-in-g", message),)
     return recording, ()

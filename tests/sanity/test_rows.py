@@ -1,0 +1,111 @@
+"""Rows that are no measurements, and rows that only look so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from synthetic import Kind, write
+
+from steelyard.io import read_recording
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.coverage import coverage, directions
+from steelyard.sanity.rows import examine_rows
+
+
+@pytest.fixture
+def recording(tmp_path: Path) -> Recording:
+    return read_recording(write(tmp_path, Kind()))
+
+
+def codes(recording: Recording) -> list[str]:
+    return sorted({f.code for f in examine_rows(recording)[1]})
+
+
+def wrench_of(recording: Recording) -> Stream:
+    return next(s for s in recording.streams if "force" in s.channels)
+
+
+def with_wrench(recording: Recording, wrench: Stream) -> Recording:
+    return replace(recording, streams=tuple(wrench if "force" in s.channels else s for s in recording.streams))
+
+
+@pytest.mark.parametrize("stamps", ["same", "new"])
+def test_repeated_rows_are_used_once(stamps: str, recording: Recording, tmp_path: Path) -> None:
+    once, findings = examine_rows(read_recording(write(tmp_path, Kind(repeated=stamps))))
+    assert {f.code for f in findings} == {"rows-duplicated"}
+    for clean, twice in zip(recording.streams, once.streams, strict=True):
+        assert abs(len(clean) - len(twice)) <= 0.005 * len(clean)
+        assert (np.diff(twice.time) > 0).all()
+
+
+def test_stuck_and_clipped_rows_are_left_out(tmp_path: Path) -> None:
+    stuck, findings = examine_rows(read_recording(write(tmp_path, Kind(stuck=True))))
+    assert [f.code for f in findings] == ["channel-stuck"]
+    assert "1000 of 7000" in findings[0].message
+    assert len(wrench_of(stuck)) == 6000
+    clipped, findings = examine_rows(read_recording(write(tmp_path, Kind(clipped=True))))
+    assert [f.code for f in findings] == ["channel-saturated"]
+    assert len(wrench_of(clipped)) < 6520
+
+
+def test_a_dead_channel_is_named(recording: Recording) -> None:
+    wrench = wrench_of(recording)
+    torque = wrench.channels["torque"].copy()
+    torque[:, 1] = 0.25
+    dead = with_wrench(recording, replace(wrench, channels={**wrench.channels, "torque": torque}))
+    assert codes(dead) == ["channel-stuck"]
+
+
+def test_a_hung_driver_is_named(recording: Recording) -> None:
+    wrench = wrench_of(recording)
+    rows = np.arange(len(wrench))
+    rows[2600:3100] = 2600
+    hung = replace(wrench, channels={q: v[rows] for q, v in wrench.channels.items()})
+    assert codes(with_wrench(recording, hung)) == ["channel-stuck"]
+
+
+def test_a_declared_zero_torque_is_not_stuck(recording: Recording) -> None:
+    wrench = wrench_of(recording)
+    channels = {**wrench.channels, "torque": np.zeros((len(wrench), 3))}
+    assert codes(with_wrench(recording, replace(wrench, channels=channels))) == []
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+def test_coarse_and_held_values_are_measurements(noise: float, tmp_path: Path) -> None:
+    recording = read_recording(write(tmp_path, Kind(noise=noise, object="mallet")))
+    wrench, pose = recording.streams[0], recording.streams[1]
+    held = np.clip(np.searchsorted(pose.time, wrench.time, "right") - 1, 0, None)
+    channels = {q: v[held] for q, v in pose.channels.items()}
+    one_file = replace(wrench, channels={**wrench.channels, **channels})
+    assert codes(replace(recording, streams=(one_file, recording.streams[2]))) == []
+    force = np.round(wrench.channels["force"], 1)
+    coarse = replace(wrench, channels={"force": force, "torque": np.round(wrench.channels["torque"], 2)})
+    assert codes(with_wrench(recording, coarse)) == []
+
+
+def test_resting_pose_repeats() -> None:
+    time = np.arange(0, 20, 0.01)
+    turn = np.clip(time - 5, 0, 2)[:, None] * [0.3, 0, 0.1]
+    stream = Stream("pose.csv", {"position": np.round(turn, 6)}, time)
+    assert codes(Recording((stream,), np.array([0, 0, -9.81]))) == []
+
+
+def test_equal_stamps_of_a_coarse_clock_are_spread(recording: Recording) -> None:
+    wrench = wrench_of(recording)
+    coarse = with_wrench(recording, replace(wrench, time=np.floor(wrench.time * 100) / 100))
+    spread, findings = examine_rows(coarse)
+    assert findings == ()
+    assert (np.diff(wrench_of(spread).time) > 0).all()
+    assert np.abs(wrench_of(spread).time - wrench.time).max() < 0.011
+
+
+def test_directions() -> None:
+    assert [f.code for f in coverage(np.array([[0, 0, -9.8], [0, 9.8, 0], [9.8, 0, 0]]))] == ["too-few-poses"]
+    assert coverage(np.concatenate([np.eye(3), -np.eye(3)]) * 9.8) == ()
+    angle = np.linspace(0, 3, 50)
+    flat = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1) * 9.8
+    assert [f.code for f in coverage(flat)] == ["nearly-planar"]
+    assert len(directions(flat)) >= 4
