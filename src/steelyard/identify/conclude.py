@@ -15,7 +15,7 @@ from steelyard.identify import noise_cost
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
 from steelyard.identify.linear import inverse_scaled, nonnegative
-from steelyard.identify.problem import Problem
+from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.inertia import InertialParameters, forms
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of
@@ -182,8 +182,7 @@ def _lost(lost: np.ndarray[Any, np.dtype[np.bool_]], problem: Problem) -> Cannot
     seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or time blocks" if poses else "")
     return CannotAnswer(
         f"The data do not fix {', '.join(n for n, gone in zip(names, lost, strict=True) if gone)} ({seen}). "
-        "Add still poses that turn gravity to other axes of the sensor: at least three, more than 30 degrees apart, "
-        "about two different axes"
+        + ADD_POSES
         + ("; or tare the sensor without a load and say --bias none." if problem.with_bias else ".")
     )
 

@@ -15,6 +15,10 @@ from steelyard.logs.moments import Moments, features
 
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
+ADD_POSES = (
+    "Add still poses that turn gravity to other axes of the sensor: at least three, more than 30 degrees apart, "
+    "about two different axes"
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -123,7 +127,7 @@ def require_rows(rows: int) -> None:
     """Raise CannotAnswer where there are too few rows for anything."""
     if rows < FEWEST_ROWS:
         raise CannotAnswer(
-            f"The log has {rows} usable row{'s' * (rows != 1)}; at least {FEWEST_ROWS} are needed. Record more."
+            f"The log has {rows} usable row{'s' * (rows != 1)}: no weight can be told from a sensor's bias. {ADD_POSES}."
         )
 
 
