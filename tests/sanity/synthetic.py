@@ -1,4 +1,4 @@
-"""A made robot log as three devices would write it: CSV files and a description, with a mistake where one is asked for."""
+"""A made robot log as three devices would write it: CSV files and a description, with a mistake where asked for."""
 
 from __future__ import annotations
 
@@ -81,18 +81,16 @@ def imu_mount(kind: Kind) -> Rotation:
 
 
 def _clock(rng: np.random.Generator, rate: float) -> np.ndarray:
-    start = rng.uniform(0, 0.004)
-    return (
-        np.arange(start, DURATION, 1 / rate)
-        + rng.uniform(-0.02, 0.02, int((DURATION - start) * rate) + 1)[: len(np.arange(start, DURATION, 1 / rate))]
-        / rate
-    )
+    even = np.arange(rng.uniform(0, 0.004), DURATION, 1 / rate)
+    return even + rng.uniform(-0.02, 0.02, len(even)) / rate
 
 
 def _pose(rng: np.random.Generator, at: Kinematics, kind: Kind) -> np.ndarray:
     noisy = at.rotation @ Rotation.exp(rng.normal(0, 1e-5 * kind.noise, (len(at.time), 3)))
     noisy = noisy.inverse() if kind.transposed else noisy
-    where = (at.position + [0.5, 0.1, 0.4] + rng.normal(0, 5e-6 * kind.noise, (len(at.time), 3))) * kind.position_scale
+    where = (
+        at.position + np.array([0.5, 0.1, 0.4]) + rng.normal(0, 5e-6 * kind.noise, (len(at.time), 3))
+    ) * kind.position_scale
     return np.column_stack([noisy.quaternion_wxyz(), where])
 
 
@@ -121,7 +119,8 @@ def _imu(rng: np.random.Generator, at: Kinematics, gravity: np.ndarray, kind: Ki
     omega, alpha = at.angular_velocity, at.angular_acceleration
     felt = at.acceleration + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm))
     felt = felt - at.rotation.inverse().apply(gravity)
-    own = imu_mount(kind).inverse().apply(felt) + [0.05, -0.1, 0.2] + rng.normal(0, 0.02 * kind.noise, felt.shape)
+    noise = rng.normal(0, 0.02 * kind.noise, felt.shape)
+    own = imu_mount(kind).inverse().apply(felt) + np.array([0.05, -0.1, 0.2]) + noise
     return np.round(own / GRAVITY / 0.000244) * 0.000244
 
 

@@ -85,6 +85,7 @@ TRAPS: dict[str, tuple[Edit, str]] = {
     "clipped": (clipped, "channel-saturated"),
 }
 TIMED_TRAPS: dict[str, tuple[Edit, str]] = {
+    "tilt along the turning axis": (lambda r: tilted(r, 0, 20, 0), "base-tilted"),
     "accelerometer in g": (lambda r: edited(r, specific_force=lambda v: v / 9.82), "gravity-in-g"),
     "accelerometer in g twice": (lambda r: edited(r, specific_force=lambda v: v * 9.82), "gravity-in-g"),
 }

@@ -10,7 +10,8 @@ from steelyard.identify.noise_cost import inner, multiply, weight
 
 # Directions whose information, after scaling the columns to one, is below this share of the largest are left at zero.
 RANK_TOLERANCE = 1e-12
-LOOSEST_RADIUS, LIGHTEST = 0.5, 0.05
+# Sizes [kg, m] that no held body exceeds by much: they keep what a log does not excite from running away.
+HEAVIEST, LIGHTEST, FARTHEST, LOOSEST_RADIUS = 1000.0, 0.05, 2.0, 0.5
 
 
 @numba.njit(cache=True)
@@ -51,8 +52,7 @@ def solve_scaled(H: Array, g: Array) -> Array:
 def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, passes: int) -> Array:
     """Return the linear parameters (p,) of `passes` weighted solutions, W renewed from each for the next.
 
-    The first pass knows no parameters, so that W is that of the wrench noise alone. Inertia that nothing excites is held
-    to that of a body half a metre in radius, so that it cannot run away and take the weights along.
+    The first pass knows no parameters, so that W is that of the wrench noise alone.
     """
     size, width = T.shape[0], T.shape[2]
     linear = np.zeros(size)
@@ -65,9 +65,12 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
         for c in range(scatter.shape[0]):
             weights[c] = weight(K, acceleration[c], wrench[c])
         H, g = normal_equations(T, scatter, weights)
-        loosest = LOOSEST_RADIUS**2 * max(abs(linear[0]), LIGHTEST)
+        mass = max(abs(linear[0]), LIGHTEST)
+        H[0, 0] += HEAVIEST**-2
+        for k in range(1, 4):
+            H[k, k] += (mass * FARTHEST) ** -2
         for k in range(4, 10):
-            H[k, k] += 1 / loosest**2
+            H[k, k] += (mass * LOOSEST_RADIUS**2) ** -2
         linear = solve_scaled(H, g)
     return linear
 

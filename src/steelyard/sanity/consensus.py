@@ -15,7 +15,6 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.noise_cost import inverse_spd
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
@@ -72,13 +71,27 @@ class Consensus:
 @numba.njit(cache=True)
 def solve(H: Array, g: Array) -> Array:
     """Return x of H x = g for a small positive definite H, held finite where directions are not seen."""
-    scale = np.empty(len(g))
-    for i in range(len(g)):
+    n = len(g)
+    low, scale, x = np.zeros((n, n)), np.empty(n), np.empty(n)
+    for i in range(n):
         scale[i] = 1 / np.sqrt(H[i, i])
-    scaled = H * np.outer(scale, scale)
-    for i in range(len(g)):
-        scaled[i, i] += UNSEEN
-    return scale * (inverse_spd(scaled) @ (scale * g))
+    for i in range(n):
+        for j in range(i + 1):
+            total = H[i, j] * scale[i] * scale[j]
+            for k in range(j):
+                total -= low[i, k] * low[j, k]
+            low[i, j] = np.sqrt(max(total + UNSEEN, UNSEEN)) if i == j else total / low[j, j]
+    for i in range(n):
+        total = g[i] * scale[i]
+        for k in range(i):
+            total -= low[i, k] * x[k]
+        x[i] = total / low[i, i]
+    for i in range(n - 1, -1, -1):
+        total = x[i]
+        for k in range(i + 1, n):
+            total -= low[k, i] * x[k]
+        x[i] = total / low[i, i]
+    return x * scale
 
 
 @numba.njit(cache=True)
@@ -164,7 +177,9 @@ def _misfit(slices: Slices, x: Array, kept: Mask) -> tuple[Array, Array, Array]:
     The model may be off by a share of the wrench, and by a delay; the delay that the kept slices show is taken out.
     """
     predicted = slices.A[:, :, :10] @ x[:10]
-    rate = np.gradient(predicted, slices.time, axis=0)
+    place = np.arange(len(slices.time))
+    before, after = np.maximum(place - 1, 0), np.minimum(place + 1, len(place) - 1)
+    rate = (predicted[after] - predicted[before]) / (slices.time[after] - slices.time[before])[:, None]
     residual = slices.y - slices.A @ x
     seen, by = rate[kept] / SCALE, residual[kept] / SCALE
     late = rate * np.clip((seen * by).sum() / ((seen**2).sum() + 1e-12), -LATEST, LATEST)

@@ -22,7 +22,7 @@ SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
 # Contact: less likely than 10^-SURPRISE by chance, a squared misfit above RATIO, and above these [N m, N].
 SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
 # ... and above this share of the weight: a base tilted by 2 degrees or 3 % of cross-talk look like less.
-LEAST_SHARE, GRAVITY = 0.1, 9.81
+LEAST_SHARE, GRAVITY = 0.12, 9.81
 # A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
 LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
 # A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.

@@ -21,9 +21,10 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
+from steelyard.sanity.blind_tilt import blind_tilt
 from steelyard.sanity.glance import Glance, glance, rolled
 from steelyard.sanity.static_fit import StaticFit, beside, fit, solve
-from steelyard.sanity.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
+from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
 from steelyard.sanity.units import scaled
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
@@ -75,6 +76,9 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     if best is None and reading.rotation is not None:
         recording, findings = _level(recording, view, reading)
         found.extend(findings)
+        blind = None if findings else blind_axis(view, reading.rotation)
+        if blind is not None and not found:
+            found.extend(blind_tilt(view, recording.gravity, blind))
     return recording, tuple(found)
 
 
@@ -243,8 +247,8 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
     message = (
         f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
-        f"given, along ({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction found"
-        f"{tilt.blind_words}."
+        f"given, along ({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction "
+        f"found{tilt.blind_words}."
     )
     return replace(recording, gravity=tilt.gravity), (Finding.of(code, message),)
 

@@ -38,6 +38,7 @@ class Glance:
     block         (N,) number of the stretch (or the pose) a row belongs to, for the jackknife
     rate          [Hz] of the rows; None for a table
     world         the wrench is in W axes
+    accelerometer (N, 3) [m/s^2] what an accelerometer shows in its own axes, where there are rotations, too
     sign_free     `pull` comes from an accelerometer whose mount the force itself decided, so that a mass has no sign
     """
 
@@ -49,6 +50,7 @@ class Glance:
     rate: float | None
     world: bool = False
     sign_free: bool = False
+    accelerometer: Array | None = None
 
     def __len__(self) -> int:
         return len(self.wrench)
@@ -221,7 +223,11 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
             return None
     acceleration = _acceleration(recording, rotation, on_grid, rate)
     block = np.minimum(np.arange(rows) * _BLOCKS // rows, _BLOCKS - 1)
-    return Glance(wrench, rotation, pull, acceleration, block, rate, world, rotation is None and _loose(recording))
+    felt = None
+    if rotation is not None:
+        felt = next((on_grid(s, v) for s, _, v in channel(recording, "specific_force") if s in used), None)
+    loose = rotation is None and _loose(recording)
+    return Glance(wrench, rotation, pull, acceleration, block, rate, world, loose, felt)
 
 
 def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, rate: float) -> Array | None:

@@ -72,7 +72,7 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
     best = fit(view.seen(found, rotation), view.block)
     if view.acceleration is not None:
         best = min(best, fit(still.seen(found, rotation), view.block), key=lambda f: f.force_share)
-    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _blind_axis(shown))
+    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _axis_unseen(shown))
 
 
 def free_direction(
@@ -126,7 +126,15 @@ def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
     return Turn(angle, axis / max(float(np.linalg.norm(axis)), 1e-12), share)
 
 
-def _blind_axis(seen: Array) -> Array | None:
+def blind_axis(view: Glance, rotation: Array) -> Array | None:
+    """Return the direction (3,) of W along which gravity cannot be seen beside a bias, None where there is none."""
+    turned = view.smooth(np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)).reshape(-1, 3, 3)
+    centred = turned - turned.mean(0)
+    values, axes = np.linalg.eigh(np.einsum("nik,nil->kl", centred, centred))
+    return axes[:, 0] if values[0] < _BLIND * values[2] < _BLIND * values[1] / _BLIND else None
+
+
+def _axis_unseen(seen: Array) -> Array | None:
     if np.trace(seen) > 2.5:
         return None
     _, axes = np.linalg.eigh(seen)
