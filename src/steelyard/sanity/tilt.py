@@ -131,7 +131,8 @@ def blind_axis(view: Glance, rotation: Array) -> Array | None:
     turned = view.smooth(np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)).reshape(-1, 3, 3)
     centred = turned - turned.mean(0)
     values, axes = np.linalg.eigh(np.einsum("nik,nil->kl", centred, centred))
-    return axes[:, 0] if values[0] < _BLIND * values[2] < _BLIND * values[1] / _BLIND else None
+    bar = _BLIND * float(values[2])
+    return np.asarray(axes[:, 0]) if values[0] < bar < values[1] else None
 
 
 def _axis_unseen(seen: Array) -> Array | None:
