@@ -37,7 +37,7 @@ def blind_tilt(view: Glance, gravity: Array, blind: Array) -> tuple[Finding, ...
     axis = ", ".join(f"{v:.2f}" for v in blind * np.sign(blind[np.abs(blind).argmax()]) + 0.0)
     message = (
         f"Gravity sweeps {abs(gain[0] - 1) * 100:.1f} ± {spread[0] * 100:.1g} % {'more' if gain[0] > 1 else 'less'} in "
-        f"the accelerometer than its direction in W says: a tilt of about {np.degrees(tilt):.0f} degrees toward or from "
-        f"({axis}) of W, unless the accelerometer's gain is off; the answer does not assume this."
+        f"the accelerometer than its direction in W says: a tilt of about {np.degrees(tilt):.0f} degrees toward or "
+        f"from ({axis}) of W, unless the accelerometer's gain is off; the answer does not assume this."
     )
     return (Finding.of("base-tilted", message),)
