@@ -187,3 +187,16 @@ def test_real_motion_with_a_late_accelerometer(examples_dir: Path, data_dir: Pat
     assert estimate.codes() - {"inertia-not-identified"} == {"stream-delayed", "imu-rotated", "nearly-planar"}
     late = next(v for k, v in estimate.delays_s.items() if "accel" in k)
     assert 0.024 < late < 0.031
+
+
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [
+        ("kuka_static", set()),
+        ("kuka_run1", {"stream-delayed", "imu-rotated", "nearly-planar"}),
+        ("kuka_run2", {"stream-delayed", "imu-rotated", "nearly-planar", "outliers"}),
+    ],
+)
+def test_real_logs_carry_what_is_true(name: str, expected: set[str], examples_dir: Path, data_dir: Path) -> None:
+    estimate = held_object.identify(real(name, examples_dir, data_dir))
+    assert estimate.codes() - {"inertia-not-identified"} == expected

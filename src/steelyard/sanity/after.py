@@ -163,13 +163,17 @@ def _white(time: Array | None, values: Array) -> float:
 
 
 def _prior(estimate: Estimate) -> tuple[Finding, ...]:
-    """Return `prior-dominated` where a number called identified owes its precision to the prior."""
+    """Return `prior-dominated` where an inertia that is given out owes its precision to the prior.
+
+    Mass and centre of mass are refused, and an inertia that is not identified is withheld, before a prior could lead.
+    """
     spread = estimate.evidence.spread
-    if spread is None:
+    if spread is None or not estimate.identified.all():
         return ()
     alone = spread / 2
     names = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
-    led = estimate.identified & (estimate.std < PRIOR_SHARE * alone)
+    led = np.isfinite(alone) & (estimate.std < PRIOR_SHARE * alone)
+    led[:4] = False
     if not led.any():
         return ()
     worst = int(np.argmax(np.where(led, alone / np.maximum(estimate.std, 1e-300), 0)))
