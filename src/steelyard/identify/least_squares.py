@@ -82,8 +82,11 @@ def _total(problem: Problem) -> Array:
     # Columns that the log does not excite at all stay at zero.
     seen = np.diag(reduced) > UNSEEN * np.diag(data)[:11]
     scale = np.where(seen, 1 / np.sqrt(np.where(seen, np.diag(reduced), 1.0)), 0.0)
-    # Noise against data, so that the matrix to factor is positive definite even where columns carry no noise.
-    regular = reduced * np.outer(scale, scale) + np.where(seen, 1e-13, 1.0) * np.eye(11)
+    # Noise against data, so that the matrix to factor is positive definite even where columns carry no noise; a log
+    # without any noise leaves the answer's own direction at zero, or below by rounding.
+    scaled = reduced * np.outer(scale, scale)
+    ridge = max(1e-13, -2 * float(np.linalg.eigvalsh(scaled)[0]))
+    regular = scaled + np.where(seen, ridge, 1.0) * np.eye(11)
     _, vectors = eigh(noise * np.outer(scale, scale), regular, check_finite=False)
     x = scale * vectors[:, -1]
     x = x / x[10]
