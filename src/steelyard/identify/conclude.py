@@ -24,6 +24,8 @@ MASS_SHARE, COM_SHARE, INERTIA_SHARE = 0.1, 0.2, 0.1
 SMALLEST_RADIUS = 0.02
 # There is no answer at all where mass or centre of mass are looser than these shares of the same sizes.
 LOST_MASS, LOST_COM = 0.5, 2.5
+# Fewer blocks left out in turn say too little about error bars; below this factor they agree.
+ENOUGH_BLOCKS, WORTH_WIDENING = 10, 1.5
 # A direction counts toward the rank when the data fix it to half its natural size.
 RANK_INFORMATION = 4.0
 # Below this information (a third of the natural size to the power -2), or below this share of the best seen direction,
@@ -104,7 +106,29 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
         covariance[:10, 10:16] if problem.with_bias else np.zeros((10, 6)),
     )  # fmt: skip
     left_out = leave_one_out(problem, solution.linear, bread, solution.jacobian, solution.prior)
-    return replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))
+    estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))
+    return _widened(estimate)
+
+
+def _widened(estimate: Estimate) -> Estimate:
+    """Return the estimate with error bars at least as wide as leaving blocks out shows, where there are enough blocks.
+
+    What the model leaves out (a soft wrist, cross-talk) is no noise, and only differs from one stretch to the next.
+    """
+    jackknife, known = estimate.evidence.jackknife_people, estimate.identified
+    if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS or not known.any():
+        return estimate
+    factor = float(np.median(jackknife[known] / np.maximum(estimate.std[known], 1e-300)))
+    if factor < WORTH_WIDENING:
+        return estimate
+    note = f"error bars are {factor:.1f} times those of the noise: so much more does the answer move when blocks are left out"
+    return replace(
+        estimate,
+        covariance=factor**2 * estimate.covariance,
+        bias_covariance=factor**2 * estimate.bias_covariance,
+        cross_covariance=factor**2 * estimate.cross_covariance,
+        notes=(*estimate.notes, note),
+    )
 
 
 def _residual(problem: Problem, K: Array) -> tuple[float, float]:

@@ -26,6 +26,7 @@ class Evidence:
     spread              (10,) how far each parameter could move at equal fit: two standard deviations of the data alone
     jackknife           (10,) leave-one-pose-out (or block) standard deviation of the parameters; None where too few
     jackknife_people    (10,) the same for mass, com, inertia about the CoM
+    blocks              how many poses or blocks were left out in turn
     """
 
     rank: int
@@ -40,6 +41,7 @@ class Evidence:
     spread: Array | None = None
     jackknife: Array | None = None
     jackknife_people: Array | None = None
+    blocks: int = 0
 
 
 @dataclass(frozen=True, eq=False)

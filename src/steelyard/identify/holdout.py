@@ -40,6 +40,7 @@ def leave_one_out(problem: Problem, linear: Array, H: Array, jacobian: Array, pr
     return {
         "holdout_force_N": float(np.sqrt(max(square[3:].mean(), 0))),
         "holdout_torque_Nm": float(np.sqrt(max(square[:3].mean(), 0))),
+        "blocks": len(numbers),
         "jackknife": _jackknife(phi),
         "jackknife_people": _jackknife(_people(phi)),
     }
