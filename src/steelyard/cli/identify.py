@@ -31,6 +31,13 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 )
 @click.option("--drift", is_flag=True, help="Let the bias grow linearly over the log.")
 @click.option(
+    "--gravity",
+    type=click.Choice(["given", "unknown"]),
+    default="given",
+    show_default=True,
+    help="Trust the direction of gravity in the description, or estimate it (tilted base).",
+)
+@click.option(
     "--tool",
     type=click.Path(path_type=Path),
     help="Result (.json) or log of the gripper alone: taken away, sharing one sensor bias.",

@@ -133,7 +133,7 @@ def _acceleration_levels(log: MotionLog) -> Array:
     if log.time is None or len(log) < 16:
         return np.zeros(6)
     # White noise leaves a variance of 70 in fourth differences, where a smooth motion leaves next to nothing.
-    differences = np.diff(readings, 4, axis=0)
+    differences = np.diff(readings[np.argsort(log.time, kind="stable")], 4, axis=0)
     return _pooled((differences**2).mean(0) / 70, len(log))
 
 

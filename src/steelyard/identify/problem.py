@@ -127,7 +127,7 @@ def require_rows(rows: int) -> None:
     """Raise CannotAnswer where there are too few rows for anything."""
     if rows < FEWEST_ROWS:
         raise CannotAnswer(
-            f"The log has {rows} usable row{'s' * (rows != 1)}: no weight can be told from a sensor's bias. {ADD_POSES}."
+            f"The log has {rows} usable row{'s' * (rows != 1)}, which cannot tell a weight from a bias. {ADD_POSES}."
         )
 
 

@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
 from steelyard.identify.geodesic import Geodesic
@@ -24,7 +24,7 @@ from steelyard.identify.tool import bias_prior, different_bias, shares_bias, wit
 from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import Recording
-from steelyard.sanity import after, examine, untouched
+from steelyard.sanity import after, examine, fitted_gravity, levelled, untouched
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # A ball's radius of gyration per axis is its diameter times this.
@@ -39,13 +39,15 @@ class Options:
 
     method       one of METHODS
     bias         "free": the sensor's constant bias is estimated; "none": it is known to be tared
-    drift        the bias may grow linearly over the log
+    drift        the bias may grow linearly over the log; it does so by itself where the log shows it
+    gravity      "given": its direction in W is trusted, unless the log shows a clear tilt; "unknown": it is estimated
     object_size  rough longest dimension of the object [m], used only where the data leave the inertia open
     """
 
     method: Literal["auto", "noise-aware", "least-squares", "geodesic"] = "auto"
     bias: Literal["free", "none"] = "free"
     drift: bool = False
+    gravity: Literal["given", "unknown"] = "given"
     object_size: float | None = None
 
     def __post_init__(self) -> None:
@@ -63,7 +65,7 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     """
     known = identify(tool, options) if isinstance(tool, Recording) else tool
     recording, before = examine(recording)
-    aligned = align(recording)
+    aligned, level = _levelled(align(recording), recording, options)
     bias = Bias(options.bias, drift=options.drift)
     keep, touched = untouched(aligned.log, bias.free)
     log, unmeasured = _with_known_acceleration(aligned.log.rows(keep), aligned)
@@ -71,11 +73,15 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     log = with_declared(log, recording.noise)
     estimator, notes = _estimator(options, log, bias)
     estimate = estimator.identify(log)
+    late = after(log, estimate, aligned, recording)
+    if bias.free and any(f.code == "bias-drift" for f in late):
+        bias = replace(bias, drift=True)
+        estimate = _estimator(options, log, bias)[0].identify(log)
+        notes = (*notes, "the fit was repeated with a bias that drifts")
     if known is not None:
         estimate, shared = _with_tool(options, log, bias, estimate, _in_log_sign(known, recording))
         notes = (*notes, *shared)
-    late = after(log, estimate, aligned, recording)
-    notes = (*notes, *unmeasured)
+    notes = (*notes, *level, *unmeasured)
     return _in_recording_sign(
         replace(
             estimate.with_findings(*before, *aligned.findings, *touched, *late),
@@ -84,6 +90,20 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
         ),
         recording,
     )
+
+
+def _levelled(aligned: Aligned, recording: Recording, options: Options) -> tuple[Aligned, tuple[str, ...]]:
+    """Return the log for the direction of gravity that it shows itself, where that was asked for."""
+    if options.gravity == "given":
+        return aligned, ()
+    if aligned.rotation is None:
+        raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
+    rotation = aligned.rotation.matrix
+    found = fitted_gravity(aligned.log, rotation, recording.gravity, aligned.acceleration_from)
+    if found is None:
+        raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
+    log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
+    return replace(aligned, log=log), (f"gravity was estimated {found.words} off the direction given",)
 
 
 def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLog, tuple[str, ...]]:

@@ -3,5 +3,6 @@
 from steelyard.sanity.after import after
 from steelyard.sanity.before import examine
 from steelyard.sanity.contact import untouched
+from steelyard.sanity.gravity import fitted_gravity, levelled
 
-__all__ = ["after", "examine", "untouched"]
+__all__ = ["after", "examine", "fitted_gravity", "levelled", "untouched"]

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from steelyard.check import Array
@@ -16,7 +14,7 @@ from steelyard.logs.recording import Recording
 from steelyard.sanity.coverage import coverage
 from steelyard.sanity.full_fit import Rows
 from steelyard.sanity.glance import channel
-from steelyard.spatial import Rotation
+from steelyard.sanity.gravity import fitted_gravity
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
 CHI2, NOISE_RATIO = 2.5, 2.5
@@ -26,7 +24,6 @@ TILT, SURE, TILT_SHARE = np.radians(2.0), 4.0, 0.7
 DRIFT_WEIGHT, DRIFT_ARM, DRIFT_SHARE = 0.02, 0.1, 0.8
 # The prior dominates where it brings a standard deviation below half of what the data alone give.
 PRIOR_SHARE = 0.5
-_ROUNDS = 4
 _FEWEST_ROWS = 8
 
 
@@ -37,7 +34,7 @@ def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recor
     """
     known = {f.code for f in aligned.findings}
     seen = tuple(f for f in coverage(log.gravity) if f.code not in known)
-    rotation = _rotation(log, aligned)
+    rotation = rotation_of(log, aligned)
     tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
     drift = () if tilted else bias_drift(log)
     return (*seen, *tilted, *drift, *_noise_level(estimate, recording), *_prior(estimate))
@@ -46,37 +43,14 @@ def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recor
 def base_tilted(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> tuple[Finding, ...]:
     """Return `base-tilted` where another direction of gravity in W explains the wrench clearly better.
 
-    rotation (N, 3, 3) S to W at the rows of the log; gravity (3,) [m/s^2] in W as it was used. The fit is linearised
-    anew about each direction found. An accelerometer's a - g knows nothing of W: then gravity alone is compared.
+    rotation (N, 3, 3) S to W at the rows of the log; gravity (3,) [m/s^2] in W as it was used.
     """
-    if len(log) < _FEWEST_ROWS:
+    found = fitted_gravity(log, rotation, gravity, acceleration_from)
+    if found is None or found.angle <= max(TILT, SURE * found.angle_std) or found.left >= TILT_SHARE:
         return ()
-    if acceleration_from == "specific_force":
-        log = replace(log, acceleration=np.zeros_like(log.acceleration))
-    given, pick = Rows.of(log)
-    R = rotation[pick]
-    level = given.solve()
-    found, phi = gravity, level.solution[:10]
-    turn, spread, left = np.zeros(3), np.zeros(3), level.left
-    for _ in range(_ROUNDS):
-        rows = _with_gravity(given, R, found)
-        columns, axes = _visible(rows, rows.tilting(phi, R, found))
-        if columns is None:
-            return ()
-        fit = rows.solve(columns, jackknife=True)
-        turn, spread, left = axes @ fit.solution[16:], np.abs(axes) @ fit.spread[16:], fit.left
-        found, phi = Rotation.exp(turn).apply(found), fit.solution[:10]
-        if np.linalg.norm(turn) < 1e-4:
-            break
-    angle = float(np.arccos(np.clip(found @ gravity / (gravity @ gravity), -1, 1)))
-    sure = angle > max(TILT, SURE * float(np.linalg.norm(spread)))
-    if not (sure and left < TILT_SHARE * level.left):
-        return ()
-    along = ", ".join(f"{v:.3f}" for v in found / np.linalg.norm(found) + 0.0)
     message = (
-        f"Gravity fits {np.degrees(angle):.1f} ± {np.degrees(np.linalg.norm(spread)):.1g} degrees off the direction "
-        f"given, along ({along}) of W, with {100 * (1 - left / level.left):.0f} % less squared residual; the answer "
-        "uses the direction given."
+        f"Gravity fits {found.words} off the direction given, with {100 * (1 - found.left):.0f} % less squared "
+        "residual; the answer uses the direction given."
     )
     return (Finding.of("base-tilted", message),)
 
@@ -102,7 +76,7 @@ def bias_drift(log: MotionLog) -> tuple[Finding, ...]:
     return (Finding.of("bias-drift", message),)
 
 
-def _rotation(log: MotionLog, aligned: Aligned) -> Array | None:
+def rotation_of(log: MotionLog, aligned: Aligned) -> Array | None:
     """Return rotations (N, 3, 3) S to W at the rows of a log that may hold fewer rows than `aligned` gave."""
     if aligned.rotation is None:
         return None
@@ -113,21 +87,6 @@ def _rotation(log: MotionLog, aligned: Aligned) -> Array | None:
         return None
     index = np.searchsorted(aligned.log.time, log.time)
     return np.asarray(matrix[np.minimum(index, len(matrix) - 1)])
-
-
-def _with_gravity(rows: Rows, rotation: Array, gravity: Array) -> Rows:
-    """Return the rows for another gravity in W, with the weights kept."""
-    turned = np.swapaxes(rotation, 1, 2) @ gravity
-    return replace(rows, columns=Rows.columns_of(replace(rows.log, gravity=turned)))
-
-
-def _visible(rows: Rows, columns: Array) -> tuple[Array | None, Array]:
-    """Return tilt columns (N, 6, k) along the axes (3, k) that the log shows beside a free bias."""
-    centred = (columns - columns.mean(0)) * np.sqrt(rows.weights)[:, :, None]
-    scatter = np.einsum("nik,nil->kl", centred, centred)
-    values, axes = np.linalg.eigh(scatter)
-    kept = axes[:, values > 0.02 * max(float(values[-1]), 1e-12)]
-    return (columns @ kept, kept) if kept.shape[1] else (None, kept)
 
 
 def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...]:
