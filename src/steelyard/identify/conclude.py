@@ -121,9 +121,7 @@ def _widened(estimate: Estimate) -> Estimate:
     factor = float(np.median(jackknife[known] / np.maximum(estimate.std[known], 1e-300)))
     if factor < WORTH_WIDENING:
         return estimate
-    note = (
-        f"error bars are {factor:.1f} times those of noise alone: the answer moves that much when blocks are left out"
-    )
+    note = f"error bars are {factor:.1f} times those of noise alone: leaving blocks out moves the answer that much"
     return replace(
         estimate,
         covariance=factor**2 * estimate.covariance,

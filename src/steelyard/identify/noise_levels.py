@@ -158,6 +158,8 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
         if c in resting and rows >= FEWEST_FOR_MEDIAN:
             residual = features(log.rows(log.noise_class == c)) @ K.T
             left = np.minimum(np.square(1.4826 * np.median(np.abs(residual), axis=0)) / (1 - lost), miss)
+        elif c in resting:
+            left = miss
         else:
             # What the motion's noise may explain is taken away; with a class at rest only a sure excess over it counts.
             unsure = 2 * np.sqrt(2 / rows) if resting else 0.0
