@@ -137,7 +137,7 @@ def test_command_prints_one_json_object(no_peers, monkeypatch):
     for name in timing._THREAD_VARIABLES:
         monkeypatch.setenv(name, "1")
     options = "identify --json --seeds 1 --objects hammer --motions stop_go --noise moderate --methods noise-aware"
-    done = CliRunner().invoke(bench, [*options.split(), "--no-million"])
+    done = CliRunner().invoke(bench, [*options.split(), "--million", "0"])
     assert done.exit_code == 0
     found = json.loads(done.stdout)
     assert found["rows"][0]["object"] == "hammer"
