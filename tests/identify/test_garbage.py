@@ -135,7 +135,7 @@ def test_two_directions_of_a_tared_sensor_are_enough() -> None:
 @pytest.mark.parametrize("name", ESTIMATORS)
 def test_too_few_rows(name: str, rows: int) -> None:
     count = "1 usable row" if rows == 1 else "0 usable rows"
-    text = f"The log has {count}: no weight can be told from a sensor's bias. {ADVICE}."
+    text = f"The log has {count}, which cannot tell a weight from a bias. {ADVICE}."
     log = bench_log("hammer", "stop_go", "moderate").rows(slice(0, rows))
     for version in (log, replace(log, noise=None)):
         with pytest.raises(CannotAnswer) as caught:
