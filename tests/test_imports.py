@@ -31,7 +31,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "inertia": {"spatial"},
     "logs": {"inertia", "spatial"},
     "shape": {"inertia", "spatial"},
-    "parts": {"shape"},
+    "parts": {"shape", "inertia", "spatial"},
     "robots": {"spatial"},
     "identify": {"parts.parts", "logs", "inertia", "spatial"},
     "team": {"identify.estimate", "identify.evidence", "identify.regressor", "logs", "inertia", "spatial"},

@@ -1,0 +1,5 @@
+"""Homogeneous parts of an object."""
+
+from steelyard.parts.parts import Parts
+
+__all__ = ["Parts"]
