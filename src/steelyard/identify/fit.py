@@ -14,7 +14,7 @@ from steelyard.identify.conclude import Solution, conclude
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
-from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows
+from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift
 from steelyard.identify.rest import at_rest
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -81,10 +81,11 @@ def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest
     the data do not fix mass and centre of mass.
     """
     require_rows(len(log))
-    log = with_noise(log, bias.free)
+    steady = with_noise(without_drift(log) if bias.drift else log, bias.free)
     if verify_rest and log.still.any():
-        first = solver(_problem(log, bias, by_block=False))
-        log = at_rest(log, first.linear[:10], first.bias)
+        first = solver(_problem(steady, replace(bias, drift=False), by_block=False))
+        steady = at_rest(steady, first.linear[:10], first.bias)
+    log = replace(steady, wrench=log.wrench)
     problem = _problem(log, bias, by_block=True)
     solution = solver(problem)
     return conclude(problem, solution, method, score_variance(log, problem, solution))

@@ -8,11 +8,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify.linear import normal_equations
+from steelyard.identify.linear import normal_equations, solve_scaled
 from steelyard.identify.regressor import design
-from steelyard.logs.log import Integers, MotionLog
+from steelyard.logs.log import Integers, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 
+# Variances [(N m)^2, N^2] of an everyday wrist sensor with its model errors.
+EVERYDAY = np.repeat(np.square([0.02, 0.5]), 3)
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
 ADD_POSES = (
@@ -129,6 +131,14 @@ def require_rows(rows: int) -> None:
         raise CannotAnswer(
             f"The log has {rows} usable row{'s' * (rows != 1)}, which cannot tell a weight from a bias. {ADD_POSES}."
         )
+
+
+def without_drift(log: MotionLog) -> MotionLog:
+    """Return the log less a drift found by weighted least squares: what noise and rest are judged by."""
+    loud = replace(log, noise_class=np.zeros(len(log), np.int64), noise=(Noise(np.zeros(6), EVERYDAY),))
+    problem = Problem.of(Moments.of_log(loud, by_block=False), True).with_drift(loud)
+    linear = solve_scaled(*problem.normal_equations(np.diag(1 / EVERYDAY)[None]))
+    return replace(log, wrench=log.wrench - np.outer(_scaled_time(log), linear[16:]))
 
 
 def _scaled_time(log: MotionLog) -> Array:
