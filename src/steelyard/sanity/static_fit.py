@@ -92,7 +92,10 @@ def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Ar
 
 def _least_norm(matrix: Array, vector: Array) -> Array:
     """Return the least-norm solution after scaling the columns to one."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * max(float(np.trace(matrix)), 1e-300)))
+    size = float(np.trace(matrix))
+    if not size > 1e-200:
+        return np.zeros(len(vector))
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * size))
     values, axes = np.linalg.eigh(matrix * np.outer(scale, scale))
     inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
     return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))

@@ -1,0 +1,476 @@
+"""The command line as a user meets it: tables, JSON, files, and one clear line with the right exit status."""
+
+from __future__ import annotations
+
+import io
+import json
+import shutil
+import subprocess
+import sys
+import time
+from contextlib import redirect_stderr, redirect_stdout
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import click
+import numpy as np
+import pytest
+
+from steelyard.cli.main import VERBS, main
+from steelyard.inertia import InertialParameters
+from steelyard.io import read_result
+from steelyard.io.recording_files import write_recording
+from steelyard.logs.recording import Recording, Stream
+from steelyard.simulate import hammer
+from steelyard.spatial import Rotation
+
+ENTRY = Path(sys.executable).with_name("steelyard")
+BODY = hammer.body()
+KEYS = {
+    "mass_kg", "com_m", "inertia_com_kgm2", "frame", "method", "consistent", "std", "covariance", "identified",
+    "force_bias_N", "torque_bias_Nm", "delays_s", "evidence", "findings",
+}  # fmt: skip
+EVIDENCE = {
+    "rank", "condition", "samples", "still_samples", "residual_force_N", "residual_torque_Nm", "chi2_per_dof",
+    "holdout_force_N", "spread",
+}  # fmt: skip
+
+
+@dataclass(frozen=True)
+class Run:
+    status: int
+    out: str
+    err: str
+
+    @property
+    def json(self) -> dict[str, Any]:
+        """The one JSON object on stdout."""
+        value = json.loads(self.out, parse_constant=lambda name: pytest.fail(f"{name} is not JSON"))
+        assert isinstance(value, dict)
+        return value
+
+    def failed(self, status: int) -> str:
+        """The one line on stderr of a run that failed with this status and said nothing on stdout."""
+        assert self.status == status
+        assert self.out == ""
+        lines = self.err.splitlines()
+        assert len(lines) == 1
+        assert lines[0].startswith("steelyard: ")
+        return lines[0].removeprefix("steelyard: ")
+
+
+class _Terminal(io.StringIO):
+    """Text that was typed, or a screen: not a terminal."""
+
+
+def steelyard(*arguments: object, typed: str | None = None, monkeypatch: pytest.MonkeyPatch | None = None) -> Run:
+    """Run the command line in this process."""
+    out, err = io.StringIO(), io.StringIO()
+    status = 0
+    if typed is not None:
+        assert monkeypatch is not None
+        monkeypatch.setattr(sys, "stdin", _Terminal(typed))
+    with redirect_stdout(out), redirect_stderr(err):
+        try:
+            main([str(a) for a in arguments])
+        except SystemExit as end:
+            status = int(end.code or 0)
+    return Run(status, click.unstyle(out.getvalue()), err.getvalue())
+
+
+@pytest.fixture(scope="session")
+def made(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return write_recording(hammer.recording(1).recording, tmp_path_factory.mktemp("hammer"))
+
+
+@pytest.fixture(scope="session")
+def answer(made: Path) -> dict[str, Any]:
+    run = steelyard("identify", made, "--json")
+    assert run.status == 0
+    return run.json
+
+
+def test_help_is_quick_and_lists_the_verbs() -> None:
+    start = time.perf_counter()
+    run = subprocess.run([ENTRY, "--help"], capture_output=True, text=True, check=True)
+    assert time.perf_counter() - start < 2  # 0.1 s on a quiet machine
+    for verb, (_, line) in VERBS.items():
+        assert f"  {verb}" in run.stdout
+        assert line.split(",")[0] in run.stdout
+    assert run.stderr == ""
+
+
+@pytest.mark.parametrize("argument", ["--help", "--version"])
+def test_help_imports_nothing_heavy(argument: str) -> None:
+    code = (
+        "import sys\nfrom steelyard.cli.main import main\n"
+        f"try: main(['{argument}'])\nexcept SystemExit: pass\n"
+        "print([m for m in ('numpy', 'scipy', 'numba') if m in sys.modules], file=sys.stderr)"
+    )
+    run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    assert run.stderr.strip() == "[]"
+
+
+@pytest.mark.parametrize("verb", VERBS)
+def test_every_verb_has_help(verb: str) -> None:
+    run = steelyard(verb, "--help")
+    assert run.status == 0
+    assert f"Usage: steelyard {verb}" in run.out
+
+
+def test_the_table_holds_the_numbers_and_the_file_is_the_json(
+    made: Path, answer: dict[str, Any], tmp_path: Path
+) -> None:
+    path = tmp_path / "result.json"
+    run = steelyard("identify", made, "-o", path)
+    assert run.status == 0
+    assert json.loads(path.read_text()) == answer
+    assert [p.name for p in tmp_path.iterdir()] == ["result.json"]
+    assert read_result(path).mass == answer["mass_kg"]
+    assert run.err == ""
+    mass, std = answer["mass_kg"], answer["std"]["mass_kg"]
+    places = int(1 - np.floor(np.log10(std)))
+    assert f"{mass:.{places}f} ± {std:.{places}f} kg" in run.out
+    for word in ("mass", "com x", "com y", "com z", "Ixx", "Izz", "method", "residual", "left out", "bias", "note"):
+        assert f"  {word}" in run.out
+    for finding in answer["findings"]:
+        assert f"{finding['code']}: {finding['message']}" in run.out
+        assert f"-> {finding['remedy']}" in run.out
+
+
+def test_json_has_the_fixed_keys(answer: dict[str, Any]) -> None:
+    assert set(answer) >= KEYS
+    assert set(answer["evidence"]) >= EVIDENCE
+    assert set(answer["std"]) >= {"mass_kg", "com_m", "inertia_com_kgm2"}
+    assert np.shape(answer["covariance"]) == (10, 10)
+    assert np.shape(answer["inertia_com_kgm2"]) == (3, 3)
+    assert {k: np.shape(v) for k, v in answer["identified"].items()} == {"mass": (), "com": (3,), "inertia": (6,)}
+    assert answer["consistent"] is True
+    assert answer["frame"] == "S"
+    for finding in answer["findings"]:
+        assert set(finding) == {"code", "message", "remedy"}
+
+
+def close_to_the_hammer(answer: dict[str, Any]) -> None:
+    assert abs(answer["mass_kg"] - float(BODY.mass)) < 4 * answer["std"]["mass_kg"]
+    gap = np.abs(np.array(answer["com_m"]) - BODY.com)
+    assert (gap < 4 * np.array(answer["std"]["com_m"])).all()
+
+
+def test_the_answer_is_right(answer: dict[str, Any]) -> None:
+    close_to_the_hammer(answer)
+    bias = np.concatenate([answer["torque_bias_Nm"], answer["force_bias_N"]])
+    assert float(np.abs(bias - hammer.BIAS)[3:].max()) < 0.05
+    assert float(np.abs(bias - hammer.BIAS)[:3].max()) < 0.01
+
+
+@pytest.mark.parametrize("method", ["noise-aware", "least-squares", "geodesic"])
+def test_methods(made: Path, method: str) -> None:
+    run = steelyard("identify", made, "--json", "--method", method)
+    assert run.status == 0
+    assert run.json["method"] == method
+    assert run.json["mass_kg"] == pytest.approx(float(BODY.mass), rel=0.01)
+
+
+def test_auto_says_what_it_chose(answer: dict[str, Any]) -> None:
+    assert answer["method"] == "noise-aware"
+    assert any(note.startswith("method: auto chose noise-aware, because ") for note in answer["notes"])
+
+
+def test_the_installed_command_prints_one_json_object(made: Path, answer: dict[str, Any]) -> None:
+    run = subprocess.run([ENTRY, "identify", made, "--json"], capture_output=True, text=True, check=False)
+    assert run.returncode == 0
+    assert run.stderr == ""
+    assert json.loads(run.stdout) == answer
+
+
+# Bad input: exit status 2, nothing on stdout, one line on stderr, nothing written.
+
+
+def test_a_missing_file(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    text = steelyard("identify", tmp_path / "nothing.toml", "-o", out, "--json").failed(2)
+    assert text.startswith(f"{tmp_path / 'nothing.toml'}: ")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_the_installed_command_fails_with_status_2(tmp_path: Path) -> None:
+    run = subprocess.run([ENTRY, "identify", tmp_path / "no.toml"], capture_output=True, text=True, check=False)
+    Run(run.returncode, run.stdout, run.stderr).failed(2)
+
+
+@pytest.mark.parametrize(
+    ("content", "words"),
+    [
+        ("this is = = not toml", ["not valid TOML"]),
+        ("[log]\ngravty = [0, 0, -9.81]\n", ["gravty", "gravity"]),
+    ],
+)
+def test_a_bad_description(tmp_path: Path, content: str, words: list[str]) -> None:
+    log, out = tmp_path / "log.toml", tmp_path / "out.json"
+    log.write_text(content)
+    text = steelyard("identify", log, "-o", out).failed(2)
+    for word in words:
+        assert word in text
+    assert not out.exists()
+
+
+@pytest.mark.parametrize("content", ["", "[log]\ngravity = [0, 0, -9.81]\nwrench = 'on-sensor'\n"])
+def test_a_description_without_streams_is_shown_a_complete_one(tmp_path: Path, content: str) -> None:
+    (tmp_path / "log.toml").write_text(content)
+    run = steelyard("identify", tmp_path / "log.toml", "--json")
+    assert run.status == 2
+    assert run.out == ""
+    first, *example = run.err.splitlines()
+    assert first.endswith(": no [[stream]] is given, so there are no data. A complete description:")
+    assert "[[stream]]" in example
+
+
+@pytest.mark.parametrize("arguments", [["identify"], ["identify", "log.toml", "--pendant"]])
+def test_a_log_or_the_pendant(arguments: list[str]) -> None:
+    text = steelyard(*arguments).failed(2)
+    assert text == "Give either a LOG or --pendant. Example: steelyard identify log.toml"
+
+
+def test_an_object_of_no_size(made: Path) -> None:
+    text = steelyard("identify", made, "--object-size", "0").failed(2)
+    assert text == "object_size must be 0.005 to 5 m; got 0.0."
+
+
+@pytest.mark.parametrize("arguments", [["identify", "--method", "magic", "x"], ["weigh"], ["identify", "--nonsense"]])
+def test_a_wrong_option(arguments: list[str]) -> None:
+    run = steelyard(*arguments)
+    assert run.status == 2
+    assert run.out == ""
+    assert "Error: " in run.err
+
+
+def test_an_output_folder_that_is_not_there(made: Path, tmp_path: Path) -> None:
+    path = tmp_path / "no" / "out.json"
+    text = steelyard("identify", made, "-o", path, "--json").failed(2)
+    assert text == f"{path}: cannot be written (No such file or directory)."
+
+
+# Sound data that do not answer: exit status 3.
+
+
+def poses(angles: list[list[float]], rows: int = 5) -> str:
+    """Readings typed by hand, on-sensor: the hammer's wrench at roll pitch yaw [deg], with the sensor's bias."""
+    lines = []
+    for k, angle in enumerate(np.repeat(np.array(angles, float), rows, axis=0)):
+        rotation = Rotation.from_rpy(np.radians(angle))
+        force = -float(BODY.mass) * rotation.inverse().apply(np.array([0, 0, -9.80665]))
+        wrench = -np.concatenate([np.cross(BODY.com, force), force]) + hammer.BIAS
+        wrench = wrench + 1e-3 * np.sin([7 * k, 11 * k, 13 * k, 17 * k, 19 * k, 23 * k])
+        lines.append(" ".join(f"{v:.6f}" for v in [*angle, *wrench[3:], *wrench[:3]]))
+    return "\n".join(lines) + "\n"
+
+
+MANY = [[0, 0, 0], [90, 0, 0], [0, 90, 0], [180, 0, 0], [0, -60, 30], [45, 45, 0]]
+
+
+def test_pendant(monkeypatch: pytest.MonkeyPatch) -> None:
+    run = steelyard("identify", "--pendant", "--json", typed=poses(MANY), monkeypatch=monkeypatch)
+    assert run.status == 0
+    assert run.json["mass_kg"] == pytest.approx(float(BODY.mass), rel=1e-3)
+    assert np.abs(np.array(run.json["com_m"]) - BODY.com).max() < 1e-3
+    assert run.json["inertia_com_kgm2"] is None
+    table = steelyard("identify", "--pendant", typed=poses(MANY), monkeypatch=monkeypatch)
+    assert table.out.startswith("pendant: what the robot holds")
+    assert "inertia    not identified by these data" in table.out
+
+
+@pytest.mark.parametrize(
+    ("typed", "start"),
+    [
+        ("", "no pose was typed. Each line holds nine numbers: "),
+        ("1 2 3\n", "line 1: got 3 numbers. Each line holds nine finite numbers: "),
+        ("0 0 0 a 0 0 0 0 0\n", "line 1: could not convert string to float: 'a'. "),
+    ],
+)
+def test_pendant_typing_errors(typed: str, start: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    text = steelyard("identify", "--pendant", typed=typed, monkeypatch=monkeypatch).failed(2)
+    assert text.startswith(start)
+
+
+@pytest.mark.parametrize(("angles", "lost"), [([[0, 0, 0]], "the mass"), ([[0, 0, 0], [180, 0, 0]], "along z")])
+def test_too_few_poses(angles: list[list[float]], lost: str, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    run = steelyard("identify", "--pendant", "-o", out, "--json", typed=poses(angles), monkeypatch=monkeypatch)
+    text = run.failed(3)
+    assert text.startswith("The data do not fix ")
+    assert lost in text
+    assert "Add still poses that turn gravity to other axes of the sensor" in text
+    assert not out.exists()
+
+
+def write(recording: Recording, folder: Path) -> Path:
+    return write_recording(recording, folder)
+
+
+def test_one_pose_in_files(tmp_path: Path) -> None:
+    made = hammer.recording(2).recording
+    cut = tuple(
+        replace(s, time=s.time[s.time < 1.5], channels={k: v[s.time < 1.5] for k, v in s.channels.items()})
+        for s in made.streams
+        if s.time is not None
+    )
+    run = steelyard("identify", write(replace(made, streams=cut), tmp_path), "-o", tmp_path / "out.json")
+    run.failed(3)
+    assert not (tmp_path / "out.json").exists()
+
+
+def without_clock(folder: Path) -> Path:
+    """The hammer's log with every stream's clock lost, rows matched."""
+    made = hammer.recording(2).recording
+    wrench, pose = (replace(s, time=None) for s in made.streams)
+    thin = {k: v[::2] for k, v in wrench.channels.items()}
+    return write(replace(made, streams=(replace(wrench, channels=thin), pose)), folder)
+
+
+def test_without_a_clock_rows_are_still_poses(tmp_path: Path) -> None:
+    run = steelyard("identify", without_clock(tmp_path), "--json")
+    assert run.status == 0
+    assert run.json["inertia_com_kgm2"] is None
+    assert "clock-missing" in {f["code"] for f in run.json["findings"]}
+    # The rows between the stops move, and are taken for still ones.
+    assert run.json["mass_kg"] == pytest.approx(float(BODY.mass), rel=0.02)
+
+
+def test_no_clock_for_dynamics(tmp_path: Path) -> None:
+    out = tmp_path / "out.json"
+    text = steelyard("identify", without_clock(tmp_path), "--drift", "--json", "-o", out).failed(3)
+    assert text == "A drifting bias needs a clock; the log has none. Record a time column."
+    assert not out.exists()
+
+
+def test_streams_without_a_clock_and_of_different_lengths(tmp_path: Path) -> None:
+    made = hammer.recording(2).recording
+    bare: tuple[Stream, ...] = tuple(replace(s, time=None) for s in made.streams)
+    text = steelyard("identify", write(replace(made, streams=bare), tmp_path), "--json").failed(2)
+    assert text.endswith(
+        'streams without time are matched by row, but their lengths differ: "wrench.csv" 5000, "pose.csv" 2500 rows.'
+    )
+
+
+# A tool, and comparison.
+
+
+def gripper() -> Recording:
+    """The same sensor and motion with half the hammer's mass on it: a tool."""
+    made = hammer.recording(7)
+    wrench = made.recording.streams[0]
+    full = {k: np.array(v) for k, v in wrench.channels.items()}
+    bias = {"force": hammer.BIAS[3:], "torque": hammer.BIAS[:3]}
+    rng = np.random.default_rng(5)
+    std = {"force": hammer.FORCE_STD, "torque": hammer.TORQUE_STD}
+    exact = {k: 0.5 * (v - bias[k]) + bias[k] for k, v in full.items()}
+    noisy = {k: v + 0.75**0.5 * std[k] * rng.normal(size=v.shape) for k, v in exact.items()}
+    return replace(made.recording, streams=(replace(wrench, channels=noisy), *made.recording.streams[1:]))
+
+
+@pytest.fixture(scope="session")
+def tool(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
+    """The gripper's description and its result."""
+    folder = tmp_path_factory.mktemp("gripper")
+    log = write_recording(gripper(), folder)
+    result = folder / "gripper.json"
+    assert steelyard("identify", log, "-o", result).status == 0
+    return log, result
+
+
+def test_a_tool_is_taken_away(made: Path, tool: tuple[Path, Path]) -> None:
+    half = InertialParameters(0.5 * BODY.vector)
+    answers = [steelyard("identify", made, "--tool", path, "--json").json for path in tool]
+    for found in answers:
+        assert abs(found["mass_kg"] - float(half.mass)) < 5 * found["std"]["mass_kg"]
+        assert (np.abs(np.array(found["com_m"]) - half.com) < 5 * np.array(found["std"]["com_m"])).all()
+        assert any("was taken away from a load of" in note for note in found["notes"])
+        assert any("sensor bias is shared" in note for note in found["notes"])
+    assert answers[0]["mass_kg"] == pytest.approx(answers[1]["mass_kg"], rel=1e-6)
+
+
+def test_a_tool_named_in_the_description(made: Path, tool: tuple[Path, Path], tmp_path: Path) -> None:
+    for path in (*made.parent.glob("*.csv"), tool[1]):
+        shutil.copy(path, tmp_path)
+    described = made.read_text().replace("[log]\n", '[log]\ntool = "gripper.json"\n')
+    (tmp_path / "log.toml").write_text(described)
+    named = steelyard("identify", tmp_path / "log.toml", "--json")
+    assert named.status == 0
+    given = steelyard("identify", made, "--tool", tool[1], "--json").json
+    assert named.json["mass_kg"] == given["mass_kg"]
+
+
+def test_a_tool_that_is_no_result(made: Path, tmp_path: Path) -> None:
+    broken = tmp_path / "tool.json"
+    broken.write_text("{}")
+    text = steelyard("identify", made, "--tool", broken).failed(2)
+    assert str(broken) in text
+
+
+def test_nothing_but_the_tool(tool: tuple[Path, Path]) -> None:
+    text = steelyard("identify", tool[0], "--tool", tool[1]).failed(3)
+    assert text.startswith("After taking the tool (")
+
+
+def test_compare(made: Path, tool: tuple[Path, Path], tmp_path: Path) -> None:
+    first, second = tmp_path / "a.json", tmp_path / "b.json"
+    again = write_recording(hammer.recording(3).recording, tmp_path / "again")
+    assert steelyard("identify", made, "-o", first).status == 0
+    assert steelyard("identify", again, "-o", second).status == 0
+    same = steelyard("compare", first, second)
+    assert same.status == 0
+    assert same.out.startswith("the same object: p = ")
+    verdict = steelyard("compare", first, second, "--json").json
+    assert verdict["same"] is True
+    assert verdict["p_value"] > 0.01
+    other = steelyard("compare", first, tool[1], "--json").json
+    assert other["same"] is False
+    assert other["p_value"] < 1e-9
+    assert steelyard("compare", first, tool[1]).out.startswith("not the same object: p = ")
+    grasp = steelyard("compare", first, second, "--any-grasp", "--json").json
+    assert grasp["dof"] == 4
+    steelyard("compare", first, tmp_path / "none.json").failed(2)
+
+
+def test_doctor() -> None:
+    run = steelyard("doctor", "--json")
+    assert run.status == 0
+    assert run.json["healthy"] is True
+    assert set(run.json["packages"]) >= {"numpy", "scipy", "numba", "click"}
+    table = steelyard("doctor")
+    assert table.status == 0
+    assert "identification of a known body: worst error" in table.out
+
+
+def test_demo(tmp_path: Path) -> None:
+    run = steelyard("demo", "--json")
+    assert run.status == 0
+    close_to_the_hammer(run.json)
+    np.testing.assert_allclose(run.json["truth"], BODY.vector)
+    table = steelyard("demo", "--keep", tmp_path / "log")
+    assert f"truth {float(BODY.mass):.2f}" in table.out
+    assert table.err.startswith(f"The log is in {tmp_path / 'log'}; identify it with: steelyard identify ")
+    assert (tmp_path / "log" / "log.toml").exists()
+
+
+def test_bench_identify() -> None:
+    choice = ["--seeds", 1, "--objects", "hammer", "--motions", "stop_go", "--noise", "moderate", "--million", 0]
+    methods = [a for m in ("noise-aware", "least-squares", "geodesic") for a in ("--methods", m)]
+    run = steelyard("bench", "identify", *choice, *methods, "--json")
+    assert run.status == 0
+    rows = {row["method"]: row for row in run.json["rows"]}
+    assert set(rows) == {"noise-aware", "least-squares", "geodesic"}
+    assert set(rows["noise-aware"]) >= {
+        "object", "motion", "noise", "seed", "mass_pct", "com_mm", "com_pct", "inertia_pct", "riemannian", "consistent",
+        "solve_ms",
+    }  # fmt: skip
+    assert rows["noise-aware"]["consistent"] is True
+    assert run.json["median"]["stop_go"]["moderate"]["noise-aware"]["mass_pct"] < 0.2
+    assert steelyard("bench", "identify", *choice, *methods).status == 0
+
+
+def test_bench_refuses_names_it_does_not_know() -> None:
+    text = steelyard("bench", "identify", "--objects", "spoon", "--million", 0).failed(2)
+    assert "'spoon'" in text
