@@ -30,6 +30,9 @@ REMEDIES: dict[str, str] = {
     "inertia-not-identified": "Turn the object faster about the weak axes, or add its shape with --scan.",
     "prior-dominated": "Add faster rotation or the object's shape; the number shown is mostly the assumed prior.",
     "noise-level-off": "Correct [noise], or leave it out so that it is estimated.",
+    "part-zero-mass": "Check the part's label and shape; merge it with a neighbour of the same material.",
+    "centroids-coplanar": "Move between the poses as well, or merge parts of the same material.",
+    "more-parts-than-rank": "Merge parts of the same material, or turn the object faster between the poses.",
     "tool-included": "Give --tool (a result or a tool-only log) if you want the object alone.",
 }
 

@@ -69,11 +69,13 @@ def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
     return bread @ score @ bread.T
 
 
-def conclude(problem: Problem, solution: Solution, method: str, score: Array | None = None) -> Estimate:
+def conclude(
+    problem: Problem, solution: Solution, method: str, score: Array | None = None, require: bool = True
+) -> Estimate:
     """Return the Estimate of a solution.
 
     `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
-    Raises CannotAnswer where mass or centre of mass are not fixed.
+    Raises CannotAnswer where mass or centre of mass are not fixed, unless `require` is false: a shape may fix them.
     """
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
@@ -91,7 +93,8 @@ def conclude(problem: Problem, solution: Solution, method: str, score: Array | N
     covariance = _sandwich(bread, V, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
     sight = _sight(H, V, solution.linear[:10])
-    _require_answer(sight, problem)
+    if require:
+        _require_answer(sight, problem)
     estimate = Estimate(
         body,
         covariance[:10, :10],

@@ -45,12 +45,30 @@ class Evidence:
 
 
 @dataclass(frozen=True, eq=False)
+class PartMass:
+    """Mass [kg] with standard deviation of one homogeneous part; volume [m^3] and centroid (3,) [m] are given."""
+
+    label: int
+    mass: float
+    std: float
+    volume: float
+    centroid: Array
+    material: str | None = None
+
+    @property
+    def density(self) -> float:
+        """Density [kg/m^3]."""
+        return self.mass / self.volume
+
+
+@dataclass(frozen=True, eq=False)
 class Estimate:
     """Parameters (10,) about the origin of `frame`, with covariance (10, 10) and everything said about them.
 
     identified   (10,) of mass, com x y z, inertia about the CoM xx xy xz yy yz zz
     wrench_bias  (6,) [tau, f] in the recording's own sign and axes: what to subtract from the raw channels
     bias_covariance  (6, 6) of the same
+    parts        mass of every part, where the object was given in parts; part_covariance (P, P) of them
     cross_covariance  (10, 6) of the parameters with the bias: needed where two runs share one bias
     """
 
@@ -65,6 +83,8 @@ class Estimate:
     frame: str = "S"
     delays_s: Mapping[str, float] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
+    parts: tuple[PartMass, ...] = ()
+    part_covariance: Array | None = None
     notes: tuple[str, ...] = ()
 
     @cached_property

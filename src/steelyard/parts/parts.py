@@ -86,7 +86,7 @@ class Parts:
     def merged(self, groups: Sequence[Sequence[int]]) -> Parts:
         """Return parts joined: each group is a list of indices; it takes the label of its first part."""
         rows = [list(g) for g in groups]
-        if sorted(sum(rows, [])) != list(range(len(self))):
+        if sorted(i for g in rows for i in g) != list(range(len(self))):
             raise BadValue(f"groups must hold every part 0..{len(self) - 1} once; got {rows}.")
         moments = np.stack([self.moments[g].sum(0) for g in rows])
         rgb = None

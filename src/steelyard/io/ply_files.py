@@ -1,0 +1,198 @@
+"""PLY files: elements of named columns, ascii or binary, read and written; triangle meshes with a part per face."""
+
+from __future__ import annotations
+
+import os
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.errors import BadFile, BadValue
+from steelyard.shape.mesh import TriangleMesh
+
+Column = np.ndarray[Any, np.dtype[Any]]
+
+_TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
+    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
+    "float64": "f8",
+}  # fmt: skip
+_ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
+_INDICES = ("vertex_indices", "vertex_index")
+
+
+@dataclass(frozen=True)
+class _Element:
+    name: str
+    count: int
+    fields: tuple[tuple[str, str, str], ...]  # name, type of the values, type of a list's length or ""
+
+
+def read_ply(path: Path | str) -> dict[str, dict[str, Column]]:
+    """Return element -> column -> values (N,) or, for a list of equal lengths, (N, k); raises BadFile."""
+    path = Path(path)
+    try:
+        content = path.read_bytes()
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
+    order, elements, body = _header(path, content)
+    out, rest = {}, content[body:]
+    words = rest.split() if not order else []
+    for element in elements:
+        if order:
+            table, used = _binary(path, element, rest, order)
+            rest = rest[used:]
+        else:
+            table, used = _ascii(path, element, words)
+            words = words[used:]
+        out[element.name] = {name: table[name] for name, _, _ in element.fields}
+    return out
+
+
+def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
+    """Return byte order ("" for ascii), elements and where the body starts; lines may end in CR LF."""
+    if not content.startswith(b"ply"):
+        raise BadFile(f'{path}: expected a PLY file, which starts with "ply"; found something else.')
+    mark = content.find(b"end_header")
+    end = content.find(b"\n", mark)
+    if mark < 0 or end < 0:
+        raise BadFile(f"{path}: the PLY header has no end_header line. Save the file again.")
+    order, elements = None, list[_Element]()
+    for line in content[:mark].decode("latin-1").splitlines():
+        match line.split():
+            case ["format", kind, _]:
+                order = _ORDERS.get(kind)
+            case ["element", name, count] if count.isdigit():
+                elements.append(_Element(name, int(count), ()))
+            case ["property", kind, name] if kind in _TYPES and elements:
+                elements[-1] = _with(elements[-1], (name, _TYPES[kind], ""))
+            case ["property", "list", length, kind, name] if {length, kind} <= set(_TYPES) and elements:
+                elements[-1] = _with(elements[-1], (name, _TYPES[kind], _TYPES[length]))
+            case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
+                pass
+            case _:
+                raise BadFile(f'{path}: the PLY header has a line that means nothing: "{line.strip()[:60]}".')
+    if order is None:
+        raise BadFile(f"{path}: the PLY header names no format among {', '.join(_ORDERS)}.")
+    return order, elements, end + 1
+
+
+def _with(element: _Element, field: tuple[str, str, str]) -> _Element:
+    return _Element(element.name, element.count, (*element.fields, field))
+
+
+def _binary(path: Path, element: _Element, data: bytes, order: str) -> tuple[Any, int]:
+    """Return the columns of one element and the bytes it took; lists must all be as long as the first."""
+    fields: list[Any] = []
+    place = 0
+    for name, kind, length in element.fields:
+        if length:
+            size = np.dtype(length).itemsize
+            k = int(np.frombuffer(data[place : place + size].ljust(size, b"\0"), order + length)[0])
+            fields += [(f"{name}#", order + length), (name, order + kind, (k,))]
+        else:
+            fields.append((name, order + kind))
+        place = np.dtype(fields).itemsize
+    used = np.dtype(fields).itemsize * element.count
+    if used > len(data):
+        raise BadFile(f'{path}: the file ends inside element "{element.name}" ({element.count} announced).')
+    table = np.frombuffer(data[:used], np.dtype(fields))
+    for name, _, length in element.fields:
+        if length and element.count and (table[f"{name}#"] != table[f"{name}#"][0]).any():
+            raise _ragged(path, name)
+    return table, used
+
+
+def _ascii(path: Path, element: _Element, words: list[bytes]) -> tuple[dict[str, Column], int]:
+    """Return the columns of one element and the words it took."""
+    slots: list[tuple[str, str, int, int]] = []  # name, type, first word, number of words
+    width = 0
+    for name, kind, length in element.fields:
+        try:
+            k = int(words[width]) if length and element.count else 1
+        except (IndexError, ValueError):
+            k = 1
+        slots.append((name, kind, width + bool(length), k if length else 0))
+        width += k + bool(length)
+    used = width * element.count
+    if used > len(words):
+        raise BadFile(f'{path}: the file ends inside element "{element.name}" ({element.count} announced).')
+    try:
+        table = np.array(words[:used], dtype="S").astype(np.float64).reshape(element.count, width)
+    except ValueError:
+        raise BadFile(f'{path}: element "{element.name}" holds a word that is no number.') from None
+    out = {}
+    for (name, kind, first, k), (_, _, length) in zip(slots, element.fields, strict=True):
+        if length and (table[:, first - 1] != k).any():
+            raise _ragged(path, name)
+        out[name] = (table[:, first : first + k] if length else table[:, first]).astype(kind)
+    return out, used
+
+
+def _ragged(path: Path, name: str) -> BadFile:
+    return BadFile(f'{path}: the lists "{name}" differ in length. Save every face as a triangle.')
+
+
+def read_mesh(path: Path | str) -> TriangleMesh:
+    """Return the triangles of a PLY file, in metres as they stand there; faces without `part` are part 0.
+
+    Raises BadFile where the file is no mesh of triangles.
+    """
+    path = Path(path)
+    elements = read_ply(path)
+    vertex, face = elements.get("vertex", {}), elements.get("face", {})
+    indices = next((face[name] for name in _INDICES if name in face), None)
+    if indices is None or not {"x", "y", "z"} <= set(vertex):
+        raise BadFile(f"{path}: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both.")
+    if len(indices) and indices.shape[1] != 3:
+        raise BadFile(f"{path}: faces have {indices.shape[1]} corners. Save every face as a triangle.")
+    colours = [face[name] for name in ("red", "green", "blue") if name in face]
+    try:
+        return TriangleMesh(
+            np.stack([vertex[axis] for axis in "xyz"], axis=1),
+            indices,
+            face.get("part", np.zeros(len(indices))),
+            np.stack(colours, axis=1) if len(colours) == 3 else None,
+        )
+    except BadValue as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> None:
+    """Write a mesh as PLY with double coordinates and part, red, green, blue per face; raises BadFile."""
+    path = Path(path)
+    rgb = mesh.rgb if mesh.rgb is not None else np.full((len(mesh), 3), 128, np.uint8)
+    vertex = np.zeros(len(mesh.vertices), [(axis, "<f8") for axis in "xyz"])
+    for k, axis in enumerate("xyz"):
+        vertex[axis] = mesh.vertices[:, k]
+    face = np.zeros(len(mesh), [("n", "u1"), ("v", "<i4", 3), ("rgb", "u1", 3), ("part", "<i4")])
+    face["n"], face["v"], face["rgb"], face["part"] = 3, mesh.triangles, rgb, mesh.part
+    kind = "ascii" if ascii else "binary_little_endian"
+    header = (
+        f"ply\nformat {kind} 1.0\ncomment units metres\nelement vertex {len(vertex)}\n"
+        "property double x\nproperty double y\nproperty double z\n"
+        f"element face {len(face)}\nproperty list uchar int vertex_indices\n"
+        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int part\nend_header\n"
+    )
+    if ascii:
+        lines = [" ".join(repr(float(x)) for x in row) for row in mesh.vertices]
+        table = np.column_stack([face["n"], face["v"], face["rgb"], face["part"]])
+        lines += [" ".join(map(str, row)) for row in table.tolist()]
+        body = ("\n".join(lines) + "\n").encode()
+    else:
+        body = vertex.tobytes() + face.tobytes()
+    write_bytes(path, header.encode() + body)
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file by way of a temporary one beside it; raises BadFile where that is not possible."""
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.write_bytes(content)
+        temporary.replace(path)
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
+    finally:
+        temporary.unlink(missing_ok=True)

@@ -1,0 +1,133 @@
+"""A known object: its mesh, its coloured cloud, its parts and their true masses, and a motion of it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.findings import Finding
+from steelyard.inertia import InertialParameters
+from steelyard.parts.parts import Labels, Parts
+from steelyard.shape.mesh import TriangleMesh
+from steelyard.spatial import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """N points of the visible surface in the object's frame.
+
+    xyz    (N, 3) [m]
+    rgb    (N, 3) uint8
+    label  (N,) label of the part that each point lies on
+    """
+
+    xyz: Array
+    rgb: np.ndarray[Any, np.dtype[np.uint8]]
+    label: Labels
+
+    def __post_init__(self) -> None:
+        xyz, rgb, label = check.vectors("points", self.xyz), np.asarray(self.rgb, np.uint8), np.asarray(self.label)
+        if xyz.ndim != 2 or not len(xyz) or rgb.shape != xyz.shape or label.shape != xyz.shape[:1]:
+            raise BadValue(
+                f"a cloud needs points (N, 3), colours (N, 3) and labels (N,), N > 0; "
+                f"got {xyz.shape}, {rgb.shape} and {label.shape}."
+            )
+        object.__setattr__(self, "xyz", xyz)
+        object.__setattr__(self, "rgb", rgb)
+        object.__setattr__(self, "label", label.astype(np.int64))
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """An exact motion of the sensor frame S with the object in it, N rows; vectors in S axes at that instant.
+
+    time                  (N,) [s]
+    rotation              (N, 3, 3) turns S into W
+    position              (N, 3) of the S origin in W [m]
+    velocity              (N, 3) of the S origin [m/s]
+    angular_velocity      (N, 3) [rad/s]
+    acceleration          (N, 3) classical, of the S origin, gravity not included [m/s^2]
+    angular_acceleration  (N, 3) [rad/s^2]
+    gravity               (N, 3) [m/s^2]
+    force                 (N, 3) what the sensor applies to the object [N]
+    torque                (N, 3) the same, about the S origin [N m]
+    """
+
+    time: Array
+    rotation: Array
+    position: Array
+    velocity: Array
+    angular_velocity: Array
+    acceleration: Array
+    angular_acceleration: Array
+    gravity: Array
+    force: Array
+    torque: Array
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "time", check.finite("time", self.time))
+        rows = self.time.shape
+        object.__setattr__(self, "rotation", check.rotations("rotation", self.rotation))
+        for name in list(self.__dataclass_fields__)[2:]:
+            values = check.vectors(name.replace("_", " "), getattr(self, name))
+            object.__setattr__(self, name, values)
+        for name in self.__dataclass_fields__:
+            found = getattr(self, name).shape[:1]
+            if found != rows:
+                raise BadValue(f"every column of a motion needs {rows[0]} rows; {name} has {found[0]}.")
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownObject:
+    """An object of a data set with its truth.
+
+    name           slug
+    mesh           closed surfaces in the object's frame O
+    parts          solid parts in O, voids taken away
+    part_masses    (P,) true masses of `parts` [kg]; None where they are not known
+    part_materials (P,) names of materials, "" where not known
+    truth          the whole object in S
+    X_SO           pose of O in S
+    cloud          points of the visible surface in O
+    box            (3,) edges of the object's box along the axes of S, for size-based errors [m]
+    track          its exact motion, None where there is none
+    facts          further entries of the file, as they stand there
+    findings       what a reader must know about the files
+    """
+
+    name: str
+    mesh: TriangleMesh
+    parts: Parts
+    part_masses: Array | None
+    part_materials: tuple[str, ...]
+    truth: InertialParameters
+    X_SO: Pose
+    cloud: Cloud
+    box: Array
+    track: Track | None = None
+    facts: Mapping[str, Any] = field(default_factory=dict)
+    findings: tuple[Finding, ...] = ()
+
+    @property
+    def parts_in_sensor(self) -> Parts:
+        """The parts seen from S."""
+        return self.parts.in_frame(self.X_SO)
+
+    @property
+    def half(self) -> str:
+        """Whether uniform density would put the centre of mass within 0.5 mm of the truth: "uniform" or "mixed"."""
+        uniform = self.parts_in_sensor.moments.sum(0)
+        offset = np.linalg.norm(uniform[1:4] / uniform[0] - self.truth.com)
+        return "uniform" if offset < 0.5e-3 else "mixed"

@@ -1,0 +1,167 @@
+"""Triangle meshes of several closed parts, and the exact moments of what each part encloses."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.findings import Finding
+from steelyard.inertia import InertialParameters
+from steelyard.spatial import Pose, Rotation
+
+Integers = np.ndarray[Any, np.dtype[np.int64]]
+Colours = np.ndarray[Any, np.dtype[np.uint8]]
+
+
+@dataclass(frozen=True, eq=False)
+class TriangleMesh:
+    """F triangles over V vertices; each triangle belongs to one part and turns its front side outward.
+
+    vertices   (V, 3) [m]
+    triangles  (F, 3) numbers of the corners, counter-clockwise seen from outside
+    part       (F,) label of the part that each triangle bounds
+    rgb        (F, 3) uint8 colour of each triangle, None where it is not known
+    """
+
+    vertices: Array
+    triangles: Integers
+    part: Integers
+    rgb: Colours | None = None
+
+    def __post_init__(self) -> None:
+        vertices = check.vectors("mesh vertices", self.vertices)
+        triangles, part = _frozen(self.triangles, np.int64), _frozen(self.part, np.int64)
+        if vertices.ndim != 2 or triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
+            raise BadValue(
+                f"a mesh needs vertices (V, 3) and triangles (F, 3), F > 0; got {vertices.shape} and {triangles.shape}."
+            )
+        if part.shape != triangles.shape[:1]:
+            raise BadValue(f"each of the {len(triangles)} triangles needs one part label; got {part.shape}.")
+        if triangles.min() < 0 or triangles.max() >= len(vertices):
+            raise BadValue(
+                f"triangles must name vertices 0..{len(vertices) - 1}; got {triangles.min()}..{triangles.max()}."
+            )
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "triangles", triangles)
+        object.__setattr__(self, "part", part)
+        if self.rgb is not None:
+            rgb = _frozen(self.rgb, np.uint8)
+            if rgb.shape != triangles.shape:
+                raise BadValue(f"each of the {len(triangles)} triangles needs one colour; got {rgb.shape}.")
+            object.__setattr__(self, "rgb", rgb)
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+    @property
+    def labels(self) -> Integers:
+        """Labels of the parts (P,), rising."""
+        return np.unique(self.part)
+
+    @property
+    def corners(self) -> Array:
+        """Corners (F, 3, 3) of the triangles [m]."""
+        return np.asarray(self.vertices[self.triangles])
+
+    @property
+    def bounds(self) -> Array:
+        """Lower and upper corner (2, 3) of the box around all triangles [m]."""
+        used = self.vertices[self.triangles.ravel()]
+        return np.stack([used.min(0), used.max(0)])
+
+    def areas(self) -> Array:
+        """Return the area (F,) of every triangle [m^2]."""
+        a, b, c = np.moveaxis(self.corners, 1, 0)
+        return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+
+    def of_part(self, label: int) -> TriangleMesh:
+        """Return the triangles of one part with only the vertices they use."""
+        chosen = self.part == label
+        used, corners = np.unique(self.triangles[chosen], return_inverse=True)
+        rgb = None if self.rgb is None else self.rgb[chosen]
+        return TriangleMesh(self.vertices[used], corners.reshape(-1, 3), self.part[chosen], rgb)
+
+    def in_frame(self, X_AB: Pose) -> TriangleMesh:
+        """Return the same mesh, given in B, seen from frame A."""
+        return TriangleMesh(X_AB.apply(self.vertices), self.triangles, self.part, self.rgb)
+
+
+def _frozen(values: Any, dtype: type) -> Any:
+    array = np.array(values, dtype=dtype)
+    array.flags.writeable = False
+    return array
+
+
+def part_moments(mesh: TriangleMesh) -> Array:
+    """Return the ten parameters (P, 10) of each part at 1 kg/m^3 in the mesh's frame, labels rising.
+
+    The surface integral of each closed part, as signed tetrahedra over a point inside its box: exact for flat
+    triangles, negative for a surface turned inside out (a void). Nothing is checked; see `require_closed`.
+    Source: divergence theorem; a tetrahedron's second moment is V/20 (sum v v^T + s s^T), s the sum of its corners.
+    """
+    labels, row = np.unique(mesh.part, return_inverse=True)
+    middle = _middles(mesh, row, len(labels))
+    corners = mesh.corners - middle[row][:, None]
+    volume = np.linalg.det(corners) / 6
+    total = corners.sum(1)
+    second = np.einsum("f,fki,fkj->fij", volume / 20, corners, corners)
+    second += np.einsum("f,fi,fj->fij", volume / 20, total, total)
+    pseudo = np.zeros((len(labels), 4, 4))
+    for i in range(3):
+        pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(row, volume / 4 * total[:, i], len(labels))
+        for j in range(3):
+            pseudo[:, i, j] = np.bincount(row, second[:, i, j], len(labels))
+    pseudo[:, 3, 3] = np.bincount(row, volume, len(labels))
+    about_middle = InertialParameters.from_pseudo_inertia(0.5 * (pseudo + np.swapaxes(pseudo, 1, 2)))
+    return about_middle.in_frame(Pose(Rotation.identity(len(labels)), middle)).vector
+
+
+def _middles(mesh: TriangleMesh, row: Integers, count: int) -> Array:
+    """Return the middle (P, 3) of each part's box [m]."""
+    lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
+    for corner in np.moveaxis(mesh.corners, 1, 0):
+        np.minimum.at(lower, row, corner)
+        np.maximum.at(upper, row, corner)
+    return np.asarray(0.5 * (lower + upper))
+
+
+def open_edges(mesh: TriangleMesh) -> Integers:
+    """Return how many edges (P,) of each part, labels rising, lack a neighbour that runs the other way.
+
+    An edge is closed when as many triangles of its part run along it one way as the other.
+    """
+    labels, row = np.unique(mesh.part, return_inverse=True)
+    start, end = mesh.triangles, np.roll(mesh.triangles, -1, axis=1)
+    forward = np.where(start < end, 1.0, -1.0).ravel()
+    low, high = np.minimum(start, end).ravel(), np.maximum(start, end).ravel()
+    size = len(mesh.vertices)
+    key = (np.repeat(row, 3) * size + low) * size + high
+    edges, place = np.unique(key, return_inverse=True)
+    unmatched = np.abs(np.bincount(place, forward)).astype(np.int64)
+    return np.bincount(edges // (size * size), unmatched, len(labels)).astype(np.int64)
+
+
+def require_closed(mesh: TriangleMesh) -> TriangleMesh:
+    """Return the mesh, or raise BadValue that names the first open part and how many edges are open."""
+    counts = open_edges(mesh)
+    if counts.any():
+        worst = int(np.flatnonzero(counts)[0])
+        raise BadValue(
+            f"part {mesh.labels[worst]} is not closed: {counts[worst]} edges lack a neighbour that runs the other way. "
+            "Close the surface, weld equal vertices, and turn all triangles outward."
+        )
+    return mesh
+
+
+def surface_finding(mesh: TriangleMesh) -> Finding | None:
+    """Return the finding `surface-open` where edges are open, else None."""
+    counts = open_edges(mesh)
+    if not counts.any():
+        return None
+    named = ", ".join(str(label) for label in mesh.labels[counts > 0])
+    return Finding.of("surface-open", f"The surface has {counts.sum()} open edges, in part {named}.")
