@@ -1,0 +1,47 @@
+"""How well a motion excites the ten parameters: the condition number properly, and as the paper reports it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import basis
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import MOTION, features
+
+# Entries of the regressor that change by less than this share of its largest do not change at all.
+CONSTANT = 1e-12
+
+
+def regressor(log: MotionLog) -> Array:
+    """Return A (N, 6, 10), so that the wrench of row n without bias is A[n] phi."""
+    return np.asarray(np.einsum("kij,nj->nik", basis(), features(log)[:, MOTION]))
+
+
+def condition(log: MotionLog) -> float:
+    """Return the condition number of the stacked regressor (6 N, 10) with columns scaled to length 1.
+
+    Infinite where the motion does not excite all ten parameters.
+    Source: Gautier and Khalil 1992, with the column scaling that makes it independent of units.
+    """
+    stacked = regressor(log).reshape(-1, 10)
+    length = np.linalg.norm(stacked, axis=0)
+    if (length == 0).any():
+        return float("inf")
+    values = np.linalg.svd(stacked / length, compute_uv=False)
+    return float(values[0] / values[-1]) if values[-1] > 0 else float("inf")
+
+
+def condition_as_published(log: MotionLog) -> float:
+    """Return the number that "The Sum of Its Parts" prints, section V-A: not the condition of the stacked regressor.
+
+    Every entry of the 6 x 10 blocks is scaled to 0..1 over time, each block is decomposed by itself, and the largest
+    singular value of any block is divided by the smallest of any block. Entries that never change are left at zero.
+    """
+    blocks = regressor(log)
+    low, high = blocks.min(0), blocks.max(0)
+    moves = high - low > CONSTANT * np.abs(blocks).max()
+    scaled = np.where(moves, (blocks - low) / np.where(moves, high - low, 1.0), 0.0)
+    values = np.linalg.svd(scaled, compute_uv=False)
+    smallest = float(values.min())
+    return float(values.max()) / smallest if smallest > 0 else float("inf")
