@@ -16,7 +16,7 @@ import pytest
 ROOT = Path(__file__).parents[1] / "src" / "steelyard"
 LONGEST = 350
 
-CORE = {"numpy", "scipy", "numba", "click"}
+CORE = {"numpy", "scipy", "numba", "click", "manifold3d"}
 SHARED = {"errors", "check", "findings"}
 UPPER = {
     "team", "identify", "parts", "shape", "robots", "excite", "workshop", "logs", "inertia", "spatial",
@@ -37,15 +37,15 @@ MAY_IMPORT: dict[str, set[str]] = {
     "team": {"identify.estimate", "identify.evidence", "identify.regressor", "logs", "inertia", "spatial"},
     "sanity": {"identify", "logs", "inertia", "spatial"},
     "excite": {"robots", "identify", "logs"},
-    "workshop": {"shape", "parts", "inertia"},
+    "workshop": {"shape", "parts", "inertia", "spatial"},
     "simulate": UPPER,
     "evaluate": UPPER,
     "live": UPPER,
     "report": UPPER | {"evaluate"},
     "pipelines": UPPER | {"simulate", "evaluate", "sanity"},
     "io": {
-        "spatial", "inertia", "logs.log", "logs.recording", "shape.mesh", "shape.tets", "parts.parts",
-        "identify.estimate",
+        "spatial", "inertia", "logs.log", "logs.recording", "shape.mesh", "shape.tets", "shape.nesting",
+        "parts.parts", "parts.from_mesh", "parts.known", "identify.estimate",
     },
 }  # fmt: skip
 MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live"}

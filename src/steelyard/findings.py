@@ -33,6 +33,9 @@ REMEDIES: dict[str, str] = {
     "part-zero-mass": "Check the part's label and shape; merge it with a neighbour of the same material.",
     "centroids-coplanar": "Move between the poses as well, or merge parts of the same material.",
     "more-parts-than-rank": "Merge parts of the same material, or turn the object faster between the poses.",
+    "surface-open": "Close the surface: weld equal vertices, fill holes, or scan the missing side.",
+    "parts-overlap": "Cut one part out of the other, so that they only touch and no volume counts twice.",
+    "part-unseen": "Nothing to do if the part is hidden inside; give its shape, since no scan can see it.",
     "tool-included": "Give --tool (a result or a tool-only log) if you want the object alone.",
 }
 

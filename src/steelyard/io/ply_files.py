@@ -15,9 +15,9 @@ from steelyard.shape.mesh import TriangleMesh
 Column = np.ndarray[Any, np.dtype[Any]]
 
 _TYPES = {
-    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4", "double": "f8",
-    "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4", "float32": "f4",
-    "float64": "f8",
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "float32": "f4", "float64": "f8",
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_indices", "vertex_index")
@@ -145,7 +145,9 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     vertex, face = elements.get("vertex", {}), elements.get("face", {})
     indices = next((face[name] for name in _INDICES if name in face), None)
     if indices is None or not {"x", "y", "z"} <= set(vertex):
-        raise BadFile(f"{path}: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both.")
+        raise BadFile(
+            f"{path}: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both."
+        )
     if len(indices) and indices.shape[1] != 3:
         raise BadFile(f"{path}: faces have {indices.shape[1]} corners. Save every face as a triangle.")
     colours = [face[name] for name in ("red", "green", "blue") if name in face]

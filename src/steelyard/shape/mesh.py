@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, cross
 
 Integers = np.ndarray[Any, np.dtype[np.int64]]
 Colours = np.ndarray[Any, np.dtype[np.uint8]]
@@ -92,7 +92,7 @@ class TriangleMesh:
 
 
 def _frozen(values: Any, dtype: type) -> Any:
-    array = np.array(values, dtype=dtype)
+    array: Any = np.array(values, dtype=dtype)
     array.flags.writeable = False
     return array
 
@@ -100,34 +100,31 @@ def _frozen(values: Any, dtype: type) -> Any:
 def part_moments(mesh: TriangleMesh) -> Array:
     """Return the ten parameters (P, 10) of each part at 1 kg/m^3 in the mesh's frame, labels rising.
 
-    The surface integral of each closed part, as signed tetrahedra over a point inside its box: exact for flat
+    The surface integral of each closed part, as signed tetrahedra over the mean of its corners: exact for flat
     triangles, negative for a surface turned inside out (a void). Nothing is checked; see `require_closed`.
     Source: divergence theorem; a tetrahedron's second moment is V/20 (sum v v^T + s s^T), s the sum of its corners.
     """
     labels, row = np.unique(mesh.part, return_inverse=True)
-    middle = _middles(mesh, row, len(labels))
-    corners = mesh.corners - middle[row][:, None]
-    volume = np.linalg.det(corners) / 6
-    total = corners.sum(1)
-    second = np.einsum("f,fki,fkj->fij", volume / 20, corners, corners)
-    second += np.einsum("f,fi,fj->fij", volume / 20, total, total)
-    pseudo = np.zeros((len(labels), 4, 4))
+    count = len(labels)
+    middle = _middles(mesh, row, count)
+    a, b, c = np.moveaxis(mesh.corners - middle[row][:, None], 1, 0)
+    volume = (a * cross(b, c)).sum(1) / 6
+    total = a + b + c
+    pseudo = np.empty((count, 4, 4))
     for i in range(3):
-        pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(row, volume / 4 * total[:, i], len(labels))
-        for j in range(3):
-            pseudo[:, i, j] = np.bincount(row, second[:, i, j], len(labels))
-    pseudo[:, 3, 3] = np.bincount(row, volume, len(labels))
-    about_middle = InertialParameters.from_pseudo_inertia(0.5 * (pseudo + np.swapaxes(pseudo, 1, 2)))
+        pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(row, volume / 4 * total[:, i], count)
+        for j in range(i, 3):
+            second = sum(v[:, i] * v[:, j] for v in (a, b, c, total))
+            pseudo[:, i, j] = pseudo[:, j, i] = np.bincount(row, volume / 20 * second, count)
+    pseudo[:, 3, 3] = np.bincount(row, volume, count)
+    about_middle = InertialParameters.from_pseudo_inertia(pseudo)
     return about_middle.in_frame(Pose(Rotation.identity(len(labels)), middle)).vector
 
 
 def _middles(mesh: TriangleMesh, row: Integers, count: int) -> Array:
-    """Return the middle (P, 3) of each part's box [m]."""
-    lower, upper = np.full((count, 3), np.inf), np.full((count, 3), -np.inf)
-    for corner in np.moveaxis(mesh.corners, 1, 0):
-        np.minimum.at(lower, row, corner)
-        np.maximum.at(upper, row, corner)
-    return np.asarray(0.5 * (lower + upper))
+    """Return the mean corner (P, 3) of each part: a point near it, so that no digits are lost far from the origin."""
+    sums = [np.bincount(np.repeat(row, 3), mesh.corners[..., k].ravel(), count) for k in range(3)]
+    return np.asarray(np.stack(sums, axis=1) / (3 * np.bincount(row, minlength=count))[:, None])
 
 
 def open_edges(mesh: TriangleMesh) -> Integers:

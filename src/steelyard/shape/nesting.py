@@ -9,9 +9,11 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.findings import Finding
 from steelyard.shape.mesh import Integers, TriangleMesh, part_moments, require_closed
 
-SHARED = 0.02  # of the smaller solid: touching parts of rounded, faceted surfaces share up to this much
+TOUCHING = 0.02  # of the smaller solid: rounded, faceted surfaces that touch share up to this much
+TOO_MUCH = 0.05  # of the whole: mass counted twice beyond this is no longer a detail
 _INSIDE = 0.5  # winding number between outside (0) and inside (1)
 
 
@@ -45,7 +47,7 @@ def solids_of(mesh: TriangleMesh) -> Solids:
             "Leave it out, or give it thickness."
         )
     voids = np.flatnonzero(moments[:, 0] < 0)
-    parents = np.array([_parent(mesh, label, moments[:, 0], k) for k in voids], np.int64)
+    parents = np.array([_parent(mesh, label, moments[:, 0], int(k)) for k in voids], np.int64)
     np.add.at(moments, parents, moments[voids])
     solid = moments[:, 0] > 0
     solid[voids] = False
@@ -76,28 +78,59 @@ def winding_number(corners: Array, point: Array) -> float:
     return float(np.arctan2(triple, rest).sum() / (2 * np.pi))
 
 
-def require_separate(mesh: TriangleMesh, shared: float = SHARED) -> TriangleMesh:
-    """Return the mesh, or raise BadValue that names two solids that share volume.
+@dataclass(frozen=True)
+class Overlap:
+    """Two solids `a` and `b` (labels) that share `volume` [m^3], as a part of the smaller and of the whole object."""
 
-    shared  the part of the smaller solid's volume up to which two are taken to touch only
+    a: int
+    b: int
+    volume: float
+    of_smaller: float
+    of_whole: float
 
-    Pairs whose surfaces cannot be joined (an edge with four triangles) are not judged.
+    def __str__(self) -> str:
+        return (
+            f"parts {self.a} and {self.b} share {self.volume * 1e6:.2g} cm^3 of space "
+            f"({100 * self.of_smaller:.1f} % of the smaller, {100 * self.of_whole:.1f} % of the whole)"
+        )
+
+
+def overlaps(mesh: TriangleMesh) -> tuple[Overlap, ...]:
+    """Return the pairs of solids that share more volume than rounded, faceted surfaces that touch.
+
+    Pairs whose surfaces cannot be joined (an edge with four triangles) are not judged. Raises as `solids_of`.
     """
     solids = solids_of(mesh)
-    bodies = {int(k): _body(mesh, [int(k), *solids.void[solids.parent == k].tolist()]) for k in solids.label}
-    boxes = {k: mesh.of_part(k).bounds for k in bodies}
-    volume = dict(zip(bodies, solids.moments[:, 0].tolist(), strict=True))
-    for a in bodies:
-        for b in bodies:
-            if a < b and (boxes[a][0] < boxes[b][1]).all() and (boxes[b][0] < boxes[a][1]).all():
-                common = (bodies[a] ^ bodies[b]).volume()
-                if common > shared * min(volume[a], volume[b]):
-                    raise BadValue(
-                        f"parts {a} and {b} share {common * 1e6:.3g} cm^3 of space "
-                        f"({100 * common / min(volume[a], volume[b]):.0f} % of the smaller). "
-                        "Cut one out of the other, so that they only touch."
-                    )
-    return mesh
+    whole = float(solids.moments[:, 0].sum())
+    bodies = [_body(mesh, [k, *solids.void[solids.parent == k].tolist()]) for k in solids.label.tolist()]
+    found = []
+    for i, j in zip(*np.triu_indices(len(bodies), 1), strict=True):
+        if _apart(bodies[i], bodies[j]):
+            continue
+        volume, smaller = (bodies[i] ^ bodies[j]).volume(), float(solids.moments[[i, j], 0].min())
+        if volume > TOUCHING * smaller:
+            found.append(Overlap(int(solids.label[i]), int(solids.label[j]), volume, volume / smaller, volume / whole))
+    return tuple(found)
+
+
+def overlap_finding(mesh: TriangleMesh) -> Finding | None:
+    """Return the finding `parts-overlap` where solids share a little volume, else None.
+
+    Raises BadValue that names the two solids where they share over 5 % of the object's volume.
+    """
+    found = overlaps(mesh)
+    for overlap in found:
+        if overlap.of_whole > TOO_MUCH:
+            raise BadValue(f"{overlap}. Cut one out of the other, so that they only touch.")
+    return Finding.of("parts-overlap", f"{'; '.join(map(str, found))}.".capitalize()) if found else None
+
+
+def _apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> bool:
+    """Whether the boxes of two bodies are apart; a body that could not be joined has none."""
+    if a.is_empty() or b.is_empty():
+        return True
+    box_a, box_b = np.reshape(a.bounding_box(), (2, 3)), np.reshape(b.bounding_box(), (2, 3))
+    return bool((box_a[0] > box_b[1]).any() or (box_b[0] > box_a[1]).any())
 
 
 def _body(mesh: TriangleMesh, labels: list[int]) -> manifold3d.Manifold:

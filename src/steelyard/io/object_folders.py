@@ -1,0 +1,192 @@
+"""Object folders: mesh.ply, points.npz, motion.npz and truth.json, as the published data set has them."""
+
+from __future__ import annotations
+
+import json
+import zipfile
+import zlib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadValue
+from steelyard.findings import Finding
+from steelyard.inertia import InertialParameters
+from steelyard.io.array_table import ArrayTable
+from steelyard.io.ply_files import read_mesh
+from steelyard.parts.from_mesh import parts_of_mesh
+from steelyard.parts.known import Cloud, KnownObject, Track
+from steelyard.parts.parts import Parts
+from steelyard.shape.mesh import TriangleMesh
+from steelyard.shape.nesting import overlap_finding
+from steelyard.spatial import Pose
+
+FILES = ("mesh.ply", "points.npz", "motion.npz", "truth.json")
+MOTION = {
+    "time": "time",
+    "rotation": "rotation_world_from_sensor",
+    "position": "position_world",
+    "velocity": "linear_velocity_sensor",
+    "angular_velocity": "angular_velocity_sensor",
+    "acceleration": "linear_acceleration_sensor",
+    "angular_acceleration": "angular_acceleration_sensor",
+    "gravity": "gravity_sensor",
+    "force": "force_sensor",
+    "torque": "torque_sensor",
+}
+# The published folders keep the physical wrench (gravity down) beside one in a world whose gravity points up.
+_DOWN = {"gravity": "gravity_sensor_down", "force": "force_sensor_gdown", "torque": "torque_sensor_gdown"}
+_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
+
+
+def object_folders(folder: Path | str) -> list[Path]:
+    """Return the object folders in `folder` by name, or the folder itself if it is one; raises BadFile if none."""
+    folder = Path(folder)
+    if (folder / "truth.json").is_file():
+        return [folder]
+    found = sorted(path.parent for path in folder.glob("*/truth.json"))
+    if not found:
+        raise BadFile(f"{folder}: no object folder is here. Each has the files {', '.join(FILES)}.")
+    return found
+
+
+def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
+    """Read an object folder, ours or a published one; nothing in it is ever unpickled.
+
+    motion  whether motion.npz is read too
+
+    Of a published folder the physical wrench is taken (gravity down). Raises BadFile where a file is missing or
+    wrong, a part is open, flat or inside out, or two parts share much volume.
+    """
+    folder = Path(folder)
+    for name in FILES[: 4 if motion else 2] + FILES[3:]:
+        if not (folder / name).is_file():
+            raise BadFile(f"{folder}: {name} is missing. An object folder has the files {', '.join(FILES)}.")
+    mesh = read_mesh(folder / "mesh.ply")
+    facts = read_truth(folder / "truth.json")
+    parts: Parts = _value(folder / "mesh.ply", lambda: parts_of_mesh(mesh))
+    overlapping: Finding | None = _value(folder / "mesh.ply", lambda: overlap_finding(mesh))
+    cloud = _cloud(folder / "points.npz", mesh)
+    X_OS = _value(folder / "truth.json", lambda: Pose.from_matrix(facts["T_mesh_from_grasp"]))
+    unseen = _unseen(parts, cloud)
+    return KnownObject(
+        name=str(facts.get("slug", folder.resolve().name)),
+        mesh=mesh,
+        parts=parts,
+        part_masses=_masses(folder / "truth.json", facts, parts),
+        part_materials=tuple(str(row.get("material_fitted") or "") for row in _rows(facts, parts)),
+        truth=_value(folder / "truth.json", lambda: _whole(facts)).in_frame(X_OS.inverse()),
+        X_SO=X_OS.inverse(),
+        cloud=cloud,
+        box=np.asarray(facts["reference_extents_sensor_m"], float),
+        track=_track(folder / "motion.npz") if motion else None,
+        facts=facts,
+        findings=tuple(finding for finding in (overlapping, unseen) if finding),
+    )
+
+
+def read_truth(path: Path) -> dict[str, Any]:
+    """Return truth.json with the entries every object needs; raises BadFile."""
+    try:
+        facts = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BadFile(f"{path}: expected a JSON file; {error}.") from None
+    needed = {
+        "mass_kg": (), "com_mesh_m": (3,), "inertia_com_mesh_kgm2": (3, 3), "T_mesh_from_grasp": (4, 4),
+        "reference_extents_sensor_m": (3,),
+    }  # fmt: skip
+    if not isinstance(facts, dict):
+        raise BadFile(f"{path}: expected one JSON object with {', '.join(needed)}.")
+    for key, shape in needed.items():
+        if key not in facts:
+            raise BadFile(f'{path}: "{key}" is missing. It needs {", ".join(needed)}.')
+        try:
+            found = np.asarray(facts[key], float)
+        except (TypeError, ValueError):
+            raise BadFile(f'{path}: "{key}" must be numbers.') from None
+        if found.shape != shape or not np.isfinite(found).all():
+            raise BadFile(f'{path}: "{key}" must be finite numbers of shape {shape}; got {found.shape}.')
+    for row in facts.get("parts", []):
+        volume = row.get("solid_volume_m3")
+        if volume is not None and volume <= 0:
+            raise BadFile(f"{path}: part {row.get('label')} has a volume of {volume:g} m^3; it must be above zero.")
+    return facts
+
+
+def _value(path: Path, make: Any) -> Any:
+    """Return make(), with the path in front of what is wrong with the numbers."""
+    try:
+        return make()
+    except BadValue as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def _whole(facts: dict[str, Any]) -> InertialParameters:
+    """Return the object in its mesh frame; raises BadValue where no rigid body is like that."""
+    whole = InertialParameters.from_com(facts["mass_kg"], facts["com_mesh_m"], facts["inertia_com_mesh_kgm2"])
+    return whole.require_consistent()
+
+
+def _rows(facts: dict[str, Any], parts: Parts) -> list[dict[str, Any]]:
+    """Return what truth.json says of each part, an empty entry where it says nothing."""
+    said = {row.get("label"): row for row in facts.get("parts", [])}
+    return [said.get(label, {}) for label in parts.label.tolist()]
+
+
+def _masses(path: Path, facts: dict[str, Any], parts: Parts) -> Array | None:
+    """Return the true mass (P,) of each part where all are known."""
+    masses = [row.get("mass_kg", row.get("mass_fitted_kg")) for row in _rows(facts, parts)]
+    if any(mass is None for mass in masses):
+        return None
+    values = np.asarray(masses, float)
+    if not np.isfinite(values).all() or (values < 0).any():
+        raise BadFile(f"{path}: the masses of parts must be finite and not below zero.")
+    return values
+
+
+def _cloud(path: Path, mesh: TriangleMesh) -> Cloud:
+    """Return the points; every label must be one of the mesh."""
+    arrays = _arrays(path, ("xyz", "rgb", "label"))
+    cloud: Cloud = _value(path, lambda: Cloud(arrays["xyz"], arrays["rgb"], arrays["label"]))
+    strange = np.setdiff1d(cloud.label, mesh.labels)
+    if len(strange):
+        raise BadFile(f"{path}: points carry the label {strange[0]}, and mesh.ply has no such part.")
+    return cloud
+
+
+def _unseen(parts: Parts, cloud: Cloud) -> Finding | None:
+    """Return the finding about parts on which no point lies."""
+    missing = np.setdiff1d(parts.label, cloud.label)
+    if not len(missing):
+        return None
+    named = ", ".join(map(str, missing))
+    return Finding.of(
+        "part-unseen", f"No point of the cloud lies on part {named}: it is hidden or too small to be seen."
+    )
+
+
+def _track(path: Path) -> Track:
+    """Return the exact motion with the physical wrench."""
+    down = set(_DOWN.values()) <= set(ArrayTable.open(path).header.groups)
+    names = MOTION | _DOWN if down else MOTION
+    arrays = _arrays(path, tuple(names.values()))
+    return _value(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))  # type: ignore[no-any-return]
+
+
+def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return named arrays of an NPZ file; raises BadFile where one is missing or no array of numbers."""
+    ArrayTable.open(path)  # refuses pickles by their header
+    with np.load(path, allow_pickle=False) as archive:
+        missing = [name for name in names if name not in archive]
+        if missing:
+            raise BadFile(f'{path}: array "{missing[0]}" is missing. It needs {", ".join(names)}.')
+        try:
+            found = {name: archive[name] for name in names}
+        except _DAMAGED as error:
+            raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+    for name, values in found.items():
+        if values.dtype.kind not in "fiub":
+            raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {values.dtype}.')
+    return found
