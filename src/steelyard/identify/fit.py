@@ -9,13 +9,15 @@ from typing import Literal
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.conclude import conclude
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift
 from steelyard.identify.rest import at_rest
+from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 
@@ -81,14 +83,25 @@ def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest
     the data do not fix mass and centre of mass.
     """
     require_rows(len(log))
-    steady = with_noise(without_drift(log) if bias.drift else log, bias.free)
+    steady = without_drift(log) if bias.drift else log
+    lost = log.wrench - steady.wrench
+    steady = with_noise(steady, bias.free)
     if verify_rest and log.still.any():
         first = solver(_problem(steady, replace(bias, drift=False), by_block=False))
         steady = at_rest(steady, first.linear[:10], first.bias)
-    log = replace(steady, wrench=log.wrench)
+    log = _drifting(steady, log, lost) if bias.drift else steady
     problem = _problem(log, bias, by_block=True)
     solution = solver(problem)
     return conclude(problem, solution, method, score_variance(log, problem, solution))
+
+
+def _drifting(steady: MotionLog, log: MotionLog, lost: Array) -> MotionLog:
+    """Return the rows of `steady`, which may be fewer than those of `log`, with the drift `lost` (N, 6) given back."""
+    if steady.time is None or log.time is None:
+        return replace(steady, wrench=steady.wrench + lost)
+    order = np.argsort(log.time, kind="stable")
+    back = [np.interp(steady.time, log.time[order], column) for column in lost[order].T]
+    return replace(steady, wrench=steady.wrench + np.stack(back, 1))
 
 
 def _problem(log: MotionLog, bias: Bias, by_block: bool) -> Problem:
