@@ -1,0 +1,50 @@
+"""The papers' scores, done right, and as they were published for comparison."""
+
+from steelyard.evaluate.bodies import (
+    Scores,
+    box_edges,
+    com_mm,
+    com_pct,
+    consistent,
+    inertia_pct,
+    inertia_scale,
+    mass_pct,
+    riemannian,
+    score,
+)
+from steelyard.evaluate.published import published_edges, score_as_published
+from steelyard.evaluate.segments import (
+    SegmentScores,
+    SurfaceGap,
+    adjusted_rand,
+    contingency,
+    global_consistency,
+    impurity,
+    score_segments,
+    surface_gap,
+    undersegmentation,
+)
+
+__all__ = [
+    "Scores",
+    "SegmentScores",
+    "SurfaceGap",
+    "adjusted_rand",
+    "box_edges",
+    "com_mm",
+    "com_pct",
+    "consistent",
+    "contingency",
+    "global_consistency",
+    "impurity",
+    "inertia_pct",
+    "inertia_scale",
+    "mass_pct",
+    "published_edges",
+    "riemannian",
+    "score",
+    "score_as_published",
+    "score_segments",
+    "surface_gap",
+    "undersegmentation",
+]

@@ -1,0 +1,41 @@
+"""The size-based errors as the published code computes them: for the table only, never to judge by.
+
+The code of "The Sum of Its Parts" keeps the centre-of-mass error in an array of integers, so that each axis loses what
+is behind the point, and divides by the box of its own estimated shape, which is thicker than the object.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.evaluate import bodies
+from steelyard.evaluate.bodies import Scores
+from steelyard.inertia import InertialParameters
+from steelyard.spatial import Rotation
+
+
+def published_edges(points: ArrayLike, rotation: Rotation) -> Array:
+    """Return |R (max - min)| (3,) [m] of estimated points (N, 3) in O, with R turning O into S.
+
+    These are the edges of a box along the axes of S only where R swaps axes.
+    """
+    cloud = check.vectors("points", points)
+    return np.asarray(np.abs(rotation.apply(np.ptp(cloud, axis=0))))
+
+
+def score_as_published(found: InertialParameters, true: InertialParameters, edges: ArrayLike) -> Scores:
+    """Score one body with the `edges` (3,) [m] of `published_edges` and centre-of-mass percents floored per axis."""
+    box = check.vectors("edges", edges)
+    floored = np.floor(100 * np.abs(found.com - true.com) / box)
+    right = bodies.score(found, true, np.stack([np.zeros(3), box]))
+    return Scores(
+        mass_pct=right.mass_pct,
+        com_mm=right.com_mm,
+        com_pct=float(floored.mean()),
+        inertia_pct=right.inertia_pct,
+        riemannian=right.riemannian,
+        consistent=right.consistent,
+    )
