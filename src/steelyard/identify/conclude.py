@@ -14,8 +14,9 @@ from steelyard.findings import Finding
 from steelyard.identify import noise_cost
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
-from steelyard.identify.linear import inverse_scaled, nonnegative
+from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
 from steelyard.identify.problem import ADD_POSES, Problem
+from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of
@@ -31,29 +32,6 @@ RANK_INFORMATION = 4.0
 # Below this information (a third of the natural size to the power -2), or below this share of the best seen direction,
 # a direction is open.
 OPEN, UNSEEN = 0.1, 1e-12
-
-
-@dataclass(frozen=True, eq=False)
-class Solution:
-    """Linear parameters (p,), d phi / d coordinates (10, 10), prior Hessian in them (10, 10).
-
-    aware   whether noise in the regressor was allowed for; the plain normal matrix is that of the others
-    """
-
-    linear: Array
-    jacobian: Array
-    prior: Array
-    aware: bool = True
-
-    @classmethod
-    def unconstrained(cls, linear: Array) -> Solution:
-        """Return a solution whose coordinates are the parameters themselves, without a prior."""
-        return cls(linear, np.eye(10), np.zeros((10, 10)), aware=False)
-
-    @property
-    def bias(self) -> Array:
-        """The wrench bias (6,) [tau, f]; zero where it was not estimated."""
-        return self.linear[10:16] if len(self.linear) > 10 else np.zeros(6)
 
 
 @numba.njit(cache=True)
@@ -85,14 +63,17 @@ def conclude(
     H = nonnegative(H, plain)
     chi2 = noise_cost.value(*data[:1], *data[2:]) / max(6 * problem.samples - len(solution.linear), 1.0)
     chi2 = max(float(chi2), 0.0)
-    V = score if score is not None else max(chi2, 1.0) * (H + extra)
-    bread = H if solution.aware else plain
-    if problem.with_bias:
-        for matrix in (H, plain, V):
-            matrix[10:16, 10:16] += problem.bias_prior.precision
-    covariance = _sandwich(bread, V, solution.jacobian, solution.prior)
+    white = max(chi2, 1.0) * (H + extra)
+    bread, meat = H, white
+    if solution.weights is not None:
+        bread, _ = normal_equations(problem.T, problem.scatter, solution.weights)
+        meat = max(chi2, 1.0) * problem.fixed_weight_score(K, solution.weights)
+    meat = meat if score is None else score
+    bread, meat = problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
+    covariance = _sandwich(bread, meat, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
-    sight = _sight(H, V, solution.linear[:10])
+    seen = meat if solution.weights is None else problem.plus_bias_prior(white)
+    sight = _sight(problem.plus_bias_prior(H), seen, solution.linear[:10])
     if require:
         _require_answer(sight, problem)
     estimate = Estimate(
@@ -108,7 +89,7 @@ def conclude(
         covariance[10:16, 10:16] if problem.with_bias else np.zeros((6, 6)),
         covariance[:10, 10:16] if problem.with_bias else np.zeros((10, 6)),
     )  # fmt: skip
-    left_out = leave_one_out(problem, solution.linear, bread, solution.jacobian, solution.prior)
+    left_out = leave_one_out(problem, solution, bread)
     estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))
     return _widened(estimate)
 

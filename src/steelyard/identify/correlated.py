@@ -13,9 +13,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
-from steelyard.identify.conclude import Solution
 from steelyard.identify.linear import nonnegative
 from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.logs.log import Integers, MotionLog
 
 # Longer logs are judged by the scatter of scores summed over blocks of time; shorter ones have too few.
@@ -35,9 +35,9 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
     K = problem.residual_map(solution.linear)
     log = log.rows(np.argsort(log.time, kind="stable"))
     if len(log) > LONGEST:
-        return _by_blocks(log, K, problem)
+        return _by_blocks(log, K, problem, solution.weights)
     H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    residual, slope = _whitened(log, K, problem)
+    residual, slope = _whitened(log, K, problem, solution.weights)
     slot = _slots(np.asarray(log.time))
     variance, squares, memory = np.zeros_like(H), 0.0, 0.0
     for channel in range(6):
@@ -50,23 +50,28 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
         memory += (2 * float(kernel[1:].sum()) / kernel[0] + 1) / 6
     # The fit has taken its share of the slow part of the noise out of the residual.
     lost = len(H) * max(memory, 1.0) / (6 * len(log))
-    variance = variance / (1 - min(lost, 0.5)) + squares * (extra - (plain - H))
-    floor = LEAST_SHARE * nonnegative(H + extra, plain)
+    variance = variance / (1 - min(lost, 0.5))
+    if solution.weights is None:
+        variance += squares * (extra - (plain - H))
+        floor = LEAST_SHARE * nonnegative(H + extra, plain)
+    else:
+        floor = LEAST_SHARE * problem.fixed_weight_score(K, solution.weights)
+        plain = floor
     return np.asarray(floor + nonnegative(variance - floor, plain))
 
 
-def _by_blocks(log: MotionLog, K: Array, problem: Problem) -> Array:
+def _by_blocks(log: MotionLog, K: Array, problem: Problem, weights: Array | None) -> Array:
     """Return the score variance from the scatter of scores summed over equal stretches of time."""
     total = np.zeros((BLOCKS, len(problem.T)))
     for block, rows in enumerate(np.array_split(np.arange(len(log)), BLOCKS)):
-        residual, slope = _whitened(log.rows(slice(int(rows[0]), int(rows[-1]) + 1)), K, problem)
+        residual, slope = _whitened(log.rows(slice(int(rows[0]), int(rows[-1]) + 1)), K, problem, weights)
         total[block] = np.einsum("nip,ni->p", slope, residual)
     total -= total.mean(0)
     return np.asarray(total.T @ total * (BLOCKS / (BLOCKS - 1)))
 
 
-def _whitened(log: MotionLog, K: Array, problem: Problem) -> tuple[Array, Array]:
-    """Return whitened residuals (N, 6) and their slopes (N, 6, p)."""
+def _whitened(log: MotionLog, K: Array, problem: Problem, weights: Array | None) -> tuple[Array, Array]:
+    """Return whitened residuals (N, 6) and what each adds to the score (N, 6, p): L^-1 W_0 T z for fixed weights."""
     z = problem.features(log)
     residual = z @ K.T
     slope = np.tensordot(z, problem.T, axes=(1, 2)).swapaxes(1, 2)
@@ -75,7 +80,7 @@ def _whitened(log: MotionLog, K: Array, problem: Problem) -> tuple[Array, Array]
         if rows.any():
             L = np.linalg.cholesky(noise_cost.weight(K, problem.acceleration[index], problem.wrench[index]))
             residual[rows] = residual[rows] @ L
-            slope[rows] = L.T @ slope[rows]
+            slope[rows] = (L.T if weights is None else np.linalg.solve(L, weights[index])) @ slope[rows]
     return residual, slope
 
 

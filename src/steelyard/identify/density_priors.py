@@ -1,7 +1,7 @@
 """Priors on the densities of parts, averaged by evidence: one common density, and groups of equal density.
 
-The data are a quadratic form in the masses, m^T A m / 2 - b^T m. With m = V exp(y_z), z the group of each part and y the
-log densities, every model below is a Gaussian prior on y; its evidence is Laplace's,
+The data are a quadratic form in the masses, m^T A m / 2 - b^T m. With m = V exp(y_z), z the group of each part and y
+the log densities, every model below is a Gaussian prior on y; its evidence is Laplace's,
     log Z = -cost(mode) - (log det C + log det H) / 2,
 C the prior covariance and H the Hessian at the mode. Densities stay positive by construction.
   common    every part has its own y_k ~ N(mu, sigma^2) around one free mu, over a ladder of sigma;
@@ -61,10 +61,10 @@ def _cost(A: Array, b: Array, volume: Array, group: Integers, precision: Array, 
     for k in range(P):
         mass[k] = volume[k] * np.exp(min(y[group[k]], 20.0))
     Am = A @ mass
-    cost = 0.5 * (mass @ Am) - b @ mass
+    cost = float(0.5 * (mass @ Am) - b @ mass)
     off = y - CENTRE
     pull = precision @ off
-    cost += 0.5 * (off @ pull)
+    cost += float(0.5 * (off @ pull))
     gradient, hessian = pull.copy(), precision.copy()
     for k in range(P):
         slope = mass[k] * (Am[k] - b[k])

@@ -11,12 +11,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.conclude import conclude
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift
 from steelyard.identify.rest import at_rest
+from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 

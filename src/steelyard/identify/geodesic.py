@@ -15,11 +15,11 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify.conclude import Solution
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.linear import solve_scaled
 from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -73,7 +73,7 @@ class Geodesic:
             step = solve_scaled(hessian, -gradient)
             decrement = -float(gradient @ step)
             if decrement < CONVERGED:
-                return Solution(x + step, np.eye(10), gamma * metric, aware=False)
+                return Solution(x + step, np.eye(10), gamma * metric, weights)
             x = self._shorten(x, step, decrement, 0.5 * x @ H @ x - g @ x + gamma * value, H, g, gamma, prior)
         raise CannotAnswer(f"The geodesic fit did not settle in {ITERATIONS} steps; give a prior nearer to the object.")
 

@@ -12,26 +12,27 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
-from steelyard.identify.linear import inverse_scaled
+from steelyard.identify.linear import inverse_scaled, normal_equations
 from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
 
 FEWEST_BLOCKS = 4
 
 
-def leave_one_out(problem: Problem, linear: Array, H: Array, jacobian: Array, prior: Array) -> dict[str, Any]:
+def leave_one_out(problem: Problem, solution: Solution, H: Array) -> dict[str, Any]:
     """Return the hold-out errors and jackknife deviations of `Evidence` by name, or nothing where blocks are few."""
     numbers = np.unique(problem.block_number[problem.block_number >= 0])
     if len(numbers) < FEWEST_BLOCKS:
         return {}
-    J = np.eye(len(linear))
-    J[:10, :10] = jacobian
+    J = np.eye(len(solution.linear))
+    J[:10, :10] = solution.jacobian
     full = J.T @ H @ J
-    full[:10, :10] += prior
+    full[:10, :10] += solution.prior
     refits, misses, rows = [], [], 0.0
     for number in numbers:
         chosen = problem.block_number == number
-        moved, miss = _without(problem, chosen, linear, full, J)
+        moved, miss = _without(problem, chosen, solution, full, J)
         refits.append(moved)
         misses.append(miss)
         rows += float(problem.blocks[chosen, 18, 18].sum())
@@ -47,18 +48,21 @@ def leave_one_out(problem: Problem, linear: Array, H: Array, jacobian: Array, pr
 
 
 def _without(
-    problem: Problem, chosen: np.ndarray[Any, np.dtype[np.bool_]], linear: Array, full: Array, J: Array
+    problem: Problem, chosen: np.ndarray[Any, np.dtype[np.bool_]], solution: Solution, full: Array, J: Array
 ) -> tuple[Array, Array]:
     """Return the refit without the chosen groups, and the squared residual (6,) it leaves in them."""
     classes = problem.block_class[chosen]
     scatter = problem.blocks[chosen]
-    K = problem.residual_map(linear)
-    data = (K, problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
-    _, gradient, _ = noise_cost.derivatives(*data)
-    _, _, plain = noise_cost.information(*data)
+    if solution.weights is None:
+        K = problem.residual_map(solution.linear)
+        data = (K, problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
+        _, gradient, _ = noise_cost.derivatives(*data)
+        _, _, plain = noise_cost.information(*data)
+    else:
+        plain, g = normal_equations(problem.T, scatter, solution.weights[classes])
+        gradient = 2 * (plain @ solution.linear - g)
     rest = full - J.T @ plain @ J
-    step = inverse_scaled(rest) @ (J.T @ gradient / 2)
-    moved = linear + J @ step
+    moved = solution.linear + J @ (inverse_scaled(rest) @ (J.T @ gradient / 2))
     K = problem.residual_map(moved)
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)
 

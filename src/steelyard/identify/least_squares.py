@@ -14,11 +14,11 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.identify.conclude import Solution
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.linear import reweighted, solve_scaled
 from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 
@@ -58,7 +58,7 @@ class LeastSquares:
             weights = np.stack([np.diag(1 / w) for w in problem.wrench])
         else:
             weights = np.broadcast_to(np.eye(6), (len(problem.scatter), 6, 6)).copy()
-        return Solution.unconstrained(solve_scaled(*problem.normal_equations(weights)))
+        return Solution.unconstrained(solve_scaled(*problem.normal_equations(weights)), weights)
 
 
 def _total(problem: Problem) -> Array:

@@ -15,11 +15,11 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.identify import newton
-from steelyard.identify.conclude import Solution
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.linear import reweighted
 from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments

@@ -20,7 +20,7 @@ ROWS_PER_AXIS = 3000
 # A median over fewer rows is too rough.
 FEWEST_FOR_MEDIAN = 60
 # The wrench keeps at least this share of the residual variance that noise in the motion could also explain.
-LEAST_SHARE = 0.1
+LEAST_SHARE = 0.02
 # No class of rows is quieter than this share of the average over all.
 QUIETEST = 0.25
 # Start of the iteration: force in N and torque in N m of an everyday wrist sensor.

@@ -17,7 +17,7 @@ from scipy.optimize import nnls
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify import density_priors, noise_cost
-from steelyard.identify.conclude import Solution, conclude
+from steelyard.identify.conclude import conclude
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias
@@ -25,6 +25,7 @@ from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equati
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import part_findings
 from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -77,7 +78,7 @@ class PartMasses:
         T = np.tensordot(columns.T, problem.T, axes=1)
         linear = np.zeros(len(problem.T))
         for _ in range(RENEWALS):
-            H, g = normal_equations(T, problem.scatter, _weights(problem, linear))
+            H, g = normal_equations(T, problem.scatter, problem.noise_weights(problem.residual_map(linear)))
             linear = columns @ solve_scaled(H, g)
         if not linear[0] > 0:
             raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
@@ -128,12 +129,6 @@ class Effective:
         return np.concatenate([phi, self.bias_at - self.bias_slope @ phi])
 
 
-def _weights(problem: Problem, linear: Array) -> Array:
-    """Return W (C, 6, 6) at the linear parameters."""
-    K = problem.residual_map(linear)
-    return np.stack([noise_cost.weight(K, a, w) for a, w in zip(problem.acceleration, problem.wrench, strict=True)])
-
-
 def _effective(problem: Problem, linear: Array, score: Array | None) -> Effective:
     """Return the effective information H V^-1 H about phi, with V the variance of the score and the bias projected out.
 
@@ -141,7 +136,7 @@ def _effective(problem: Problem, linear: Array, score: Array | None) -> Effectiv
     """
     K = problem.residual_map(linear)
     H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    _, g = problem.normal_equations(_weights(problem, linear))
+    _, g = problem.normal_equations(problem.noise_weights(K))
     H = nonnegative(H, plain)
     V = H + extra if score is None else score.copy()
     if problem.with_bias:

@@ -9,6 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.linear import normal_equations, solve_scaled
+from steelyard.identify.noise_cost import weight
 from steelyard.identify.regressor import design
 from steelyard.logs.log import Integers, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
@@ -100,6 +101,23 @@ class Problem:
         K = np.tensordot(linear, self.T, axes=1)
         K[:, 12:18] += np.eye(6)
         return np.asarray(K)
+
+    def plus_bias_prior(self, matrix: Array) -> Array:
+        """Return a matrix (p, p) of information with what is known of the bias added."""
+        if not self.with_bias:
+            return matrix
+        out = matrix.copy()
+        out[10:16, 10:16] += self.bias_prior.precision
+        return out
+
+    def noise_weights(self, K: Array) -> Array:
+        """Return W (C, 6, 6), the inverse of each class's noise at the residual map K (6, Z)."""
+        return np.stack([weight(K, a, w) for a, w in zip(self.acceleration, self.wrench, strict=True)])
+
+    def fixed_weight_score(self, K: Array, weights: Array) -> Array:
+        """Return the variance (p, p) of the score of rows weighted by `weights` (C, 6, 6) under white noise."""
+        noise = np.linalg.inv(self.noise_weights(K))
+        return np.asarray(normal_equations(self.T, self.scatter, weights @ noise @ weights)[0])
 
     def normal_equations(self, weights: Array) -> tuple[Array, Array]:
         """Return H (p, p) and g (p,) of the rows weighted by `weights` (C, 6, 6), with what is known of the bias."""

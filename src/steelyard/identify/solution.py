@@ -1,0 +1,33 @@
+"""Solution: what an estimator found, and how it was weighted."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+
+
+@dataclass(frozen=True, eq=False)
+class Solution:
+    """Linear parameters (p,), d phi / d coordinates (10, 10), prior Hessian in them (10, 10).
+
+    weights  (C, 6, 6) fixed weights of the rows of each class; None = the inverse of their noise, that in the regressor
+             included and taken out of the scatter
+    """
+
+    linear: Array
+    jacobian: Array
+    prior: Array
+    weights: Array | None = None
+
+    @classmethod
+    def unconstrained(cls, linear: Array, weights: Array | None = None) -> Solution:
+        """Return a solution whose coordinates are the parameters themselves, without a prior."""
+        return cls(linear, np.eye(10), np.zeros((10, 10)), weights)
+
+    @property
+    def bias(self) -> Array:
+        """The wrench bias (6,) [tau, f]; zero where it was not estimated."""
+        return self.linear[10:16] if len(self.linear) > 10 else np.zeros(6)
