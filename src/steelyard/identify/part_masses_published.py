@@ -1,0 +1,128 @@
+"""HPS as published: part masses by non-negative least squares on rows that look still, gravity alone, nothing weighted.
+
+For comparison. It takes any number of parts, where the published code refuses more than four.
+Source: "The Sum of Its Parts", eq. 6-7 and its code: no acceleration term, newton and newton metre mixed, rows chosen
+by their *noisy* acceleration. The sign of gravity here is the physical one.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.optimize import nnls
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.inertia import InertialParameters
+from steelyard.logs.log import Mask, MotionLog
+from steelyard.parts.parts import Parts
+
+# Bounds on the length of measured linear [m/s^2] and angular acceleration [rad/s^2], "below 1 unit".
+GATE = 1.0
+RANK_TOLERANCE = 1e-9
+
+
+@dataclass(frozen=True)
+class PublishedPartMasses:
+    """Options of HPS.
+
+    parts  the parts, in the frame of the sensor; `point_parts` makes them as published, from points
+    gate   rows are used where both measured accelerations are shorter than this [m/s^2, rad/s^2]
+    """
+
+    parts: Parts
+    gate: float = GATE
+
+    def identify(self, log: MotionLog) -> Estimate:
+        """Return the estimate of a log; the sensor is taken to be tared.
+
+        The covariance is that of the wrench noise through the parts that carry mass, zero where the log declares none.
+        Raises CannotAnswer where no row passes the gate or no part carries mass.
+        """
+        used = self.rows(log)
+        if not used.any():
+            raise CannotAnswer(
+                f"No row has both accelerations below {self.gate:g} (m/s^2, rad/s^2), so none looks still. "
+                "Use the noise-aware estimator, which takes every row."
+            )
+        chosen = log.rows(used)
+        A, b = _stacked(chosen, self.parts)
+        masses = nnls(A, b, maxiter=50 * len(self.parts))[0]
+        if not masses.sum() > 0:
+            raise CannotAnswer("The log shows no weight: no part carries mass. Check the sign of the wrench.")
+        return self._estimate(chosen, A, b, masses)
+
+    def rows(self, log: MotionLog) -> Mask:
+        """Return which rows (N,) are used."""
+        linear = np.linalg.norm(log.acceleration, axis=1)
+        angular = np.linalg.norm(log.angular_acceleration, axis=1)
+        return np.asarray((linear < self.gate) & (angular < self.gate))
+
+    def _estimate(self, log: MotionLog, A: Array, b: Array, masses: Array) -> Estimate:
+        covariance = _covariance(A, log, masses > 0)
+        std = np.sqrt(np.diag(covariance))
+        B = self.parts.per_mass
+        values = np.linalg.svd(A / np.linalg.norm(A, axis=0), compute_uv=False)
+        seen = values > RANK_TOLERANCE * values[0]
+        residual = (b - A @ masses).reshape(-1, 6)
+        evidence = Evidence(
+            rank=int(seen.sum()),
+            condition=float(values[0] / values[-1]) if seen.all() else float("inf"),
+            samples=len(log),
+            still_samples=int(log.still.sum()),
+            residual_force_N=float(np.sqrt(np.mean(residual[:, 3:] ** 2))),
+            residual_torque_Nm=float(np.sqrt(np.mean(residual[:, :3] ** 2))),
+        )
+        rows = zip(self.parts.label, masses, std, self.parts.volume, self.parts.centroid, strict=True)
+        return Estimate(
+            self.parts.whole(masses),
+            B @ covariance @ B.T,
+            "part-masses-published",
+            evidence,
+            np.ones(10, np.bool_),
+            parts=tuple(PartMass(int(k), float(m), float(s), float(v), c) for k, m, s, v, c in rows),
+            part_covariance=covariance,
+        )
+
+
+def _stacked(log: MotionLog, parts: Parts) -> tuple[Array, Array]:
+    """Return the data matrix (6 n, P) with columns [c_i x (-g); -g] and the wrenches (6 n,).
+
+    Source: eq. 6, whose wrench is [f, tau]; the order of rows does not matter.
+    """
+    weight = -log.gravity[:, None, :]
+    columns = np.concatenate([np.cross(parts.centroid, weight), np.broadcast_to(weight, (len(log), len(parts), 3))], 2)
+    return np.swapaxes(columns, 1, 2).reshape(-1, len(parts)), log.wrench.ravel()
+
+
+def _covariance(A: Array, log: MotionLog, held: Mask) -> Array:
+    """Return the covariance (P, P) of the masses above zero from the declared wrench noise."""
+    out = np.zeros((len(held), len(held)))
+    if log.noise is None:
+        return out
+    variance = np.stack([noise.wrench for noise in log.noise])[log.noise_class].ravel()
+    bread = np.linalg.pinv(A[:, held])
+    out[np.ix_(held, held)] = (bread * variance) @ bread.T
+    return out
+
+
+def point_parts(points: ArrayLike, volume: ArrayLike, label: ArrayLike) -> Parts:
+    """Return parts made of points (T, 3) [m] of volume (T,) [m^3], one label (T,) each: the published discretisation.
+
+    The published code keeps one point per tetrahedron, its centroid, and leaves out the tetrahedron's own inertia.
+    """
+    places, sizes = check.vectors("points", points), check.finite("volumes", volume)
+    names, row = np.unique(np.asarray(label), return_inverse=True)
+    if places.ndim != 2 or sizes.shape != places.shape[:1] or row.shape != places.shape[:1]:
+        raise BadValue(
+            f"points, volumes and labels must have shapes (T, 3), (T,) and (T,); "
+            f"got {places.shape}, {sizes.shape} and {row.shape}."
+        )
+    moments = [
+        InertialParameters.from_point_masses(sizes[row == k], places[row == k]).vector for k in range(len(names))
+    ]
+    return Parts(names.astype(np.int64), np.stack(moments))
