@@ -36,6 +36,9 @@ REMEDIES: dict[str, str] = {
     "surface-open": "Close the surface: weld equal vertices, fill holes, or scan the missing side.",
     "parts-overlap": "Cut one part out of the other, so that they only touch and no volume counts twice.",
     "part-unseen": "Nothing to do if the part is hidden inside; give its shape, since no scan can see it.",
+    "part-not-homogeneous": "Split the part where its material changes, or check the shape and the grasp pose.",
+    "materials-tied": "Move faster, add poses, or shorten the list of materials.",
+    "materials-impossible": "Add the missing material to the list, or check the shape and its units.",
     "tool-included": "Give --tool (a result or a tool-only log) if you want the object alone.",
 }
 

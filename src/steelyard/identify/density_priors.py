@@ -28,13 +28,13 @@ SWEEPS = 3
 
 
 @numba.njit(cache=True)
-def _mode(
-    A: Array, b: Array, volume: Array, group: Integers, precision: Array, start: Array
+def mode(
+    A: Array, b: Array, volume: Array, group: Integers, precision: Array, centre: Array, start: Array
 ) -> tuple[Array, float, Array]:
-    """Return the mode y (G,), its cost with prior, and the Hessian (G, G), by damped Newton steps."""
+    """Return the mode y (G,), its cost with the prior N(centre, precision^-1), and the Hessian (G, G), by Newton."""
     y = start.copy()
     G = len(y)
-    cost, gradient, hessian = _cost(A, b, volume, group, precision, y)
+    cost, gradient, hessian = _cost(A, b, volume, group, precision, centre, y)
     for _ in range(STEPS):
         values, vectors = np.linalg.eigh(hessian)
         step = -(vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(values), 1e-6)))
@@ -45,7 +45,7 @@ def _mode(
         if longest > 1.0:
             step = step / longest
         for _ in range(20):
-            now, g, h = _cost(A, b, volume, group, precision, y + step)
+            now, g, h = _cost(A, b, volume, group, precision, centre, y + step)
             if now < cost + 1e-12 * abs(cost):
                 break
             step = 0.5 * step
@@ -54,7 +54,9 @@ def _mode(
 
 
 @numba.njit(cache=True)
-def _cost(A: Array, b: Array, volume: Array, group: Integers, precision: Array, y: Array) -> tuple[float, Array, Array]:
+def _cost(
+    A: Array, b: Array, volume: Array, group: Integers, precision: Array, centre: Array, y: Array
+) -> tuple[float, Array, Array]:
     """Return data cost plus prior at log densities y (G,), gradient and Hessian."""
     P, G = len(volume), len(y)
     mass = np.empty(P)
@@ -62,7 +64,7 @@ def _cost(A: Array, b: Array, volume: Array, group: Integers, precision: Array, 
         mass[k] = volume[k] * np.exp(min(y[group[k]], 20.0))
     Am = A @ mass
     cost = float(0.5 * (mass @ Am) - b @ mass)
-    off = y - CENTRE
+    off = y - centre
     pull = precision @ off
     cost += float(0.5 * (off @ pull))
     gradient, hessian = pull.copy(), precision.copy()
@@ -76,7 +78,7 @@ def _cost(A: Array, b: Array, volume: Array, group: Integers, precision: Array, 
 
 
 @numba.njit(cache=True)
-def _log_det(matrix: Array) -> float:
+def log_det(matrix: Array) -> float:
     """Return log det of a symmetric matrix, with eigenvalues kept above zero."""
     total = 0.0
     for value in np.linalg.eigvalsh(matrix):
@@ -94,9 +96,9 @@ def common_density(A: Array, b: Array, volume: Array, start: Array) -> tuple[Arr
     for s in range(S - 1, -1, -1):
         near, wide = LADDER[s] ** 2, WIDTH**2
         precision = np.eye(P) / near - wide / (near * (near + P * wide))
-        y, cost, hessian = _mode(A, b, volume, own, precision, y)
+        y, cost, hessian = mode(A, b, volume, own, precision, np.full(P, CENTRE), y)
         prior = (P - 1) * np.log(near) + np.log(near + P * wide)
-        evidence[s] = -cost - 0.5 * (prior + _log_det(hessian))
+        evidence[s] = -cost - 0.5 * (prior + log_det(hessian))
         masses[s] = volume * np.exp(y)
         spread[s] = np.outer(masses[s], masses[s]) * inverse_scaled(hessian)
     return masses, evidence - np.log(S), spread
@@ -185,8 +187,8 @@ def _grouped(A: Array, b: Array, volume: Array, group: Integers, G: int, start: 
         y[group[k]] += volume[k] * start[k]
         weight[group[k]] += volume[k]
     y /= weight
-    y, cost, hessian = _mode(A, b, volume, group, np.eye(G) / WIDTH**2, y)
-    evidence = -cost - 0.5 * (2 * G * np.log(WIDTH) + _log_det(hessian)) + _partition_prior(group, G)
+    y, cost, hessian = mode(A, b, volume, group, np.eye(G) / WIDTH**2, np.full(G, CENTRE), y)
+    evidence = -cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + _partition_prior(group, G)
     inverse = inverse_scaled(hessian)
     mass, spread = np.empty(P), np.empty((P, P))
     for k in range(P):

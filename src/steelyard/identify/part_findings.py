@@ -2,11 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
+from scipy.special import gammaincinv
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.material_choice import POSSIBLE, Choices
+from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
 
 # A part is "at zero" below this share of the whole.
@@ -15,24 +21,18 @@ ZERO_SHARE = 1e-3
 SEEN_SHARE = 0.5
 # Centroids lie in a plane where their spread across it is below this share of the spread along it.
 FLAT_SHARE = 0.01
-# More parts than this share of rank means that the split between parts rests on the priors.
+# Three centroids always lie in a plane.
 FEWEST_FOR_PLANE = 4
+# A right shape is called wrong this often.
+MISFIT_CHANCE = 1e-5
 
 
-def part_findings(estimate: Estimate, parts: Parts, information: Array) -> list[Finding]:
-    """Return findings on parts at zero mass, more parts than the data tell apart, and coplanar centroids."""
-    out = []
-    mass = estimate.mass
-    zero = [p.label for p in estimate.parts if p.mass < ZERO_SHARE * mass]
-    if zero:
-        share = float(parts.volume[np.isin(parts.label, zero)].sum() / parts.volume.sum())
-        names = ", ".join(map(str, zero))
-        out.append(
-            Finding.of(
-                "part-zero-mass", f"Part {names} has less than 0.1 % of the mass but {100 * share:.2g} % of the volume."
-            )
-        )
-    rank = seen_rank(parts, information, mass)
+def part_findings(
+    estimate: Estimate, parts: Parts, data: Effective, choices: Choices | None, materials: Sequence[Material]
+) -> list[Finding]:
+    """Return what there is to know: parts at zero, parts not told apart, materials tied or impossible, misfit."""
+    out = _zero(estimate, parts)
+    rank = seen_rank(parts, data.information, estimate.mass)
     if rank < len(parts):
         message = (
             f"The data tell {rank} combinations of the masses of {len(parts)} parts apart; the rest is the prior's."
@@ -41,6 +41,65 @@ def part_findings(estimate: Estimate, parts: Parts, information: Array) -> list[
         if len(parts) >= FEWEST_FOR_PLANE and flat(parts.centroid):
             text = "The centroids of the parts lie in one plane: still poses cannot tell their masses apart."
             out.append(Finding.of("centroids-coplanar", text))
+    if choices is not None:
+        out += _material_findings(estimate, data, choices, materials)
+    elif (misfit := data.misfit(estimate.parameters.vector)) > (limit := misfit_limit(data, len(parts))):
+        text = (
+            f"Homogeneous parts of this shape leave a chi-square of {misfit:.0f} that ten free numbers do not "
+            f"(at most {limit:.0f} by chance): a part is not of one density, or the shape is wrong."
+        )
+        out.append(Finding.of("part-not-homogeneous", text))
+    return out
+
+
+def misfit_limit(data: Effective, parts: int) -> float:
+    """Return the chi-square that a right shape exceeds once in 100 000 logs."""
+    values = np.linalg.eigvalsh(data.information)
+    seen = int((values > 1e-9 * values[-1]).sum())
+    return float(2 * gammaincinv(max(seen - min(parts, seen - 1), 1) / 2, 1 - MISFIT_CHANCE))
+
+
+def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:
+    """Return the finding on parts with next to no mass."""
+    zero = [p.label for p in estimate.parts if p.mass < ZERO_SHARE * estimate.mass]
+    share = float(parts.volume[np.isin(parts.label, zero)].sum() / parts.volume.sum())
+    if not zero or share < ZERO_SHARE:
+        return []
+    names = ", ".join(map(str, zero))
+    return [
+        Finding.of(
+            "part-zero-mass", f"Part {names} has less than 0.1 % of the mass but {100 * share:.2g} % of the volume."
+        )
+    ]
+
+
+def named_materials(count: int, choices: Choices | None, materials: Sequence[Material]) -> list[str | None]:
+    """Return the name of each part's material, with a question mark where another one is possible."""
+    if choices is None:
+        return [None] * count
+    shares = choices.shares(len(materials))
+    best = shares.argmax(1)
+    return [materials[b].name + ("" if shares[k, b] > 1 - POSSIBLE else "?") for k, b in enumerate(best)]
+
+
+def _material_findings(
+    estimate: Estimate, data: Effective, choices: Choices, materials: Sequence[Material]
+) -> list[Finding]:
+    """Return findings on materials that cannot be told apart, or that cannot give the wrench at all."""
+    out = []
+    limit = misfit_limit(data, 1)
+    misfit = data.misfit(estimate.parameters.vector)
+    if misfit > limit:
+        text = f"No choice from the list gives this wrench: chi-square {misfit:.0f}, at most {limit:.0f} by chance."
+        return [Finding.of("materials-impossible", text)]
+    shares = choices.shares(len(materials))
+    ties = []
+    for row, part in zip(shares, estimate.parts, strict=True):
+        possible = [f"{materials[k].name} ({100 * row[k]:.0f} %)" for k in np.argsort(-row) if row[k] > POSSIBLE]
+        if len(possible) > 1:
+            ties.append(f"part {part.label}: " + " or ".join(possible[:3]))
+    if ties:
+        out.append(Finding.of("materials-tied", f"The data leave the material open of {'; '.join(ties)}."))
     return out
 
 

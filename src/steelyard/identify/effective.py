@@ -1,0 +1,51 @@
+"""What a log says about phi alone: information with noise taken out, bias projected out, sandwich folded in."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify import noise_cost
+from steelyard.identify.linear import inverse_scaled, nonnegative
+from steelyard.identify.problem import Problem
+
+
+@dataclass(frozen=True, eq=False)
+class Effective:
+    """Information F (10, 10) and F phi_hat (10,), and how the bias (0 or more) follows phi."""
+
+    information: Array
+    pull: Array
+    bias_at: Array
+    bias_slope: Array
+
+    @classmethod
+    def of(cls, problem: Problem, linear: Array, score: Array | None) -> Effective:
+        """Return F = H V^-1 H at the linear parameters (p,), V the variance (p, p) of the score.
+
+        H is the information with the noise of the acceleration taken out of the scatter, so that H phi = g is
+        consistent; V adds what that noise does to the score, or is `score` where the log's own correlation is known.
+        """
+        K = problem.residual_map(linear)
+        H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
+        _, g = problem.normal_equations(problem.noise_weights(K))
+        H = nonnegative(H, plain)
+        V = problem.plus_bias_prior(H + extra if score is None else score)
+        H = problem.plus_bias_prior(H)
+        bread = inverse_scaled(H[10:, 10:]) if problem.with_bias else np.zeros((0, 0))
+        project = np.concatenate([np.eye(10), -H[:10, 10:] @ bread], 1)
+        half = (project @ H[:, :10]) @ inverse_scaled(project @ V @ project.T)
+        information = half @ (project @ H[:, :10])
+        return cls(0.5 * (information + information.T), half @ (project @ g), bread @ g[10:], bread @ H[10:, :10])
+
+    def linear_at(self, phi: Array) -> Array:
+        """Return [phi, bias] (p,) with the bias that fits best beside phi (10,)."""
+        return np.concatenate([phi, self.bias_at - self.bias_slope @ phi])
+
+    def misfit(self, phi: Array) -> float:
+        """Return how much worse phi (10,) fits than the best ten numbers, as a chi-square."""
+        best = inverse_scaled(self.information) @ self.pull
+        gap = phi - best
+        return max(float(gap @ self.information @ gap), 0.0)

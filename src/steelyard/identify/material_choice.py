@@ -1,0 +1,128 @@
+"""Which material each part is made of, from a list: the mixed-integer choice of the paper's future work.
+
+A choice gives every part the log-normal density of its material; its evidence is Laplace's, as in `density_priors`. Few
+choices are all tried; many are searched part by part from several starts. What was tried is averaged by evidence, so
+that ties stay ties.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.density_priors import log_det, mode
+from steelyard.identify.linear import inverse_scaled
+from steelyard.logs.log import Integers
+from steelyard.parts.material import Material
+
+# Up to this many choices all are tried.
+EXHAUSTIVE = 3000
+MOST, SWEEPS = 4000, 6
+# A material is not ruled out for a part above this share of the evidence.
+POSSIBLE = 0.05
+
+
+@dataclass(frozen=True, eq=False)
+class Choices:
+    """N choices looked at: masses (N, P), log evidence (N,), covariances (N, P, P), material numbers (N, P)."""
+
+    masses: Array
+    evidence: Array
+    spread: Array
+    chosen: Integers
+
+    def shares(self, materials: int) -> Array:
+        """Return the probability (P, materials) of each material for each part."""
+        weight = np.exp(self.evidence - self.evidence.max())
+        weight /= weight.sum()
+        out = np.zeros((self.chosen.shape[1], materials))
+        for k in range(materials):
+            out[:, k] = weight @ (self.chosen == k)
+        return out
+
+
+def choose(A: Array, b: Array, volume: Array, materials: Sequence[Material], free: Array) -> Choices:
+    """Return the choices of one material per part and what they weigh.
+
+    A, b    the data as m^T A m / 2 - b^T m
+    free    (P,) masses without any list: where the search starts
+    """
+    centre = np.log([m.density for m in materials])
+    tolerance = np.array([m.tolerance for m in materials])
+    P, K = len(volume), len(materials)
+    if K**P <= EXHAUSTIVE:
+        tried = np.stack(np.meshgrid(*[np.arange(K)] * P, indexing="ij"), -1).reshape(-1, P)
+        return Choices(*_all(A, b, volume, centre, tolerance, tried), tried)
+    density = np.log(np.maximum(free, 1e-9) / volume)
+    near = np.abs((density[:, None] - centre) / tolerance).argmin(1)
+    starts = np.stack([near, *(np.full(P, k) for k in range(K))])
+    masses, evidence, spread, chosen, count = _search(A, b, volume, centre, tolerance, starts)
+    return Choices(masses[:count], evidence[:count], spread[:count], chosen[:count])
+
+
+@numba.njit(cache=True)
+def _one(
+    A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, chosen: Integers
+) -> tuple[Array, float, Array]:
+    """Return masses (P,), log evidence and covariance (P, P) of one choice."""
+    P = len(volume)
+    at, precision, prior = np.empty(P), np.zeros((P, P)), 0.0
+    for k in range(P):
+        at[k] = centre[chosen[k]]
+        precision[k, k] = tolerance[chosen[k]] ** -2
+        prior += 2 * np.log(tolerance[chosen[k]])
+    y, cost, hessian = mode(A, b, volume, np.arange(P), precision, at, at)
+    masses = volume * np.exp(y)
+    evidence = -cost - 0.5 * (prior + log_det(hessian)) - P * np.log(len(centre))
+    return masses, evidence, np.outer(masses, masses) * inverse_scaled(hessian)
+
+
+@numba.njit(cache=True)
+def _all(
+    A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, tried: Integers
+) -> tuple[Array, Array, Array]:
+    """Return masses, log evidence and covariance of every choice."""
+    N, P = tried.shape
+    masses, evidence, spread = np.zeros((N, P)), np.zeros(N), np.zeros((N, P, P))
+    for i in range(N):
+        masses[i], evidence[i], spread[i] = _one(A, b, volume, centre, tolerance, tried[i])
+    return masses, evidence, spread
+
+
+@numba.njit(cache=True)
+def _search(
+    A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, starts: Integers
+) -> tuple[Array, Array, Array, Integers, int]:
+    """Return what was tried from the starts (S, P), changing one part at a time as long as the evidence rises."""
+    P, K = len(volume), len(centre)
+    masses, evidence, spread = np.zeros((MOST, P)), np.full(MOST, -np.inf), np.zeros((MOST, P, P))
+    known, count = np.full((MOST, P), -1), 0
+    for s in range(len(starts)):
+        current, best = starts[s].copy(), -np.inf
+        for _sweep in range(SWEEPS):
+            improved = False
+            for k in range(P):
+                base = current.copy()
+                for material in range(K):
+                    trial = base.copy()
+                    trial[k] = material
+                    place = -1
+                    for i in range(count):
+                        if (known[i] == trial).all():
+                            place = i
+                            break
+                    if place < 0:
+                        if count == MOST:
+                            return masses, evidence, spread, known, count
+                        place, count = count, count + 1
+                        known[place] = trial
+                        masses[place], evidence[place], spread[place] = _one(A, b, volume, centre, tolerance, trial)
+                    if evidence[place] > best + 1e-9:
+                        best, current, improved = evidence[place], trial.copy(), True
+            if not improved:
+                break
+    return masses, evidence, spread, known, count

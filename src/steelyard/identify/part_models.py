@@ -1,0 +1,80 @@
+"""From what a log says about phi to the masses of parts: free, averaged over models, or from a list of materials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.optimize import nnls
+
+from steelyard.check import Array
+from steelyard.identify import density_priors
+from steelyard.identify.effective import Effective
+from steelyard.identify.linear import inverse_scaled
+from steelyard.identify.material_choice import Choices, choose
+from steelyard.parts.material import Material
+from steelyard.parts.parts import Parts
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """Masses (P,) [kg] with covariance (P, P), and the material choices looked at where there was a list."""
+
+    mean: Array
+    covariance: Array
+    choices: Choices | None = None
+
+
+def free_masses(data: Effective, parts: Parts) -> Masses:
+    """Return masses that are only kept from falling below zero."""
+    A, b = _in_masses(data, parts)
+    mean = _nonnegative(A, b)
+    held = mean > 0
+    covariance = np.zeros_like(A)
+    covariance[np.ix_(held, held)] = inverse_scaled(A[np.ix_(held, held)])
+    return Masses(mean, covariance)
+
+
+def averaged_masses(data: Effective, parts: Parts) -> Masses:
+    """Return masses averaged by evidence over one common density and groups of equal density."""
+    A, b = _in_masses(data, parts)
+    if len(parts) == 1:
+        return free_masses(data, parts)
+    mean, covariance, _ = density_priors.averaged(_families(A, b, parts.volume))
+    return Masses(mean, covariance)
+
+
+def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]) -> Masses:
+    """Return masses averaged by evidence over the choices of one material per part."""
+    A, b = _in_masses(data, parts)
+    guess = averaged_masses(data, parts).mean
+    choices = choose(A, b, parts.volume, materials, guess)
+    mean, covariance, _ = density_priors.averaged([(choices.masses, choices.evidence, choices.spread)])
+    return Masses(mean, covariance, choices)
+
+
+def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:
+    """Return A (P, P) and b (P,): the data as m^T A m / 2 - b^T m."""
+    B = parts.per_mass
+    return B.T @ data.information @ B, B.T @ data.pull
+
+
+def _families(A: Array, b: Array, volume: Array) -> list[tuple[Array, Array, Array]]:
+    """Return both families of density models: masses, log evidence and covariances of each model."""
+    start = np.full(len(volume), np.log(max(float(_nonnegative(A, b).sum()), 1e-6) / volume.sum()))
+    common = density_priors.common_density(A, b, volume, start)
+    widest = np.log(common[0][-1] / volume)
+    starts = density_priors.first_partitions(widest)
+    masses, evidence, spread, _, looked = density_priors.equal_groups(A, b, volume, widest, starts)
+    return [common, (masses[:looked], evidence[:looked], spread[:looked])]
+
+
+def _nonnegative(A: Array, b: Array) -> Array:
+    """Return m >= 0 that minimises m^T A m / 2 - b^T m (Lawson and Hanson on a root of A)."""
+    scale = 1 / np.sqrt(np.maximum(np.diag(A), 1e-300))
+    values, vectors = np.linalg.eigh(A * np.outer(scale, scale))
+    kept = values > 1e-12 * values[-1]
+    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
+    target = (vectors[:, kept].T @ (scale * b)) / np.sqrt(values[kept])
+    return np.asarray(scale * nnls(root, target, maxiter=50 * len(b))[0])

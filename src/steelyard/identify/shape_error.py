@@ -1,0 +1,54 @@
+"""ShapeError: how wrong the given shape and grasp may be, and what that does to the answer."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.inertia import InertialParameters, forms
+from steelyard.spatial import Pose, Rotation
+
+
+@dataclass(frozen=True)
+class ShapeError:
+    """Standard deviations of what is taken as known.
+
+    com_m           of the centre of mass that the shape gives, per axis [m]
+    inertia_share   of the inertia, as a share of half its trace
+    grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
+    """
+
+    com_m: float = 0.0
+    inertia_share: float = 0.0
+    grasp_m: float = 0.0
+    grasp_rad: float = 0.0
+
+    def __post_init__(self) -> None:
+        values = (self.com_m, self.inertia_share, self.grasp_m, self.grasp_rad)
+        if not all(np.isfinite(v) and v >= 0 for v in values):
+            raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
+
+    def grasp_steps(self) -> list[Pose]:
+        """Return displacements of one standard deviation along and about each axis that has one."""
+        steps = [Pose(Rotation.identity(), self.grasp_m * axis) for axis in np.eye(3) if self.grasp_m]
+        return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
+
+    def covariance(self, body: InertialParameters, moved: Array) -> Array:
+        """Return what shape and grasp add to the covariance (10, 10) of the body's parameters.
+
+        moved  (K, 10) how the parameters change with each of the K grasp steps, the masses found anew
+        """
+        jacobian = np.zeros((10, 10))
+        jacobian[0, 0], jacobian[1:] = 1, forms.com_jacobian(body.vector)
+        half_trace = float(np.trace(body.inertia_com)) / 2
+        variance = np.repeat([0.0, self.com_m**2, (self.inertia_share * half_trace) ** 2], [1, 3, 6])
+        back = np.linalg.inv(jacobian)
+        return np.asarray((back * variance) @ back.T + moved.T @ moved)
+
+
+EXACT = ShapeError()
+# What a mesh of a real tool is wrong by even when it is right.
+MEASURED = ShapeError(com_m=1e-4, inertia_share=3e-3)
