@@ -24,6 +24,8 @@ from steelyard.parts.parts import Parts
 # Bounds on the length of measured linear [m/s^2] and angular acceleration [rad/s^2], "below 1 unit".
 GATE = 1.0
 RANK_TOLERANCE = 1e-9
+# Share of the trace of A^T A by which ties are broken.
+TIE = 1e-12
 
 
 @dataclass(frozen=True)
@@ -51,7 +53,7 @@ class PublishedPartMasses:
             )
         chosen = log.rows(used)
         A, b = _stacked(chosen, self.parts)
-        masses = nnls(A, b, maxiter=50 * len(self.parts))[0]
+        masses = _least_squares(A, b)
         if not masses.sum() > 0:
             raise CannotAnswer("The log shows no weight: no part carries mass. Check the sign of the wrench.")
         return self._estimate(chosen, A, b, masses)
@@ -97,6 +99,17 @@ def _stacked(log: MotionLog, parts: Parts) -> tuple[Array, Array]:
     weight = -log.gravity[:, None, :]
     columns = np.concatenate([np.cross(parts.centroid, weight), np.broadcast_to(weight, (len(log), len(parts), 3))], 2)
     return np.swapaxes(columns, 1, 2).reshape(-1, len(parts)), log.wrench.ravel()
+
+
+def _least_squares(A: Array, b: Array) -> Array:
+    """Return m >= 0 (P,) that minimises |A m - b|^2, of several such the one with the least |m|^2.
+
+    Rows at rest have rank four, so that with more parts the answer of eq. 7 is a whole face; a corner of it, as an
+    active-set solver returns, would be worse than what the published interior-point solver finds.
+    """
+    count = A.shape[1]
+    tie = np.sqrt(TIE * np.square(A).sum()) * np.eye(count)
+    return np.asarray(nnls(np.concatenate([A, tie]), np.concatenate([b, np.zeros(count)]), maxiter=50 * count)[0])
 
 
 def _covariance(A: Array, log: MotionLog, held: Mask) -> Array:

@@ -15,6 +15,7 @@ from steelyard.io.stream_entries import QuantitySpec
 from steelyard.io.units import ANGLE, factor
 
 _SHOWN = 5
+_LARGEST = 1e9  # in SI: nothing that a robot feels or does is as large
 
 
 def channel(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Array:
@@ -26,7 +27,9 @@ def channel(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Arr
     values = np.stack(columns, -1)
     require_finite(values, spec.where)
     if spec.form is None:
-        return check.frozen(values * factor(spec.name, spec.unit, gravity))
+        values = values * factor(spec.name, spec.unit, gravity)
+        _require_likely(values, spec.where)
+        return check.frozen(values)
     try:
         return rotation_of(values, spec.form, ANGLE[spec.unit]).matrix
     except BadValue as error:
@@ -41,6 +44,16 @@ def require_finite(values: Array, where: str) -> None:
         raise BadValue(
             f"{where}: {len(rows)} of {len(values)} rows are NaN or infinite: {rows_text(rows)}. "
             "Delete those rows, or record again."
+        )
+
+
+def _require_likely(values: Array, where: str) -> None:
+    """Raise BadValue naming the rows of (N, 3) that hold numbers beyond any sensor."""
+    rows = np.flatnonzero((np.abs(values) > _LARGEST).any(-1))
+    if len(rows):
+        raise BadValue(
+            f"{where}: {len(rows)} of {len(values)} rows hold impossible numbers, up to {np.abs(values).max():.2g}: "
+            f"{rows_text(rows)}. Delete those rows, or correct the columns and units."
         )
 
 

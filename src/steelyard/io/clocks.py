@@ -13,6 +13,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.channels import require_finite
 
+# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
+_CLOSEST, _FURTHEST = 2e-6, 3600.0
 _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them to a nanosecond
 
 
@@ -42,6 +44,8 @@ class Clock:
                 f"{self.where}: time stands still at {self.stamps[0]} in all {len(self.stamps)} rows. "
                 "Name the column of the clock, or give time = { rate = .. }."
             )
+        if len(steps):
+            require_likely_step(float(np.median(steps)) / self.per_second or _CLOSEST, self.where)
 
     def seconds_after(self, origin: int) -> Array:
         """Return (N,) [s] after `origin` [s]; integers are subtracted as integers."""
@@ -57,6 +61,15 @@ def common_origin(clocks: Sequence[Clock]) -> int:
     """Return the whole second to subtract from every clock: the earliest, or 0 where the stamps are small."""
     earliest = min((clock.first_second for clock in clocks), default=0)
     return earliest if abs(earliest) > _LARGE else 0
+
+
+def require_likely_step(step: float, where: str) -> None:
+    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
+    if not _CLOSEST <= step <= _FURTHEST:
+        raise BadValue(
+            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
+            "(s, ms, us, ns), the column or the rate."
+        )
 
 
 def steady(rate: float, rows: int, start: float) -> Array:

@@ -31,6 +31,9 @@ rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }   # 
 """
 
 _LARGEST_DESCRIPTION = 4_000_000
+# [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
+_WEAKEST, _STRONGEST = 0.1, 100.0
+_LOUDEST = 1e6
 _NOISE = ("force", "torque", "acceleration", "angular_acceleration")
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
 
@@ -93,6 +96,8 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     gravity = log.numbers("gravity", 3) if "gravity" in log else default_gravity()
     if not gravity.any():
         raise log.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
+    if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
+        raise log.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
     pose, spread = _object_pose(_section(top, "object"))
     return Description(
         streams=_streams(top),
@@ -105,6 +110,10 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     )
 
 
+def _short(values: Array) -> str:
+    return f"[{', '.join(f'{v:g}' for v in values)}]"
+
+
 def _section(top: Entry, key: str) -> Entry:
     value = top.values.get(key, {})
     if not isinstance(value, Mapping):
@@ -114,7 +123,7 @@ def _section(top: Entry, key: str) -> Entry:
 
 def _noise(entry: Entry) -> dict[str, float]:
     entry.only(*_NOISE)
-    return {key: entry.positive(key) for key in _NOISE if key in entry}
+    return {key: entry.positive(key, _LOUDEST) for key in _NOISE if key in entry}
 
 
 def _object_pose(entry: Entry) -> tuple[Pose | None, tuple[float, float] | None]:

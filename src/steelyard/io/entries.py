@@ -87,11 +87,17 @@ class Entry:
             raise self.error(f'"{key}" must be a finite number; got {value!r}.')
         return float(value)
 
-    def positive(self, key: str) -> float:
-        """Return one finite number above zero."""
+    def positive(self, key: str, largest: float = math.inf) -> float:
+        """Return one finite number above zero, and not above `largest`."""
         value = self.number(key)
         if value <= 0:
             raise self.error(f'"{key}" must be above zero; got {value:g}.')
+        return self.bounded(key, value, largest)
+
+    def bounded(self, key: str, value: float, largest: float) -> float:
+        """Return `value`, or raise BadDescription where its size is above `largest`."""
+        if abs(value) > largest:
+            raise self.error(f'"{key}" must be no larger than {largest:g}; got {value:g}. Check its unit.')
         return value
 
     def numbers(self, key: str, *counts: int) -> Array:

@@ -13,7 +13,7 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io import guess
 from steelyard.io.channels import channel, require_one_length
-from steelyard.io.clocks import Clock, common_origin, steady
+from steelyard.io.clocks import Clock, common_origin, require_likely_step, steady
 from steelyard.io.description import Description, read_description
 from steelyard.io.requirements import require_answerable, require_matched_rows
 from steelyard.io.rotations import FORMS
@@ -161,6 +161,7 @@ def _times(
     start = min((float(s[0]) for s in seconds if s is not None), default=0.0)
     for i, spec in enumerate(specs):
         if spec.time is not None and spec.time.column is None:
+            require_likely_step(1 / spec.time.rate, spec.time.where)
             seconds[i] = steady(spec.time.rate, rows[i], start)
     return seconds
 

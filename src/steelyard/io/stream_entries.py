@@ -4,6 +4,8 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
+import numpy as np
+
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry
@@ -23,6 +25,8 @@ FRAMED = (
     "angular_acceleration",
 )
 
+# [s] between clocks with different origins; [m] from S to anything that is fixed to it.
+_LONGEST_DELAY, _FURTHEST = 1e10, 10.0
 _JOINT = ("joint_position", "joint_torque")
 _KEYS = ("path", "topic", "kind", "time", "delay", "mount", *QUANTITIES, *_JOINT)
 
@@ -164,7 +168,8 @@ def _delay(stream: Entry) -> float | None:
         return None
     entry = stream.table("delay")
     entry.only("value", "unit")
-    return entry.number("value") / TIME[entry.choice("unit", list(TIME), "s")]
+    value = entry.number("value") / TIME[entry.choice("unit", list(TIME), "s")]
+    return entry.bounded("value", value, _LONGEST_DELAY)
 
 
 def _mount(stream: Entry) -> Mount | None:
@@ -186,6 +191,7 @@ def parse_pose(entry: Entry, *more: str) -> tuple[Rotation | None, Array | None]
     position = None
     if "position" in entry:
         position = entry.numbers("position", 3) * LENGTH[entry.choice("unit", list(LENGTH), "m")]
+        entry.bounded("position", float(np.abs(position).max()), _FURTHEST)
     return (_fixed_rotation(entry) if "rotation" in entry else None), position
 
 

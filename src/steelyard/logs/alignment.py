@@ -259,15 +259,17 @@ def _clocks(given: _Prepared, time: Array, wrench: Array) -> tuple[Clocks, tuple
     clocks = refine(question, {**given.known, **scan(question)})
     clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
     least = given.options.smallest_delay_s
-    late = tuple(n for n in given.unknown if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
-    if len(late) < len(given.unknown):
-        none = {n: 0.0 for n in given.unknown if n not in late}
+    late = given.unknown
+    while True:
+        # A delay must stay significant in the fit that is told of in the end.
+        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
+        if sure == late:
+            return clocks, late
+        late, none = sure, {n: 0.0 for n in given.unknown if n not in sure}
         fixed = replace(question, unknown=late, known={**given.known, **none}, _cache={})
         again = refine(fixed, {**clocks.delays_s, **none})
         found = _with_interpolation(given, again.delays_std_s)
-        spread = {**clocks.delays_std_s, **{n: found[n] for n in late}}
-        clocks = replace(again, delays_std_s=spread)
-    return clocks, late
+        clocks = replace(again, delays_std_s={**clocks.delays_std_s, **{n: found[n] for n in late}})
 
 
 def _with_interpolation(given: _Prepared, stds: Mapping[str, float]) -> dict[str, float]:

@@ -39,6 +39,7 @@ class Mounting:
     bias          (3,) [m/s^2] in its own axes
     scale         what its numbers must be multiplied with to agree with gravity
     rotation_std, position_std, bias_std   (3,) [rad, m, m/s^2]; zero where given
+    scale_std     of the scale; zero where it was not sought
     """
 
     rotation: Rotation
@@ -48,6 +49,7 @@ class Mounting:
     rotation_std: Array | None = None
     position_std: Array | None = None
     bias_std: Array | None = None
+    scale_std: float = 0.0
 
     def at_sensor(self, specific_force: Array, omega: Array, alpha: Array) -> Array:
         """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning

@@ -16,6 +16,8 @@ from steelyard.spatial import Rotation
 _BLOCKS = 20
 _ROUNDS = 4
 _STEPS = 12
+# One scale serves all axes of an accelerometer, whose gains differ by about this much whatever the log shows.
+_GAIN = 0.003
 _PRIOR = {"delay": 0.1, "rotation": 0.5, "position": 0.3, "bias": 1.0, "scale": 0.01, "centre": 0.5}
 _PRIOR_BODY = np.array([30.0, 3, 3, 3, 0.3, 0.3, 0.3, 0.3, 0.3, 0.3])
 _STEP = 1e-4
@@ -134,6 +136,7 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
             rotation_std=layout.get(std, "rotation", np.zeros(3)),
             position_std=layout.get(std, "position", np.zeros(3)),
             bias_std=layout.get(std, "bias", np.zeros(3)),
+            scale_std=max(float(layout.get(std, "scale", np.zeros(1))[0]), _GAIN) if "scale" in layout.slices else 0.0,
         )
     return Clocks(found, spread, mounting, theta[layout.slices["body"]], residual)
 

@@ -67,10 +67,9 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     recording, before = examine(recording)
     aligned, level = _levelled(align(recording), recording, options)
     bias = Bias(options.bias, drift=options.drift)
-    keep, touched = untouched(aligned.log, bias.free)
-    log, unmeasured = _with_known_acceleration(aligned.log.rows(keep), aligned)
-    touched = () if unmeasured else touched
-    log = with_declared(log, recording.noise)
+    log, unmeasured = _with_known_acceleration(aligned.log, aligned)
+    keep, touched = (slice(None), ()) if unmeasured else untouched(log, bias.free)
+    log = with_declared(log.rows(keep), recording.noise)
     estimator, notes = _estimator(options, log, bias)
     estimate = estimator.identify(log)
     late = after(log, estimate, aligned, recording)
@@ -84,7 +83,7 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     notes = (*notes, *level, *unmeasured)
     return _in_recording_sign(
         replace(
-            estimate.with_findings(*before, *aligned.findings, *touched, *late),
+            _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late),
             delays_s=dict(aligned.delays_s),
             notes=(*notes, *aligned.notes, *estimate.notes),
         ),
@@ -120,6 +119,18 @@ def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLo
         return at_rest, ("no stream measures the acceleration: only the rows at rest were used",)
     quiet = None if log.noise is None else tuple(Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) for n in log.noise)
     return replace(log, noise=quiet), ("no stream measures the acceleration: it was taken as zero throughout",)
+
+
+def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
+    """Return the estimate with the gain error of the accelerometer that alone measured a - g, where there was one.
+
+    f = m (a - g): a reading too small by a share makes mass and first moment too large by the same share.
+    """
+    if aligned.acceleration_from != "specific_force":
+        return estimate
+    share = max((m.scale_std for m in aligned.mounts.values()), default=0.0)
+    slope = np.concatenate([estimate.parameters.vector[:4], np.zeros(6)])
+    return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))
 
 
 def _estimator(

@@ -1,0 +1,58 @@
+"""The twenty families by name, and what the published tools weigh and are made of.
+
+Source: "The Sum of Its Parts", Table II.
+"""
+
+from __future__ import annotations
+
+import zlib
+from collections.abc import Callable, Mapping
+from types import MappingProxyType
+
+import numpy as np
+
+from steelyard.errors import BadValue
+from steelyard.workshop import calipers, clamps, drivers, hammers, locking, plain, pliers, saws, wrenches
+from steelyard.workshop.draw import Draw
+from steelyard.workshop.tools import Tool
+
+FAMILIES: Mapping[str, Callable[[Draw], Tool]] = MappingProxyType({
+    "allen-key": plain.allen_key,
+    "box-wrench": plain.box_wrench,
+    "measuring-tape": plain.measuring_tape,
+    "ruler": plain.ruler,
+    "screwdriver": drivers.screwdriver,
+    "nut-screwdriver": drivers.nut_screwdriver,
+    "rubber-mallet": hammers.rubber_mallet,
+    "bent-jaw-pliers": pliers.bent_jaw_pliers,
+    "machinist-hammer": hammers.machinist_hammer,
+    "pliers": pliers.pliers,
+    "c-clamp": clamps.c_clamp,
+    "adjustable-wrench": wrenches.adjustable_wrench,
+    "hammer": hammers.hammer,
+    "file": drivers.file,
+    "socket-wrench": wrenches.socket_wrench,
+    "hacksaw": saws.hacksaw,
+    "clamp": clamps.clamp,
+    "vise-grip": locking.vise_grip,
+    "electronic-caliper": calipers.electronic_caliper,
+    "vise-clamp": clamps.vise_clamp,
+})  # fmt: skip
+
+# Mass [kg] and number of parts of the published tools.
+TABLE_II: Mapping[str, tuple[float, int]] = MappingProxyType({
+    "allen-key": (0.128, 1), "box-wrench": (0.206, 1), "measuring-tape": (0.136, 1), "ruler": (0.009, 1),
+    "screwdriver": (0.030, 2), "nut-screwdriver": (0.081, 2), "rubber-mallet": (0.237, 2),
+    "bent-jaw-pliers": (0.255, 3), "machinist-hammer": (0.133, 2), "pliers": (0.633, 3), "c-clamp": (0.598, 5),
+    "adjustable-wrench": (0.719, 4), "hammer": (0.690, 3), "file": (0.020, 3), "socket-wrench": (0.356, 5),
+    "hacksaw": (0.658, 7), "clamp": (0.340, 7), "vise-grip": (0.387, 8), "electronic-caliper": (0.174, 14),
+    "vise-clamp": (0.225, 9),
+})  # fmt: skip
+
+
+def build(name: str, seed: int | None = None) -> Tool:
+    """Return a tool of the family `name`: the nominal one, or the variant of that seed."""
+    if name not in FAMILIES:
+        raise BadValue(f"There is no tool '{name}'; there are: {', '.join(FAMILIES)}.")
+    rng = None if seed is None else np.random.default_rng([seed, zlib.crc32(name.encode())])
+    return FAMILIES[name](Draw(rng))
