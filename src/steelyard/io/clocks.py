@@ -14,7 +14,8 @@ from steelyard.errors import BadValue
 from steelyard.io.channels import require_finite
 
 # [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
-_CLOSEST, _FURTHEST = 2e-6, 3600.0
+_CLOSEST, _FURTHEST = 1e-7, 3600.0
+_FEW_STEPS = 10
 _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them to a nanosecond
 
 
@@ -44,7 +45,7 @@ class Clock:
                 f"{self.where}: time stands still at {self.stamps[0]} in all {len(self.stamps)} rows. "
                 "Name the column of the clock, or give time = { rate = .. }."
             )
-        if len(steps):
+        if len(steps) > _FEW_STEPS:
             require_likely_step(float(np.median(steps)) / self.per_second or _CLOSEST, self.where)
 
     def seconds_after(self, origin: int) -> Array:

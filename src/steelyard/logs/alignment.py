@@ -227,6 +227,7 @@ def _rows(given: _Prepared) -> tuple[Array, Array]:
     every = 1
     if given.cutoff is not None:
         every = max(int(sampling_rate(given.clock) / (2.5 * given.cutoff)), 1)
+        every = min(every, len(given.clock))
     time = given.clock[every // 2 :: every]
     spans = list(given.spans().values())
     start = max((s for s, _ in spans), default=float(time[0]))
