@@ -33,7 +33,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "shape": {"inertia", "spatial"},
     "parts": {"shape", "inertia", "spatial"},
     "robots": {"spatial"},
-    "identify": {"parts.parts", "logs", "inertia", "spatial"},
+    "identify": {"parts.parts", "parts.material", "logs", "inertia", "spatial"},
     "team": {"identify.estimate", "identify.evidence", "identify.regressor", "logs", "inertia", "spatial"},
     "sanity": {"identify", "logs", "inertia", "spatial"},
     "excite": {"robots", "identify", "logs"},
