@@ -56,7 +56,7 @@ Solver = Callable[[Problem], Solution]
 
 
 @contextmanager
-def _within_numbers() -> Iterator[None]:
+def within_numbers() -> Iterator[None]:
     """Turn a breakdown of the linear algebra into CannotAnswer: only rows that hold no body at all lead there."""
     try:
         with np.errstate(all="ignore"):
@@ -68,14 +68,14 @@ def _within_numbers() -> Iterator[None]:
         ) from None
 
 
-@_within_numbers()
+@within_numbers()
 def fit_moments(moments: Moments, bias: Bias, solver: Solver, method: str) -> Estimate:
     """Return the estimate from a statistic that carries its noise."""
     problem = replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
     return conclude(problem, solver(problem), method)
 
 
-@_within_numbers()
+@within_numbers()
 def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest: bool = False) -> Estimate:
     """Return the estimate of a log; noise that it does not declare is estimated, time order widens the error bars.
 

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.identify.linear import reweighted
 from steelyard.identify.regressor import design, residual_map
 from steelyard.identify.rest import RIPPLE
-from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 
 # Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
@@ -25,6 +25,8 @@ LEAST_SHARE = 0.02
 QUIETEST = 0.25
 # Start of the iteration: force in N and torque in N m of an everyday wrist sensor.
 FIRST_GUESS = np.repeat(np.square([0.02, 0.5]), 3)
+# Of a channel that does not measure.
+DEAF = np.repeat(np.square([1e2, 1e3]), 3)
 SMALLEST = np.repeat(np.square([1e-7, 1e-6]), 3)
 
 
@@ -105,6 +107,13 @@ def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
         for n in log.noise or ()
     )
     return replace(log, noise=noise)
+
+
+def without_dead(log: MotionLog, dead: Mask) -> MotionLog:
+    """Return the log with so much noise on the wrench channels `dead` (6,) [tau, f] that they say nothing."""
+    if log.noise is None or not dead.any():
+        return log
+    return replace(log, noise=tuple(Noise(n.acceleration, np.where(dead, DEAF, n.wrench)) for n in log.noise))
 
 
 def _declared(variance: Array, declared: Mapping[str, float], names: tuple[str, str]) -> Array:

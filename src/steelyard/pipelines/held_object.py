@@ -14,17 +14,17 @@ import numpy as np
 
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias
+from steelyard.identify.fit import Bias, within_numbers
 from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.noise_aware import NoiseAware
-from steelyard.identify.noise_levels import with_declared
+from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.identify.rest import RIPPLE
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import Recording
-from steelyard.sanity import after, examine, fitted_gravity, levelled, untouched
+from steelyard.sanity import after, dead_channels, examine, fitted_gravity, levelled, untouched
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # A ball's radius of gyration per axis is its diameter times this.
@@ -57,6 +57,7 @@ class Options:
             raise BadValue(f"object_size must be 0.005 to 5 m; got {self.object_size}.")
 
 
+@within_numbers()
 def identify(recording: Recording, options: Options = Options(), tool: Recording | Estimate | None = None) -> Estimate:
     """Return mass, centre of mass and inertia of what the robot holds, in the frame of the sensor.
 
@@ -69,7 +70,7 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     bias = Bias(options.bias, drift=options.drift)
     log, unmeasured = _with_known_acceleration(aligned.log, aligned)
     keep, touched = (slice(None), ()) if unmeasured else untouched(log, bias.free)
-    log = with_declared(log.rows(keep), recording.noise)
+    log = without_dead(with_declared(log.rows(keep), recording.noise), dead_channels(recording))
     estimator, notes = _estimator(options, log, bias)
     estimate = estimator.identify(log)
     late = after(log, estimate, aligned, recording)

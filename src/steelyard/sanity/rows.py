@@ -83,12 +83,12 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     for quantity in (q for q in _NOISY if q in stream.channels):
         values = stream.channels[quantity]
         same = values[1:] == values[:-1]
-        lively = (same.mean(0) < 0.3) & (_noise_shares(values) > NOISE_SHARE)
+        dead = _dead(values)
         for axis in range(3):
             name = f"{quantity} {'xyz'[axis]}"
             others = np.delete(np.arange(3), axis)
             rows = _frozen_rows(values[:, axis], stream.time) & ~frozen
-            if (values[:, axis] == values[0, axis]).all() and lively[others].any():
+            if dead[axis]:
                 found.append(_stuck(stream, name, "does not change at all while its neighbours do"))
             elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
                 found.append(
@@ -98,6 +98,29 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     if frozen.mean() > 0.7:
         frozen[:] = False
     return _kept(stream, ~frozen) if frozen.any() else stream, tuple(found)
+
+
+def dead_channels(recording: Recording) -> Mask:
+    """Return which channels (6,) [tau, f] of the wrench never change while their neighbours do.
+
+    Where the wrench is not given in the axes of S, a dead channel is none of the six, and none is returned.
+    """
+    dead = np.zeros(6, np.bool_)
+    for stream in (s for s in recording.streams if "force" in s.channels and s.time is not None):
+        turned = stream.mount is not None and stream.mount.rotation is not None
+        if turned or len(stream) < 4 * FROZEN_ROWS:
+            continue
+        for k, quantity in enumerate(("torque", "force")):
+            if quantity in stream.channels and stream.frames.get(quantity, "S") == "S":
+                dead[3 * k : 3 * k + 3] = _dead(stream.channels[quantity])
+    return dead
+
+
+def _dead(values: Array) -> Mask:
+    """Return which of three channels (N, 3) never change while one beside them carries noise."""
+    same = (values[1:] == values[:-1]).mean(0)
+    lively = (same < 0.3) & (_noise_shares(values) > NOISE_SHARE)
+    return np.asarray((values == values[0]).all(0) & lively.any())
 
 
 def _hung_rows(stream: Stream) -> Mask:
@@ -240,7 +263,7 @@ def _clipped_rows(column: Array, extreme: float) -> Mask:
 
 
 def _stuck(stream: Stream, name: str, what: str) -> Finding:
-    left_out = "" if "at all" in what else "; these rows were left out"
+    left_out = "; it was not used" if "at all" in what else "; these rows were left out"
     return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}{left_out}.")
 
 

@@ -1,0 +1,47 @@
+"""A wrench channel that does not measure is named and says nothing: the answer is that of the other five."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from synthetic import Kind, write
+
+from steelyard.io import read_recording
+from steelyard.logs.recording import Mount, Recording, Stream
+from steelyard.pipelines.held_object import identify
+from steelyard.sanity import dead_channels
+from steelyard.spatial import Rotation
+
+
+@pytest.fixture(scope="module")
+def recording(tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    return read_recording(write(tmp_path_factory.mktemp("log"), Kind()))
+
+
+def with_dead(recording: Recording, quantity: str, axis: int) -> Recording:
+    def dead(stream: Stream) -> Stream:
+        values = stream.channels[quantity].copy()
+        values[:, axis] = values[0, axis]
+        return replace(stream, channels={**stream.channels, quantity: values})
+
+    return replace(recording, streams=tuple(dead(s) if "force" in s.channels else s for s in recording.streams))
+
+
+@pytest.mark.parametrize(("quantity", "axis"), [("force", 0), ("force", 2), ("torque", 1)])
+def test_the_others_answer(quantity: str, axis: int, recording: Recording) -> None:
+    whole, five = identify(recording), identify(with_dead(recording, quantity, axis))
+    assert "channel-stuck" in [f.code for f in five.findings]
+    std = np.hypot(whole.std[:4], five.std[:4])
+    gap = np.append(five.mass - whole.mass, five.com - whole.com)
+    assert (np.abs(gap) < 4 * std).all()
+    assert five.std[0] < 0.02 * whole.mass
+
+
+def test_only_channels_of_the_sensor_itself_are_dead(recording: Recording) -> None:
+    assert not dead_channels(recording).any()
+    dead = with_dead(recording, "force", 1)
+    assert dead_channels(dead).tolist() == [False, False, False, False, True, False]
+    turned = tuple(replace(s, mount=Mount(Rotation.exp([0.1, 0.2, 0.3]))) for s in dead.streams)
+    assert not dead_channels(replace(dead, streams=turned)).any()
