@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numba
 import numpy as np
@@ -18,6 +17,7 @@ from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equati
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
+from steelyard.logs.log import Mask
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of
 # the mass, of the radius of gyration, and of half the trace of the inertia about the centre of mass.
@@ -131,9 +131,22 @@ class Sight:
     sizes: Array
 
     @property
-    def identified(self) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    def identified(self) -> Mask:
         """Which of the ten the data fix."""
-        return np.asarray(self.std < np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6]) * self.sizes)
+        return identified(self.std, self.sizes)
+
+
+def natural_sizes(phi: Array) -> Array:
+    """Return (10,) mass [kg], radius of gyration [m] for com x y z, half the trace of the inertia about it."""
+    mass = max(abs(float(phi[0])), 1e-6)
+    trace = abs(float(phi[4] + phi[7] + phi[9]) / 2 - float(phi[1:4] @ phi[1:4]) / mass)
+    radius = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    return np.repeat([mass, radius, max(trace, mass * SMALLEST_RADIUS**2)], [1, 3, 6])
+
+
+def identified(std: Array, sizes: Array) -> Mask:
+    """Return which of mass, com and inertia about the CoM (10,) have standard deviations small beside their sizes."""
+    return np.asarray(std < np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6]) * sizes)
 
 
 def _sight(H: Array, V: Array, phi: Array) -> Sight:
@@ -141,9 +154,8 @@ def _sight(H: Array, V: Array, phi: Array) -> Sight:
 
     In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
     """
-    mass = max(abs(float(phi[0])), 1e-6)
-    trace = abs(float(phi[4] + phi[7] + phi[9]) / 2 - float(phi[1:4] @ phi[1:4]) / mass)
-    radius = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    sizes = natural_sizes(phi)
+    mass, radius = sizes[:2]
     natural = mass * np.repeat([1.0, radius, radius**2], [1, 3, 6])
     F, G = _without_bias(H, V)
     values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
@@ -154,7 +166,6 @@ def _sight(H: Array, V: Array, phi: Array) -> Sight:
     hidden = values < max(OPEN, UNSEEN * float(values[-1]))
     bread = (directions[:, ~hidden] / values[~hidden]) @ vectors[:, ~hidden].T * natural
     variance = ((bread @ G) * bread).sum(1)
-    sizes = np.repeat([mass, radius, max(trace, mass * SMALLEST_RADIUS**2)], [1, 3, 6])
     open_end = (directions[:, hidden] ** 2).sum(1) / OPEN
     std = np.sqrt(np.maximum(variance, 0) + open_end)
     std[open_end > sizes**2] = np.inf
@@ -178,7 +189,7 @@ def _require_answer(sight: Sight, problem: Problem) -> None:
         raise _lost(lost, problem)
 
 
-def _lost(lost: np.ndarray[Any, np.dtype[np.bool_]], problem: Problem) -> CannotAnswer:
+def _lost(lost: Mask, problem: Problem) -> CannotAnswer:
     """Return the error that names which of mass, com x y z (4,) are lost, and what to add."""
     names = (
         "the mass",

@@ -10,9 +10,11 @@ from scipy.special import gammaincc
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
+from steelyard.identify.conclude import identified, natural_sizes
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import BiasPrior
 from steelyard.inertia import InertialParameters
+from steelyard.logs.log import Mask
 
 # Two runs whose biases differ with a probability below this do not share one.
 SAME_BIAS = 1e-4
@@ -54,13 +56,25 @@ def without_tool(load: Estimate, tool: Estimate, shared: bool) -> Estimate:
     message = (
         f"A tool of {tool.mass:.4g} kg was taken away from a load of {load.mass:.4g} kg; the rest is the object alone."
     )
-    return replace(
+    rest = replace(
         load,
         parameters=InertialParameters(body),
         covariance=0.5 * (covariance + covariance.T),
-        identified=load.identified & tool.identified,
         notes=(*load.notes, message),
     )
+    return _own(rest, load.identified & tool.identified)
+
+
+def _own(rest: Estimate, known: Mask) -> Estimate:
+    """Return what is left with only that called identified which is so for its own size, not for that of the load."""
+    fixed = known & identified(rest.std, natural_sizes(rest.parameters.vector))
+    names = ("xx", "xy", "xz", "yy", "yz", "zz")
+    lost = [n for n, was, now in zip(names, known[4:], fixed[4:], strict=True) if was and not now]
+    rest = replace(rest, identified=fixed)
+    if not lost:
+        return rest
+    message = f"The inertia entries {', '.join(lost)} of the object are lost in the error bars of load and tool."
+    return rest.with_findings(Finding.of("inertia-not-identified", message))
 
 
 def different_bias(p: float) -> Finding:
