@@ -22,6 +22,7 @@ VERBS: dict[str, tuple[str, str]] = {
         "steelyard.cli.doctor:doctor",
         "Versions, what is installed, a tiny identification with a known answer.",
     ),
+    "workshop": ("steelyard.cli.workshop:workshop", "Twenty workshop tools as object folders with exact truth."),
     "bench": ("steelyard.cli.bench:bench", "Every number that the README claims, made again."),
 }
 

@@ -17,25 +17,13 @@ from steelyard.inertia import InertialParameters
 from steelyard.io.array_table import ArrayTable
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
-from steelyard.parts.known import Cloud, KnownObject, Track
+from steelyard.parts.known import MOTION, Cloud, KnownObject, Track, unseen_finding
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import overlap_finding
 from steelyard.spatial import Pose
 
 FILES = ("mesh.ply", "points.npz", "motion.npz", "truth.json")
-MOTION = {
-    "time": "time",
-    "rotation": "rotation_world_from_sensor",
-    "position": "position_world",
-    "velocity": "linear_velocity_sensor",
-    "angular_velocity": "angular_velocity_sensor",
-    "acceleration": "linear_acceleration_sensor",
-    "angular_acceleration": "angular_acceleration_sensor",
-    "gravity": "gravity_sensor",
-    "force": "force_sensor",
-    "torque": "torque_sensor",
-}
 # The published folders keep the physical wrench (gravity down) beside one in a world whose gravity points up.
 _DOWN = {"gravity": "gravity_sensor_down", "force": "force_sensor_gdown", "torque": "torque_sensor_gdown"}
 _DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
@@ -70,7 +58,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
     overlapping: Finding | None = _value(folder / "mesh.ply", lambda: overlap_finding(mesh))
     cloud = _cloud(folder / "points.npz", mesh)
     X_OS = _value(folder / "truth.json", lambda: Pose.from_matrix(facts["T_mesh_from_grasp"]))
-    unseen = _unseen(parts, cloud)
+    unseen = unseen_finding(parts, cloud)
     return KnownObject(
         name=str(facts.get("slug", folder.resolve().name)),
         mesh=mesh,
@@ -82,6 +70,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
         cloud=cloud,
         box=np.asarray(facts["reference_extents_sensor_m"], float),
         track=_track(folder / "motion.npz") if motion else None,
+        part_names=_names(facts, parts),
         facts=facts,
         findings=tuple(finding for finding in (overlapping, unseen) if finding),
     )
@@ -135,6 +124,12 @@ def _rows(facts: dict[str, Any], parts: Parts) -> list[dict[str, Any]]:
     return [said.get(label, {}) for label in parts.label.tolist()]
 
 
+def _names(facts: dict[str, Any], parts: Parts) -> tuple[str, ...]:
+    """Return the name of each part where all have one."""
+    names = tuple(str(row.get("name", "")) for row in _rows(facts, parts))
+    return names if all(names) else ()
+
+
 def _masses(path: Path, facts: dict[str, Any], parts: Parts) -> Array | None:
     """Return the true mass (P,) of each part where all are known."""
     masses = [row.get("mass_kg", row.get("mass_fitted_kg")) for row in _rows(facts, parts)]
@@ -156,21 +151,10 @@ def _cloud(path: Path, mesh: TriangleMesh) -> Cloud:
     return cloud
 
 
-def _unseen(parts: Parts, cloud: Cloud) -> Finding | None:
-    """Return the finding about parts on which no point lies."""
-    missing = np.setdiff1d(parts.label, cloud.label)
-    if not len(missing):
-        return None
-    named = ", ".join(map(str, missing))
-    return Finding.of(
-        "part-unseen", f"No point of the cloud lies on part {named}: it is hidden or too small to be seen."
-    )
-
-
 def _track(path: Path) -> Track:
     """Return the exact motion with the physical wrench."""
     down = set(_DOWN.values()) <= set(ArrayTable.open(path).header.groups)
-    names = MOTION | _DOWN if down else MOTION
+    names = {**MOTION, **(_DOWN if down else {})}
     arrays = _arrays(path, tuple(names.values()))
     return _value(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))  # type: ignore[no-any-return]
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from types import MappingProxyType
 from typing import Any
 
 import numpy as np
@@ -46,6 +47,21 @@ class Cloud:
         return len(self.xyz)
 
 
+# Column of Track -> its name in motion.npz.
+MOTION: Mapping[str, str] = MappingProxyType({
+    "time": "time",
+    "rotation": "rotation_world_from_sensor",
+    "position": "position_world",
+    "velocity": "linear_velocity_sensor",
+    "angular_velocity": "angular_velocity_sensor",
+    "acceleration": "linear_acceleration_sensor",
+    "angular_acceleration": "angular_acceleration_sensor",
+    "gravity": "gravity_sensor",
+    "force": "force_sensor",
+    "torque": "torque_sensor",
+})  # fmt: skip
+
+
 @dataclass(frozen=True, eq=False)
 class Track:
     """An exact motion of the sensor frame S with the object in it, N rows; vectors in S axes at that instant.
@@ -85,6 +101,15 @@ class Track:
             if found != rows:
                 raise BadValue(f"every column of a motion needs {rows[0]} rows; {name} has {found[0]}.")
 
+    @classmethod
+    def from_columns(cls, columns: Mapping[str, Array]) -> Track:
+        """Return the motion of columns named as in motion.npz."""
+        return cls(**{field: columns[name] for field, name in MOTION.items()})
+
+    def columns(self) -> dict[str, Array]:
+        """Return the columns under their names in motion.npz."""
+        return {name: getattr(self, field) for field, name in MOTION.items()}
+
     def __len__(self) -> int:
         return len(self.time)
 
@@ -103,6 +128,7 @@ class KnownObject:
     cloud          points of the visible surface in O
     box            (3,) edges of the object's box along the axes of S, for size-based errors [m]
     track          its exact motion, None where there is none
+    part_names     (P,) what each part is; empty where nothing says
     facts          further entries of the file, as they stand there
     findings       what a reader must know about the files
     """
@@ -117,6 +143,7 @@ class KnownObject:
     cloud: Cloud
     box: Array
     track: Track | None = None
+    part_names: tuple[str, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 
@@ -128,6 +155,26 @@ class KnownObject:
     @property
     def half(self) -> str:
         """Whether uniform density would put the centre of mass within 0.5 mm of the truth: "uniform" or "mixed"."""
+        return "uniform" if self.uniform_offset < 0.5e-3 else "mixed"
+
+    @property
+    def uniform_offset(self) -> float:
+        """How far from the truth uniform density would put the centre of mass [m]."""
         uniform = self.parts_in_sensor.moments.sum(0)
-        offset = np.linalg.norm(uniform[1:4] / uniform[0] - self.truth.com)
-        return "uniform" if offset < 0.5e-3 else "mixed"
+        return float(np.linalg.norm(uniform[1:4] / uniform[0] - self.truth.com))
+
+
+def unseen_finding(parts: Parts, cloud: Cloud) -> Finding | None:
+    """Return the finding `part-unseen` about parts on which no point lies, else None."""
+    missing = np.setdiff1d(parts.label, cloud.label)
+    if not len(missing):
+        return None
+    named = ", ".join(map(str, missing))
+    return Finding.of(
+        "part-unseen", f"No point of the cloud lies on part {named}: it is hidden or too small to be seen."
+    )
+
+
+def box_in_sensor(cloud: Cloud, X_SO: Pose) -> Array:
+    """Return the edges (3,) of the cloud's box in O, turned into S and made positive [m], as the paper's metrics do."""
+    return np.asarray(np.abs(X_SO.rotation.apply(np.ptp(cloud.xyz, axis=0))))

@@ -102,7 +102,7 @@ def overlaps(mesh: TriangleMesh) -> tuple[Overlap, ...]:
     """
     solids = solids_of(mesh)
     whole = float(solids.moments[:, 0].sum())
-    bodies = [_body(mesh, [k, *solids.void[solids.parent == k].tolist()]) for k in solids.label.tolist()]
+    bodies = [body_of(mesh, [k, *solids.void[solids.parent == k].tolist()]) for k in solids.label.tolist()]
     found = []
     for i, j in zip(*np.triu_indices(len(bodies), 1), strict=True):
         if _apart(bodies[i], bodies[j]):
@@ -133,7 +133,7 @@ def _apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> bool:
     return bool((box_a[0] > box_b[1]).any() or (box_b[0] > box_a[1]).any())
 
 
-def _body(mesh: TriangleMesh, labels: list[int]) -> manifold3d.Manifold:
+def body_of(mesh: TriangleMesh, labels: list[int]) -> manifold3d.Manifold:
     """Return the parts as one body for set operations."""
     chosen = np.isin(mesh.part, labels)
     used, corners = np.unique(mesh.triangles[chosen], return_inverse=True)

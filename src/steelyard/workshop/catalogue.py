@@ -6,7 +6,7 @@ Source: "The Sum of Its Parts", Table II.
 from __future__ import annotations
 
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from types import MappingProxyType
 
 import numpy as np
@@ -50,9 +50,12 @@ TABLE_II: Mapping[str, tuple[float, int]] = MappingProxyType({
 })  # fmt: skip
 
 
-def build(name: str, seed: int | None = None) -> Tool:
-    """Return a tool of the family `name`: the nominal one, or the variant of that seed."""
+def build(name: str, seed: int | Sequence[int] | None = None) -> Tool:
+    """Return a tool of the family `name`: the nominal one, or the variant of that seed.
+
+    Raises BadValue where there is no such family.
+    """
     if name not in FAMILIES:
         raise BadValue(f"There is no tool '{name}'; there are: {', '.join(FAMILIES)}.")
-    rng = None if seed is None else np.random.default_rng([seed, zlib.crc32(name.encode())])
+    rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(name.encode())])
     return FAMILIES[name](Draw(rng))

@@ -53,7 +53,7 @@ def screwdriver(draw: Draw) -> Tool:
 
 def nut_screwdriver(draw: Draw) -> Tool:
     """Return a nut driver: a hollow shaft with a hexagonal mouth, its end hidden in the handle."""
-    radius, handle, shaft, mouth = draw.sizes(12.2, 100, 95, 8.0)
+    radius, handle, shaft, mouth = draw.sizes(11.6, 94, 92, 7.0)
     tip, wall = handle + shaft, 0.72 * mouth + 0.4
     outside = lathe([
         (0.56 * mouth, 0.45 * handle), (0.56 * mouth, tip - 22), (wall, tip - 18), (wall, tip),
@@ -78,10 +78,7 @@ def file(draw: Draw) -> Tool:
         block((-0.45 * width, 0.45 * width), (0, 0.6 * thick), (end - 30, end - 29)),
         block((-0.2 * width, 0.2 * width), (0, 0.7 * thick), (end - 2, end)),
     )
-    teeth = [
-        block((-width, width), (-1, 0.14), (z, z + 0.7)).rotate([0, 0, 0])
-        for z in np.arange(handle + 12, end - 4, 1.8)
-    ]
+    teeth = [block((-width, width), (-1, 0.14), (z, z + 0.7)) for z in np.arange(handle + 12, end - 4, 1.8)]
     tang = hull(
         block((-0.25 * width, 0.25 * width), (0.2, thick), (handle + 2, handle + 4)),
         block((-1, 1), (0.5, thick - 0.5), (0.45 * handle, 0.45 * handle + 1)),

@@ -6,18 +6,18 @@ import numpy as np
 
 from steelyard.workshop.draw import Draw
 from steelyard.workshop.materials import ALLOY_STEEL, ALUMINIUM, BLACK_OXIDE_STEEL, CARBON_STEEL, STAINLESS_STEEL, ZINC
-from steelyard.workshop.solids import block, elbow, hexagon, lathe, limb, prism, ring, rod, rounded, union
+from steelyard.workshop.solids import Solid, block, elbow, hexagon, limb, prism, ring, rod, rounded, union
 from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
 
 
 def allen_key(draw: Draw) -> Tool:
     """Return an L of hexagonal bar; the long arm lies along y."""
-    across, long, short = draw.sizes(9.6, 165, 34)
+    across, long, short = draw.sizes(9.4, 152, 32)
     bend = 1.8 * across
     arm = hexagon(across, -long, 0).rotate([0, 90, 0]).rotate([0, 0, 90])  # along -y, flats across x
     foot = hexagon(across, -short, 0).rotate([0, 90, 0])
     solid = union([
-        elbow(across, bend), arm.translate([bend, 0, 0]), foot.rotate([0, 0, 0]).translate([0, bend, 0]),
+        elbow(across, bend), arm.translate([bend, 0, 0]), foot.translate([0, bend, 0]),
     ])  # fmt: skip
     piece = Piece("key", solid, draw.pick(ALLOY_STEEL, BLACK_OXIDE_STEEL), (58, 59, 64))
     return make_tool("allen-key", [piece], Grasp((bend, -0.75 * long, 0), "y", "z"), draw)
@@ -32,7 +32,7 @@ def box_wrench(draw: Draw) -> Tool:
         rod(small, -thick / 2, thick / 2 - 1).translate([length, 0, 1.5]),
     ]
     openings = [
-        _twelve_points(0.6 * large).translate([0, 0, 0]),
+        _twelve_points(0.6 * large),
         _twelve_points(0.6 * small).translate([length, 0, 0]),
     ]
     solid = union([shank, *heads]) - union(openings)
@@ -40,7 +40,7 @@ def box_wrench(draw: Draw) -> Tool:
     return make_tool("box-wrench", [piece], Grasp((0.4 * length, 0, 0), "x", "z"), draw, finish="shaded")
 
 
-def _twelve_points(radius: float) -> object:
+def _twelve_points(radius: float) -> Solid:
     angles = np.pi / 12 * np.arange(24)
     radii = np.where(np.arange(24) % 2, 0.9 * radius, radius)
     return prism([(r * np.cos(a), r * np.sin(a)) for r, a in zip(radii, angles, strict=True)], -20, 20)
@@ -48,7 +48,7 @@ def _twelve_points(radius: float) -> object:
 
 def measuring_tape(draw: Draw) -> Tool:
     """Return a tape measure: a hollow case with a hub inside, a thumb lock and the hooked end of the blade."""
-    width, height, depth, wall = draw.sizes(62, 56, 25, 1.75, spread=0.08)
+    width, height, depth, wall = draw.sizes(61, 54, 24, 1.3, spread=0.08)
     outer = union([
         rounded((0, width), (0, height), (0, depth), 16),
         block((width - 22, width), (0, 18), (0, depth)),
@@ -56,13 +56,13 @@ def measuring_tape(draw: Draw) -> Tool:
     inner = rounded((wall, width - wall), (wall, height - wall), (wall, depth - wall), 15) - rod(9, -1, 50).translate(
         [width / 2, height / 2, 0]
     )
-    mouth = rod(3.5, 0, depth).rotate([0, 0, 0]).translate([width - 4, height + 0.5, 0])
+    mouth = rod(3.5, 0, depth).translate([width - 4, height + 0.5, 0])
     lock = rounded((0.55 * width, 0.85 * width), (height - 3, height + 2.5), (0.3 * depth, 0.7 * depth), 2)
     blade = block((width - 0.2, width + 7), (1, 2.0), (0.2 * depth, 0.8 * depth))
     hook = block((width + 6, width + 7.2), (-6, 2.0), (0.2 * depth, 0.8 * depth))
     rim = ring(0.34 * height, 0.30 * height, depth - 0.1, depth + 0.8).translate([width / 2 - 4, height / 2, 0])
     solid = union([outer - inner, lock, blade, hook, rim]) - mouth
-    piece = Piece("case", solid, draw.pick(ZINC, ZINC, ALUMINIUM) if draw.rng else ZINC, (240, 190, 24))
+    piece = Piece("case", solid, ZINC, (240, 190, 24))
     return make_tool("measuring-tape", [piece], Grasp((width / 2, height / 2, depth / 2), "x", "y"), draw)
 
 
@@ -78,6 +78,3 @@ def ruler(draw: Draw) -> Tool:
     ]
     piece = Piece("ruler", blade - hole - union(marks), draw.pick(ALUMINIUM, STAINLESS_STEEL))
     return make_tool("ruler", [piece], Grasp((0.15 * length, width / 2, thick / 2), "x", "z"), draw)
-
-
-__all__ = ["allen_key", "box_wrench", "lathe", "measuring_tape", "ruler"]

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from steelyard.workshop.draw import Draw
 from steelyard.workshop.materials import ALLOY_STEEL, BLACK_OXIDE_STEEL, BRASS, CARBON_STEEL, STAINLESS_STEEL
-from steelyard.workshop.solids import Solid, block, limb, rod, union
+from steelyard.workshop.solids import Solid, block, limb, rod, smooth, union
 from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
 
 Station = tuple[float, float, float, float, float]  # x, y, radius, low, high
@@ -31,7 +31,7 @@ def scaled(stations: list[Station], factor: float) -> list[Station]:
 
 
 def bent_jaw_pliers(draw: Draw) -> Tool:
-    """Return long-nose pliers whose jaws bend out of the plane, with a brass rivet."""
+    """Return long-nose pliers whose jaws bend out of the plane, in one colour."""
     k, nose, spread = draw.scale(0.08), draw.size(62, 0.12), draw.size(24, 0.12)
     jaw: list[Station] = scaled([
         (0, 3, 8.5, -5.5, 5.5), (0.30 * nose, 4.2, 5.6, -5, 5), (0.62 * nose, 3.0, 4.0, -4, 4.5),
@@ -41,33 +41,35 @@ def bent_jaw_pliers(draw: Draw) -> Tool:
         (0, 0, 9, -5.5, 5.5), (-17, -8, 6.0, -5, 5), (-42, -0.8 * spread, 4.9, -4.4, 4.4),
         (-85, -spread, 4.9, -4.2, 4.2), (-122, -0.86 * spread, 5.2, -4, 4),
     ], k)  # fmt: skip
-    first, second = halves(jaw, handle, 11.5 * k, 11 * k)
+    first, second = halves(jaw, smooth(handle), 11.5 * k, 11 * k)
     grooves = [block((x, x + 0.8), (-0.6, 0.6), (-20, 30)) for x in range(int(0.5 * nose * k), int(0.9 * nose * k), 3)]
+    steel = draw.pick(ALLOY_STEEL, CARBON_STEEL)
     pieces = [
         Piece("rivet", rod(4.2 * k, -6.2 * k, 6.2 * k), draw.pick(BRASS, STAINLESS_STEEL)),
-        Piece("lower half", first - union(grooves), draw.pick(ALLOY_STEEL, CARBON_STEEL)),
-        Piece("upper half", second - union(grooves), draw.pick(ALLOY_STEEL, CARBON_STEEL)),
+        Piece("lower half", first - union(grooves), steel),
+        Piece("upper half", second - union(grooves), steel),
     ]
-    return make_tool("bent-jaw-pliers", pieces, Grasp((-70 * k, 0, 0), "x", "z"), draw, finish="shaded")
+    grasp, paint = Grasp((-70 * k, 0, 0), "x", "z"), draw.colour(steel)
+    return make_tool("bent-jaw-pliers", pieces, grasp, draw, finish="shaded", one_colour=paint)
 
 
 def pliers(draw: Draw) -> Tool:
     """Return heavy slip-joint pliers in one colour: broad toothed jaws and long curved handles."""
     k, spread = draw.scale(0.08), draw.size(26, 0.12)
     jaw: list[Station] = scaled([
-        (0, 6, 13, -10, 10), (20, 8.5, 9.5, -9.5, 9.5), (38, 7, 8, -8.5, 8.5), (52, 4.4, 5.5, -7.5, 7.5),
+        (0, 5, 11, -8, 8), (20, 7, 8.5, -7.5, 7.5), (38, 6, 7, -7, 7), (53, 3.6, 4.6, -6.2, 6.2),
     ], k)  # fmt: skip
     handle: list[Station] = scaled([
-        (0, 0, 15, -10, 10), (-28, -13, 9, -9.5, 9.5), (-60, -0.85 * spread, 7.6, -8.6, 8.6),
-        (-110, -spread, 7.2, -8.4, 8.4), (-150, -0.95 * spread, 7.2, -8.2, 8.2), (-181, -0.72 * spread, 6.8, -8, 8),
+        (0, 0, 13, -8, 8), (-28, -12, 7.6, -7.6, 7.6), (-60, -0.85 * spread, 6.6, -7, 7),
+        (-110, -spread, 6.4, -6.8, 6.8), (-150, -0.95 * spread, 6.4, -6.6, 6.6), (-181, -0.72 * spread, 6, -6.4, 6.4),
     ], k)  # fmt: skip
-    first, second = halves(jaw, handle, 18 * k, 20 * k)
-    mouth = rod(6.5 * k, -50, 50).translate([26 * k, 0, 0])
+    first, second = halves(jaw, smooth(handle), 15.5 * k, 16 * k)
+    mouth = rod(5.2 * k, -50, 50).translate([26 * k, 0, 0])
     teeth = [block((x * k, (x + 1.1) * k), (-0.9, 0.9), (-20, 20)) for x in (36, 39, 42, 45, 48, 51)]
     cut = union([mouth, *teeth])
     steel = draw.pick(BLACK_OXIDE_STEEL, ALLOY_STEEL)
     pieces = [
-        Piece("rivet", rod(6 * k, -11.2 * k, 11.2 * k), steel),
+        Piece("rivet", rod(5.5 * k, -8.9 * k, 8.9 * k), steel),
         Piece("lower half", first - cut, steel),
         Piece("upper half", second - cut, steel),
     ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import pairwise
 from typing import Any
 
 import manifold3d
@@ -56,9 +57,21 @@ def limb(stations: Sequence[tuple[float, float, float, float, float]], facets: i
     return chain([rod(r, low, high, facets=facets).translate([x, y, 0]) for x, y, r, low, high in stations])
 
 
+def smooth(stations: Sequence[tuple[float, ...]], between: int = 4) -> Any:
+    """Return stations with `between` - 1 more in every gap, on a Catmull-Rom curve through the given ones."""
+    given = np.array(stations, float)
+    p = np.vstack([2 * given[0] - given[1], given, 2 * given[-1] - given[-2]])
+    t = np.linspace(0, 1, between, endpoint=False)[:, None]
+    spans = [
+        0.5 * (2 * b + (c - a) * t + (2 * a - 5 * b + 4 * c - d) * t**2 + (3 * b - a - 3 * c + d) * t**3)
+        for a, b, c, d in zip(p[:-3], p[1:-2], p[2:-1], p[3:], strict=True)
+    ]
+    return [tuple(row) for row in np.vstack([*spans, given[-1:]]).tolist()]
+
+
 def chain(solids: Sequence[Solid]) -> Solid:
     """Return the union of the hulls of neighbours."""
-    return union([manifold3d.Manifold.batch_hull([a, b]) for a, b in zip(solids[:-1], solids[1:], strict=True)])
+    return union([manifold3d.Manifold.batch_hull([a, b]) for a, b in pairwise(solids)])
 
 
 def hull(*solids: Solid) -> Solid:

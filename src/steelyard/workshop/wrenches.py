@@ -2,13 +2,18 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from steelyard.workshop.draw import Draw
-from steelyard.workshop.materials import ALLOY_STEEL, CARBON_STEEL, FOAM_RUBBER, NYLON, PVC, RUBBER, STAINLESS_STEEL, ZINC
-from steelyard.workshop.solids import (
-    Solid, ball, block, chain, hexagon, hull, knurled, lathe, limb, prism, ring, rod, union,
-)  # fmt: skip
+from steelyard.workshop.materials import (
+    ALLOY_STEEL,
+    CARBON_STEEL,
+    FOAM_RUBBER,
+    NYLON,
+    PVC,
+    RUBBER,
+    STAINLESS_STEEL,
+    ZINC,
+)
+from steelyard.workshop.solids import block, hexagon, knurled, lathe, limb, prism, rod, union
 from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
 
 
@@ -48,9 +53,7 @@ def socket_wrench(draw: Draw) -> Tool:
     """Return a ratchet with a socket on it: a gear hidden in the head, a selector on top and a grip."""
     k, reach, across = draw.scale(0.07), draw.size(152, 0.1), draw.size(15, 0.1)
     head = union([lathe([(15, -8), (16.5, -6), (16.5, 6), (15, 8)]), limb([(0, 0, 13, -6, 6), (26, 0, 6, -5.2, 5.2)])])
-    stem = union([
-        rod(5.4, 0, reach + 24, facets=28).rotate([0, 90, 0]).translate([22, 0, 0]),
-    ])  # fmt: skip
+    stem = rod(5.4, 0, reach + 24, facets=28).rotate([0, 90, 0]).translate([22, 0, 0])
     chamber = rod(11.5, -5.6, 5.2)
     gear = knurled(11.5, -5.6, 4.6, 24, 0.9)
     drive = block((-4.75, 4.75), (-4.75, 4.75), (-20, -5.6)) + rod(6.4, -9, -5.6)
@@ -73,6 +76,3 @@ def socket_wrench(draw: Draw) -> Tool:
     ]
     pieces = [Piece(p.name, p.solid.scale([k, k, k]), p.material, p.rgb) for p in pieces]
     return make_tool("socket-wrench", pieces, Grasp((0.8 * reach * k, 0, 0), "-x", "z"), draw)
-
-
-__all__ = ["Solid", "adjustable_wrench", "ball", "chain", "hull", "np", "ring", "socket_wrench"]
