@@ -105,7 +105,7 @@ def common_density(A: Array, b: Array, volume: Array, start: Array) -> tuple[Arr
 
 
 @numba.njit(cache=True)
-def _partition_prior(group: Integers, G: int) -> float:
+def partition_prior(group: Integers, G: int) -> float:
     """Return the log probability of a partition in a Chinese restaurant with concentration one."""
     P = len(group)
     total = 0.0
@@ -121,7 +121,7 @@ def _partition_prior(group: Integers, G: int) -> float:
 
 
 @numba.njit(cache=True)
-def _canonical(group: Integers) -> tuple[Integers, int]:
+def canonical(group: Integers) -> tuple[Integers, int]:
     """Return the partition with groups numbered in the order of their first part, and their number."""
     out, seen = np.full(len(group), -1), np.full(len(group) + 1, -1)
     G = 0
@@ -147,7 +147,7 @@ def equal_groups(
     spread, known = np.zeros((MOST_MODELS, P, P)), np.full((MOST_MODELS, P), -1)
     count = 0
     for k0 in range(len(starts)):
-        current, _ = _canonical(starts[k0])
+        current, _ = canonical(starts[k0])
         best = -np.inf
         for sweep in range(SWEEPS + 1):
             improved = False
@@ -158,7 +158,7 @@ def equal_groups(
                     trial = base.copy()
                     if sweep:
                         trial[k] = g
-                    trial, groups = _canonical(trial)
+                    trial, groups = canonical(trial)
                     place = -1
                     for i in range(count):
                         if (known[i] == trial).all():
@@ -188,7 +188,7 @@ def _grouped(A: Array, b: Array, volume: Array, group: Integers, G: int, start: 
         weight[group[k]] += volume[k]
     y /= weight
     y, cost, hessian = mode(A, b, volume, group, np.eye(G) / WIDTH**2, np.full(G, CENTRE), y)
-    evidence = -cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + _partition_prior(group, G)
+    evidence = -cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + partition_prior(group, G)
     inverse = inverse_scaled(hessian)
     mass, spread = np.empty(P), np.empty((P, P))
     for k in range(P):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -39,6 +39,12 @@ class Effective:
         half = (project @ H[:, :10]) @ inverse_scaled(project @ V @ project.T)
         information = half @ (project @ H[:, :10])
         return cls(0.5 * (information + information.T), half @ (project @ g), bread @ g[10:], bread @ H[10:, :10])
+
+    def blurred(self, error: Array) -> Effective:
+        """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
+        shrink = np.linalg.inv(np.eye(10) + self.information @ error)
+        information = shrink @ self.information
+        return replace(self, information=0.5 * (information + information.T), pull=shrink @ self.pull)
 
     def linear_at(self, phi: Array) -> Array:
         """Return [phi, bias] (p,) with the bias that fits best beside phi (10,)."""

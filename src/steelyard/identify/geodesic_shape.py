@@ -5,7 +5,7 @@ Source: Lee, Wensing, Park 2019, entropic; the prior of "The Sum of Its Parts", 
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,51 +13,59 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.geodesic import Geodesic
-from steelyard.identify.least_squares import LeastSquares
+from steelyard.identify.linear import solve_scaled
+from steelyard.identify.problem import Problem
+from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 from steelyard.parts.parts import Parts
 
 
-@dataclass(frozen=True)
-class HomogeneousGeodesic:
-    """Options of GEO with a homogeneous body as prior.
+@dataclass(frozen=True, eq=False)
+class ShapeGeodesic:
+    """Options of GEO with the object's shape as prior.
 
-    parts  the object's shape, in the frame of the sensor
-    mass   its true mass [kg]; None = what weighted least squares finds
-    alpha  strength, see `Geodesic`
+    shape     the prior in S up to its mass: `uniform_body` of the parts, or `published_prior`
+    mass      the mass of the prior [kg]; None = what least squares finds
+    alpha     strength, see `Geodesic`
+    weighted  rows weighted by the wrench noise; as published N and N m count alike, and the pull is then far weaker
     """
 
-    parts: Parts
+    shape: InertialParameters
     mass: float | None = None
     alpha: float = 1e-5
+    weighted: bool = False
 
     def identify(self, log: MotionLog) -> Estimate:
         """Return the estimate of a log; the sensor is taken to be tared."""
-        mass = self.mass or LeastSquares("weighted", bias="none").identify(log).mass
-        return Geodesic(self._prior(mass), alpha=self.alpha, bias="none").identify(log)
+        return fit_log(log, Bias("none"), self._fit, "geodesic-shape")
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        mass = self.mass or LeastSquares("weighted", bias="none").solve(moments).mass
-        return Geodesic(self._prior(mass), alpha=self.alpha, bias="none").solve(moments)
+        return fit_moments(moments, Bias("none"), self._fit, "geodesic-shape")
 
-    def _prior(self, mass: float) -> InertialParameters:
+    def _fit(self, problem: Problem) -> Solution:
+        if not self.weighted:
+            problem = replace(problem, wrench=np.ones_like(problem.wrench))
+        weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+        mass = self.mass or float(solve_scaled(*problem.normal_equations(weights))[0])
         if not mass > 0:
             raise CannotAnswer(
                 f"Least squares finds a mass of {mass:.3g} kg, so there is no prior body. Check the sign of the wrench."
             )
-        return uniform_body(self.parts, mass)
+        prior = InertialParameters(self.shape.vector * (mass / self.shape.mass))
+        return Geodesic(prior, alpha=self.alpha, bias="none")._fit(problem)
 
 
-def uniform_body(parts: Parts, mass: float) -> InertialParameters:
+def uniform_body(parts: Parts, mass: float = 1.0) -> InertialParameters:
     """Return the body of one density with the shape of `parts` and the given mass [kg], in their frame."""
     return parts.whole(parts.volume * (mass / parts.volume.sum()))
 
 
-def published_prior(points: ArrayLike, mass: float) -> InertialParameters:
+def published_prior(points: ArrayLike, mass: float = 1.0) -> InertialParameters:
     """Return the prior of the published code from the centroids (T, 3) [m] of tetrahedra in S: wrong, for the table.
 
     The centre of mass is the plain mean of the centroids, whatever their volume. The inertia J is that of equal point

@@ -1,7 +1,8 @@
 """Which material each part is made of, from a list: the mixed-integer choice of the paper's future work.
 
-A choice gives every part the log-normal density of its material; its evidence is Laplace's, as in `density_priors`. Few
-choices are all tried; many are searched part by part from several starts. What was tried is averaged by evidence, so
+A choice gives every part the log-normal density of its material; its evidence is Laplace's, as in `density_priors`, and
+few materials in one object are likelier than many (a Chinese restaurant again). Few choices are all tried; many are
+searched from several starts. What was tried is averaged by evidence, so
 that ties stay ties.
 """
 
@@ -14,7 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.density_priors import log_det, mode
+from steelyard.identify.density_priors import canonical, log_det, mode, partition_prior
 from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import Integers
 from steelyard.parts.material import Material
@@ -77,7 +78,10 @@ def _one(
         prior += 2 * np.log(tolerance[chosen[k]])
     y, cost, hessian = mode(A, b, volume, np.arange(P), precision, at, at)
     masses = volume * np.exp(y)
-    evidence = -cost - 0.5 * (prior + log_det(hessian)) - P * np.log(len(centre))
+    group, groups = canonical(chosen)
+    evidence = -cost - 0.5 * (prior + log_det(hessian)) + partition_prior(group, groups)
+    for taken in range(groups):
+        evidence -= np.log(float(max(len(centre) - taken, 1)))
     return masses, evidence, np.outer(masses, masses) * inverse_scaled(hessian)
 
 
@@ -97,7 +101,7 @@ def _all(
 def _search(
     A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, starts: Integers
 ) -> tuple[Array, Array, Array, Integers, int]:
-    """Return what was tried from the starts (S, P), changing one part at a time as long as the evidence rises."""
+    """Return what was tried from the starts (S, P): one part, or all parts of one material, changed at a time."""
     P, K = len(volume), len(centre)
     masses, evidence, spread = np.zeros((MOST, P)), np.full(MOST, -np.inf), np.zeros((MOST, P, P))
     known, count = np.full((MOST, P), -1), 0
@@ -105,11 +109,14 @@ def _search(
         current, best = starts[s].copy(), -np.inf
         for _sweep in range(SWEEPS):
             improved = False
-            for k in range(P):
+            for move in range(P + K):
                 base = current.copy()
                 for material in range(K):
                     trial = base.copy()
-                    trial[k] = material
+                    if move < P:
+                        trial[move] = material
+                    else:
+                        trial[base == move - P] = material
                     place = -1
                     for i in range(count):
                         if (known[i] == trial).all():

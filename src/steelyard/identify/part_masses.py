@@ -25,8 +25,9 @@ from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import named_materials, part_findings
 from steelyard.identify.part_models import Masses, averaged_masses, free_masses, material_masses
 from steelyard.identify.problem import Problem
-from steelyard.identify.shape_error import EXACT, ShapeError
+from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 from steelyard.parts.material import Material
@@ -53,7 +54,7 @@ class PartMasses:
     bias: Bias | str = "free"
     density: Literal["averaged", "free"] = "averaged"
     materials: tuple[Material, ...] = ()
-    shape_error: ShapeError = EXACT
+    shape_error: ShapeError = MEASURED
 
     def __post_init__(self) -> None:
         if self.density not in ("averaged", "free"):
@@ -94,13 +95,17 @@ class PartMasses:
         return linear
 
     def _conclude(self, problem: Problem, linear: Array, score: Array | None) -> Estimate:
+        """Return the Estimate after a few rounds: weights and the size of a shape error depend on the answer."""
         data = Effective.of(problem, linear, score)
+        error = self.shape_error.covariance(InertialParameters(linear[:10]))
         for _ in range(RENEWALS - 1):
-            masses = self._masses(data, self.parts)
-            data = Effective.of(problem, data.linear_at(self.parts.whole(masses.mean).vector), score)
-        masses = self._masses(data, self.parts)
-        estimate = self._estimate(problem, data, masses)
-        return estimate.with_findings(*part_findings(estimate, self.parts, data, masses.choices, self.materials))
+            masses = self._masses(data.blurred(error), self.parts)
+            body = self.parts.whole(masses.mean)
+            data, error = Effective.of(problem, data.linear_at(body.vector), score), self.shape_error.covariance(body)
+        masses = self._masses(data.blurred(error), self.parts)
+        estimate = self._estimate(problem, data, error, masses)
+        seen = data.blurred(error)
+        return estimate.with_findings(*part_findings(estimate, self.parts, seen, masses.choices, self.materials))
 
     def _masses(self, data: Effective, parts: Parts) -> Masses:
         """Return the masses of the parts by the chosen model."""
@@ -108,16 +113,20 @@ class PartMasses:
             return material_masses(data, parts, self.materials)
         return (averaged_masses if self.density == "averaged" else free_masses)(data, parts)
 
-    def _estimate(self, problem: Problem, data: Effective, masses: Masses) -> Estimate:
-        """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp."""
-        body = self.parts.whole(masses.mean)
-        solution = Solution.unconstrained(data.linear_at(body.vector))
-        estimate = conclude(problem, solution, "part-masses", require=False)
+    def _estimate(self, problem: Problem, data: Effective, error: Array, masses: Masses) -> Estimate:
+        """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
+
+        phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with the shape (e = 0): letting a noisy log
+        move it lost more in the thin axes than it won in the others.
+        """
         B = self.parts.per_mass
-        covariance = B @ masses.covariance @ B.T + self.shape_error.covariance(body, self._moved(data))
+        body = self.parts.whole(masses.mean)
+        estimate = conclude(problem, Solution.unconstrained(data.linear_at(body.vector)), "part-masses", require=False)
+        moved = self._moved(data.blurred(error))
+        covariance = B @ masses.covariance @ B.T + error + moved.T @ moved
         return replace(
             estimate,
-            covariance=covariance,
+            covariance=0.5 * (covariance + covariance.T),
             part_covariance=masses.covariance,
             parts=self._found(masses),
             identified=np.ones(10, np.bool_),

@@ -36,17 +36,14 @@ class ShapeError:
         steps = [Pose(Rotation.identity(), self.grasp_m * axis) for axis in np.eye(3) if self.grasp_m]
         return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
 
-    def covariance(self, body: InertialParameters, moved: Array) -> Array:
-        """Return what shape and grasp add to the covariance (10, 10) of the body's parameters.
-
-        moved  (K, 10) how the parameters change with each of the K grasp steps, the masses found anew
-        """
+    def covariance(self, body: InertialParameters) -> Array:
+        """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
         jacobian = np.zeros((10, 10))
         jacobian[0, 0], jacobian[1:] = 1, forms.com_jacobian(body.vector)
         half_trace = float(np.trace(body.inertia_com)) / 2
         variance = np.repeat([0.0, self.com_m**2, (self.inertia_share * half_trace) ** 2], [1, 3, 6])
         back = np.linalg.inv(jacobian)
-        return np.asarray((back * variance) @ back.T + moved.T @ moved)
+        return np.asarray((back * variance) @ back.T)
 
 
 EXACT = ShapeError()
