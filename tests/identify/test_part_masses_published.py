@@ -7,7 +7,7 @@ import pytest
 
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.evaluate import riemannian
-from steelyard.identify.geodesic_shape import HomogeneousGeodesic, published_prior, uniform_body
+from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior, uniform_body
 from steelyard.identify.part_masses_published import PublishedPartMasses, point_parts
 from steelyard.identify.point_masses import PointMasses
 from steelyard.inertia import InertialParameters, solids
@@ -121,8 +121,8 @@ def test_geo_with_the_shape_is_nearly_exact_for_one_density():
     parts = boxes(4)
     body = uniform_body(parts, 1.1)
     log = handling_log(body, "paper", "high")
-    for mass in (None, 1.1):
-        found = HomogeneousGeodesic(parts, mass).identify(log)
+    for mass, weighted in ((None, False), (1.1, False), (None, True)):
+        found = ShapeGeodesic(uniform_body(parts), mass, weighted=weighted).identify(log)
         assert riemannian(found.parameters, body) < 0.25
     assert uniform_body(parts, 1.1).mass == pytest.approx(1.1)
 

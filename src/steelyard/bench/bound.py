@@ -17,6 +17,7 @@ from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments
 from steelyard.parts.parts import Parts
+from steelyard.simulate.handling import noise_std
 
 DRAWS = 4000
 RANK_TOLERANCE = 1e-12
@@ -53,3 +54,8 @@ def expected_scores(spread: Array, body: InertialParameters, edges: Array) -> di
         "inertia_pct": float(np.mean(100 * np.abs(error[:, 4:] / evaluate.inertia_scale(mass, edges)))),
         "riemannian": float(np.mean(np.sqrt(0.5 * np.einsum("nij,nji->n", relative, relative)))),
     }
+
+
+def noise_of(scenario: str) -> Noise:
+    """Return the variances of a noise scenario."""
+    return Noise.of_std(*noise_std(scenario))

@@ -13,8 +13,7 @@ from steelyard.bench.cuts import interior_points, slabs
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.geodesic import Geodesic
-from steelyard.identify.geodesic_shape import HomogeneousGeodesic, published_prior
+from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior, uniform_body
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.part_masses_published import PublishedPartMasses
@@ -188,13 +187,11 @@ class Method:
 
 def methods_for(case: Case, names: tuple[str, ...]) -> list[Method]:
     """Return the methods of those names for one object; the wrench has no bias and none estimates one."""
-    estimators: dict[str, Callable[[], PartMasses | HomogeneousGeodesic | Geodesic | LeastSquares | PointMasses]] = {
+    estimators: dict[str, Callable[[], PartMasses | ShapeGeodesic | LeastSquares | PointMasses]] = {
         "ours": lambda: PartMasses(case.parts, bias="none"),
         "ours-still": lambda: PartMasses(case.parts, bias="none"),
-        "geo": lambda: HomogeneousGeodesic(case.parts),
-        "geo-published-prior": lambda: Geodesic(
-            published_prior(_inside(case), float(case.known.truth.mass)), bias="none"
-        ),
+        "geo": lambda: ShapeGeodesic(uniform_body(case.true_parts)),
+        "geo-published-prior": lambda: ShapeGeodesic(published_prior(_inside(case)), float(case.known.truth.mass)),
         "ols": lambda: LeastSquares("ordinary", bias="none"),
         "point-mass": lambda: PointMasses(_inside(case)),
     }

@@ -29,7 +29,7 @@ def identify_table(result: dict[str, Any]) -> str:
     lines = [f"seeds {_listed(result['seeds'])}; {len(result['objects'])} objects; medians"]
     for motion, noises in result["median"].items():
         for noise, methods in noises.items():
-            lines += ["", *_block(f"{motion}, {noise}", methods, _IDENTIFY)]
+            lines += ["", *block(f"{motion}, {noise}", methods, _IDENTIFY)]
     if result["speed"]:
         lines += ["", "solve time as a multiple of ours, in this run:"]
         lines += [f"  {name.split(' / ')[0]:24s} {ratio:8.1f} x" for name, ratio in result["speed"].items()]
@@ -57,7 +57,7 @@ def coverage_table(result: dict[str, Any]) -> str:
     """Return the coverage of the 95 % intervals, one block per case."""
     lines = [f"seeds {_listed(result['seeds'])}; {result['motion']}, {result['noise']}; 95 % intervals"]
     for name, case in result["cases"].items():
-        lines += ["", *_block(f"{name} ({case['logs']} logs)", case["kinds"], _COVERAGE)]
+        lines += ["", *block(f"{name} ({case['logs']} logs)", case["kinds"], _COVERAGE)]
         lines.append("inertia entries called identified (median of six):")
         lines += [f"  {_entries(case['objects'])}"]
     return "\n".join(lines)
@@ -67,7 +67,7 @@ def _entries(objects: dict[str, Any]) -> str:
     return ", ".join(f"{name} {entry['inertia_identified']:g}" for name, entry in objects.items())
 
 
-def _block(title: str, rows: dict[str, dict[str, Any]], columns: Sequence[tuple[str, str, int]]) -> list[str]:
+def block(title: str, rows: dict[str, dict[str, Any]], columns: Sequence[tuple[str, str, int]]) -> list[str]:
     """Return a titled table with one line per row, numbers right-aligned under their heads."""
     width = max(len(title), *(len(name) for name in rows)) + 2
     lines = [title.ljust(width) + "".join(head.rjust(len(head) + 3) for head, _, _ in columns)]

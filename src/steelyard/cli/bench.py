@@ -1,4 +1,4 @@
-"""`steelyard bench identify|coverage`."""
+"""`steelyard bench identify|coverage|held-object`."""
 
 from __future__ import annotations
 
@@ -65,3 +65,29 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
     progress = progress_bar("bench coverage")
     result = job.run(seeds, spectra=spectra, declared=not noise_unknown, progress=progress, **choices)
     print_json(result) if as_json else click.echo(coverage_table(result))
+
+
+@bench.command("held-object")
+@click.option(
+    "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
+)
+@click.option(
+    "--parts",
+    type=click.Choice(["truth", "truth-split", "truth-merged"]),
+    default="truth",
+    show_default=True,
+    help="Parts given to the estimators: the true ones, each cut in pieces, or joined.",
+)
+@click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
+@click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+@click.option("--noise", "noises", multiple=True, help="Only these scenarios: none, low, moderate, high, high-code.")
+@click.option("--methods", multiple=True, help="Only these methods.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@_JSON
+def held_object(data: Path, as_json: bool, **choices: Any) -> None:
+    """The paper's identification benchmark: every object, four noise scenarios, ours beside its rivals."""
+    from steelyard.bench import held_object as job
+    from steelyard.bench.held_object_table import held_object_table
+
+    result = job.run(data, progress=progress_bar("bench held-object"), **choices)
+    print_json(result) if as_json else click.echo(held_object_table(result))
