@@ -12,6 +12,7 @@ _SPLIT_HZ = 20.0  # a held body moves below, a knock rings above
 _PEAK, _EDGE = 8.0, 4.0  # sigmas to call a tap, and to end it
 _SURROUNDINGS_S = 0.6
 _SHARE_OF_RANGE = 0.05
+_GAP_ROWS, _GAP_S = 5, 0.05  # a step of the clock longer than both is a gap
 
 
 def bursts(time: Array, values: Array, margin_s: float = 0.03) -> Array:
@@ -29,7 +30,9 @@ def bursts(time: Array, values: Array, margin_s: float = 0.03) -> Array:
     level = _level(size, half)
     slow = np.quantile(values, [0.02, 0.98], axis=0)
     floor = _SHARE_OF_RANGE * float(np.linalg.norm(slow[1] - slow[0]))
-    return _intervals(time, (size > _PEAK * level) & (size > floor), size > _EDGE * level, margin_s)
+    whole = ~_beside_gaps(time, rate)
+    peak = (size > _PEAK * level) & (size > floor) & whole
+    return _intervals(time, peak, (size > _EDGE * level) & whole, margin_s)
 
 
 def merged(*groups: Array) -> Array:
@@ -48,6 +51,17 @@ def inside(time: Array, intervals: Array) -> Mask:
     """Return which of `time` (N,) lie in disjoint, ordered intervals (K, 2)."""
     edges = intervals.ravel()
     return np.asarray(np.searchsorted(edges, time, "right") % 2 == 1)
+
+
+def _beside_gaps(time: Array, rate: float) -> Mask:
+    """Return rows (N,) beside a gap in the clock: what was moved on meanwhile looks like a burst, and is none."""
+    steps = np.diff(time)
+    marks = np.zeros(len(time) + 1, np.int64)
+    reach = int(np.ceil(rate / min(_SPLIT_HZ, 0.2 * rate)))
+    for row in np.flatnonzero(steps > max(_GAP_ROWS / rate, _GAP_S)) + 1:
+        marks[max(row - reach, 0)] += 1
+        marks[min(row + reach, len(time))] -= 1
+    return np.asarray(np.cumsum(marks[:-1]) > 0)
 
 
 def _fast_part(values: Array, rate: float) -> Array:

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.conventions import examine_conventions
 from steelyard.sanity.rows import examine_rows
 from steelyard.sanity.units import examine_units
+
+# A motion is told from its neighbours in time.
+FEWEST_ROWS = 12
 
 
 def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -15,7 +19,19 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     Rows that are no measurements are left out; units, signs and frames are put right where the numbers leave no
     doubt, so that the answer is right all the same. Each finding says what was assumed.
     """
+    _require_rows(recording)
     recording, rows = examine_rows(recording)
     recording, units = examine_units(recording)
     recording, conventions = examine_conventions(recording)
     return recording, (*rows, *units, *conventions)
+
+
+def _require_rows(recording: Recording) -> None:
+    """Raise CannotAnswer where a stream is too short to tell how the sensor moved."""
+    short = next((s for s in recording.streams if s.time is not None and len(s) < FEWEST_ROWS), None)
+    if short is not None:
+        raise CannotAnswer(
+            f"'{short.name}' has {len(short)} row{'s' * (len(short) != 1)}; a log with a clock needs at least "
+            f"{FEWEST_ROWS} to tell how the sensor moved. Record longer, or mark a table of still poses with "
+            'kind = "poses" and no time.'
+        )
