@@ -27,6 +27,8 @@ SMALLEST_RADIUS = 0.02
 LOST_MASS, LOST_COM = 0.5, 2.5
 # Fewer blocks left out in turn say too little about error bars; below this factor they agree.
 ENOUGH_BLOCKS, WORTH_WIDENING = 10, 1.5
+# Share of its size that no number is known better than.
+SMALLEST_STD = 1e-9
 # A direction counts toward the rank when the data fix it to half its natural size.
 RANK_INFORMATION = 4.0
 # Below this information (a third of the natural size to the power -2), or below this share of the best seen direction,
@@ -102,7 +104,9 @@ def _widened(estimate: Estimate) -> Estimate:
     jackknife, known = estimate.evidence.jackknife_people, estimate.identified
     if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS or not known.any():
         return estimate
-    factor = float(np.median(jackknife[known] / np.maximum(estimate.std[known], 1e-300)))
+    # A channel that holds exact zeros has no noise at all, and nothing to be a multiple of.
+    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector)
+    factor = float(np.median(jackknife[known] / np.maximum(estimate.std, least)[known]))
     if factor < WORTH_WIDENING:
         return estimate
     note = f"error bars are {factor:.1f} times those of noise alone: leaving blocks out moves the answer that much"

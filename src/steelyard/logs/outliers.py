@@ -58,9 +58,9 @@ def _beside_gaps(time: Array, rate: float) -> Mask:
     steps = np.diff(time)
     marks = np.zeros(len(time) + 1, np.int64)
     reach = int(np.ceil(rate / min(_SPLIT_HZ, 0.2 * rate)))
-    for row in np.flatnonzero(steps > max(_GAP_ROWS / rate, _GAP_S)) + 1:
-        marks[max(row - reach, 0)] += 1
-        marks[min(row + reach, len(time))] -= 1
+    gaps = np.flatnonzero(steps > max(_GAP_ROWS / rate, _GAP_S)) + 1
+    np.add.at(marks, np.maximum(gaps - reach, 0), 1)
+    np.add.at(marks, np.minimum(gaps + reach, len(time)), -1)
     return np.asarray(np.cumsum(marks[:-1]) > 0)
 
 
