@@ -8,8 +8,11 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.io import read_recording, read_result
+from steelyard.io.ply_files import read_mesh
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
+from steelyard.parts.from_mesh import parts_of_mesh
+from steelyard.parts.parts import Parts
 from steelyard.pipelines import held_object
 
 DEFAULTS = held_object.Options()
@@ -21,6 +24,7 @@ def identify(
     options: held_object.Options = DEFAULTS,
     *,
     tool: str | Path | Recording | Estimate | None = None,
+    parts: str | Path | Parts | None = None,
     data: str | Path | None = None,
 ) -> Estimate:
     """Return mass, centre of mass and inertia of what the robot holds, with covariance, evidence and findings.
@@ -29,6 +33,7 @@ def identify(
              fitted as it is, without alignment and sanity checks)
     options  method, bias and prior size
     tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared
+    parts    the object's homogeneous parts in its own frame, or a mesh (.ply) whose faces carry part numbers
     data     folder that relative paths in the description start from
 
     Raises BadInput where the files make no sense, CannotAnswer where they do not determine mass and centre of mass.
@@ -36,7 +41,9 @@ def identify(
     if isinstance(log, MotionLog):
         return NoiseAware(bias=Bias(options.bias, drift=options.drift)).identify(log)
     recording = log if isinstance(log, Recording) else read_recording(log, data)
-    return held_object.identify(recording, options, _tool(recording.tool if tool is None else tool, data))
+    known = _tool(recording.tool if tool is None else tool, data)
+    shape = parts_of_mesh(read_mesh(Path(parts))) if isinstance(parts, str | Path) else parts
+    return held_object.identify(recording, options, known, shape)
 
 
 def _tool(tool: str | Path | Recording | Estimate | None, data: str | Path | None) -> Recording | Estimate | None:

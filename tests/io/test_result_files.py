@@ -45,7 +45,7 @@ def test_keys_of_the_format(estimate: Estimate) -> None:
     assert list(result) == [
         "mass_kg", "com_m", "inertia_com_kgm2", "frame", "method", "consistent", "std", "covariance",
         "bias_covariance", "cross_covariance", "parameters",
-        "identified", "force_bias_N", "torque_bias_Nm", "delays_s", "evidence", "findings", "notes",
+        "identified", "force_bias_N", "torque_bias_Nm", "delays_s", "parts", "evidence", "findings", "notes",
     ]  # fmt: skip
     assert result["mass_kg"] == pytest.approx(4.8)
     np.testing.assert_allclose(result["com_m"], [0, 0, 0.15], atol=1e-15)

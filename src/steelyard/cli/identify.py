@@ -43,6 +43,11 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
     help="Result (.json) or log of the gripper alone: taken away, sharing one sensor bias.",
 )
 @click.option(
+    "--parts",
+    type=click.Path(path_type=Path),
+    help="Mesh (.ply) of the object whose faces carry part numbers; needs [object] pose_in_sensor.",
+)
+@click.option(
     "--object-size",
     type=float,
     metavar="M",
@@ -51,8 +56,8 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 @click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
-def identify(log: Path | None, data: Path | None, tool: Path | None, pendant: bool, output: Path | None,
-             as_json: bool, **chosen: Any) -> None:  # fmt: skip
+def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, pendant: bool,
+             output: Path | None, as_json: bool, **chosen: Any) -> None:  # fmt: skip
     """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
     if pendant == (log is not None):
         raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
@@ -63,7 +68,7 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, pendant: bo
     from steelyard.pipelines.held_object import Options
 
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
-    estimate = api.identify(recording, Options(**chosen), tool=tool, data=data)
+    estimate = api.identify(recording, Options(**chosen), tool=tool, parts=parts, data=data)
     if output is not None:
         write_result(estimate, output)
     if as_json:

@@ -37,6 +37,7 @@ def estimate_table(estimate: Estimate, title: str, truth: Array | None = None) -
         click.style(title, bold=True),
         _columns(_body_rows(estimate, truth)),
         *_inertia_note(estimate),
+        *_part_lines(estimate),
         "",
         *_evidence_lines(estimate),
         "",
@@ -77,6 +78,17 @@ def _inertia_note(estimate: Estimate) -> list[str]:
     if estimate.identified[4:].all():
         return []
     return ["  inertia    not identified by these data"]
+
+
+def _part_lines(estimate: Estimate) -> list[str]:
+    """Return the parts with their masses and densities."""
+    if not estimate.parts:
+        return []
+    rows = [
+        (f"part {p.label}", plus_minus(1e3 * p.mass, 1e3 * p.std, "g"), f"{p.density:.0f} kg/m³", p.material or "")
+        for p in estimate.parts
+    ]
+    return ["", _columns(rows)]
 
 
 def _evidence_lines(estimate: Estimate) -> list[str]:

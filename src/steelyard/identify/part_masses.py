@@ -20,7 +20,7 @@ from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias
-from steelyard.identify.linear import normal_equations, solve_scaled
+from steelyard.identify.linear import reweighted
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import named_materials, part_findings
 from steelyard.identify.part_models import Masses, averaged_masses, free_masses, material_masses
@@ -67,32 +67,21 @@ class PartMasses:
         """
         log = with_noise(log, Bias.of(self.bias).free)
         problem = self._problem(Moments.of_log(log))
-        start = self._uniform(problem)
-        return self._conclude(problem, start, score_variance(log, problem, Solution.unconstrained(start)))
+        first = self._conclude(problem, _start(problem), None)
+        if log.time is None:
+            return first
+        bias = first.wrench_bias[: len(problem.T) - 10]
+        linear = np.concatenate([first.parameters.vector, bias])
+        return self._conclude(problem, linear, score_variance(log, problem, Solution.unconstrained(linear)))
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
         problem = self._problem(moments)
-        return self._conclude(problem, self._uniform(problem), None)
+        return self._conclude(problem, _start(problem), None)
 
     def _problem(self, moments: Moments) -> Problem:
         bias = Bias.of(self.bias)
         return replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
-
-    def _uniform(self, problem: Problem) -> Array:
-        """Return the linear parameters (p,) of the object at one density: the start."""
-        shape = self.parts.whole(self.parts.volume / self.parts.volume.sum()).vector
-        columns = np.zeros((len(problem.T), 1 + len(problem.T) - 10))
-        columns[:10, 0] = shape
-        columns[10:, 1:] = np.eye(len(problem.T) - 10)
-        T = np.tensordot(columns.T, problem.T, axes=1)
-        linear = np.zeros(len(problem.T))
-        for _ in range(RENEWALS):
-            H, g = normal_equations(T, problem.scatter, problem.noise_weights(problem.residual_map(linear)))
-            linear = columns @ solve_scaled(H, g)
-        if not linear[0] > 0:
-            raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
-        return linear
 
     def _conclude(self, problem: Problem, linear: Array, score: Array | None) -> Estimate:
         """Return the Estimate after a few rounds: weights and the size of a shape error depend on the answer."""
@@ -116,7 +105,7 @@ class PartMasses:
     def _estimate(self, problem: Problem, data: Effective, error: Array, masses: Masses) -> Estimate:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
 
-        phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with the shape (e = 0): letting a noisy log
+        phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with the shape (e = 0): letting a log
         move it lost more in the thin axes than it won in the others.
         """
         B = self.parts.per_mass
@@ -151,3 +140,11 @@ class PartMasses:
             return parts.whole(self._masses(data, parts).mean).vector
 
         return np.stack([(found(X) - found(X.inverse())) / 2 for X in steps])
+
+
+def _start(problem: Problem) -> Array:
+    """Return the linear parameters (p,) of ten free numbers: the first weights come from them."""
+    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, RENEWALS)
+    if not linear[0] > 0:
+        raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
+    return linear

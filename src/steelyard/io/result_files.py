@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
-from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia import forms
 
 
@@ -43,11 +43,25 @@ def result_dict(estimate: Estimate) -> dict[str, Any]:
         "force_bias_N": force_bias,
         "torque_bias_Nm": torque_bias,
         "delays_s": dict(estimate.delays_s),
+        "parts": [_part(part) for part in estimate.parts],
         "evidence": _evidence(estimate.evidence),
         "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in estimate.findings],
         "notes": list(estimate.notes),
     }
     return {key: _plain(value) for key, value in values.items()}
+
+
+def _part(part: PartMass) -> dict[str, Any]:
+    """Return one part under the names of the format."""
+    return {
+        "label": part.label,
+        "mass_kg": part.mass,
+        "std_kg": part.std,
+        "volume_m3": part.volume,
+        "centroid_m": part.centroid,
+        "density_kg_m3": part.density,
+        "material": part.material,
+    }
 
 
 def _people(values: Array) -> dict[str, Any]:

@@ -19,11 +19,14 @@ from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.noise_levels import with_declared, without_dead
+from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.rest import RIPPLE
+from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import Recording
+from steelyard.parts.parts import Parts
 from steelyard.sanity import after, dead_channels, examine, fitted_gravity, levelled, untouched
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
@@ -58,10 +61,17 @@ class Options:
 
 
 @within_numbers()
-def identify(recording: Recording, options: Options = Options(), tool: Recording | Estimate | None = None) -> Estimate:
+def identify(
+    recording: Recording,
+    options: Options = Options(),
+    tool: Recording | Estimate | None = None,
+    parts: Parts | None = None,
+) -> Estimate:
     """Return mass, centre of mass and inertia of what the robot holds, in the frame of the sensor.
 
-    `tool` is a recording or a result of the gripper alone: it is taken away, and its sensor bias is shared.
+    tool   a recording or a result of the gripper alone: it is taken away, and its sensor bias is shared
+    parts  the object's homogeneous parts in its own frame O; the recording says where O sits in the sensor
+
     Raises CannotAnswer where the data do not fix mass and centre of mass, BadInput where they make no sense.
     """
     known = identify(tool, options) if isinstance(tool, Recording) else tool
@@ -71,12 +81,13 @@ def identify(recording: Recording, options: Options = Options(), tool: Recording
     log, unmeasured = _with_known_acceleration(aligned.log, aligned)
     keep, touched = (slice(None), ()) if unmeasured else untouched(log, bias.free)
     log = without_dead(with_declared(log.rows(keep), recording.noise), dead_channels(recording))
-    estimator, notes = _estimator(options, log, bias)
+    shape = None if parts is None else _shape(parts, recording)
+    estimator, notes = _estimator(options, log, bias, shape)
     estimate = estimator.identify(log)
     late = after(log, estimate, aligned, recording)
     if bias.free and any(f.code == "bias-drift" for f in late):
         bias = replace(bias, drift=True)
-        estimate = _estimator(options, log, bias)[0].identify(log)
+        estimate = _estimator(options, log, bias, shape)[0].identify(log)
         notes = (*notes, "the fit was repeated with a bias that drifts")
     if known is not None:
         estimate, shared = _with_tool(options, log, bias, estimate, _in_log_sign(known, recording))
@@ -134,10 +145,23 @@ def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
     return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))
 
 
+def _shape(parts: Parts, recording: Recording) -> tuple[Parts, ShapeError]:
+    """Return the parts in the sensor's frame and how wrong they may be there."""
+    if recording.object_pose is None:
+        raise BadValue(
+            "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
+        )
+    grasp_m, grasp_rad = recording.object_pose_std or (0.0, 0.0)
+    return parts.in_frame(recording.object_pose), replace(MEASURED, grasp_m=grasp_m, grasp_rad=grasp_rad)
+
+
 def _estimator(
-    options: Options, log: MotionLog, bias: Bias
-) -> tuple[NoiseAware | LeastSquares | Geodesic, tuple[str, ...]]:
+    options: Options, log: MotionLog, bias: Bias, shape: tuple[Parts, ShapeError] | None = None
+) -> tuple[NoiseAware | LeastSquares | Geodesic | PartMasses, tuple[str, ...]]:
     """Return the estimator and what there is to say about the choice."""
+    if shape is not None and options.method == "auto":
+        why = f"method: auto chose part-masses, because the shape is given in {len(shape[0])} parts"
+        return PartMasses(shape[0], bias=bias, shape_error=shape[1]), (why,)
     if options.method == "least-squares":
         return LeastSquares(bias=bias), ()
     if options.method == "geodesic":

@@ -43,7 +43,7 @@ def vise_grip(draw: Draw) -> Tool:
     ]).rotate([0, 90, 0]).translate([0, 11, 0])  # fmt: skip
     lever = limb([(-0.46 * length, -27, 4.5, -4, 4), (-0.62 * length, -28, 3.2, -3.5, 3.5),
                   (-0.8 * length, -23, 3.0, -6, 6)])  # fmt: skip
-    coil = rod(3.4, -62, -14, facets=20) - rod(2.5, -63, -13, facets=20)
+    coil = rod(3.4, -62, -8, facets=20) - rod(2.5, -63, -7, facets=20)
     spring = coil.rotate([0, 90, 0]).translate([0, 14, 0])
     steel = draw.pick(CARBON_STEEL, ALLOY_STEEL)
     pieces = [

@@ -29,25 +29,29 @@ def hacksaw(draw: Draw) -> Tool:
                    rod(4, 0, 9).rotate([0, -90, 0]).translate([-13, 0, 0])])  # fmt: skip
     rear = union([block((span - 6, span + 12), (-5, 5), (0.33, 5)), rod(1.9, -4, 3, facets=16).translate([span, 0, 0]),
                   rod(4.2, 10, 66, facets=24).rotate([0, 90, 0]).translate([span, 0, 0])])  # fmt: skip
-    neck = limb([(back + 6, depth, 11, -9, 9), (back + 8, 0.45 * depth, 8, -8, 8), (back + 8, 0, 11, -9, 9)])
-    bottom = limb([(back + 8, -4, 9, -8, 8), (back + 72, -26, 9, -9, 9)])
-    spine = limb([(back + 6, depth, 11, -9, 9), (back + 46, 0.62 * depth, 11, -9, 9), (back + 72, -26, 9, -9, 9)])
-    grip = limb([(back + 30, 0.78 * depth, 14, -13, 13), (back + 47, 0.58 * depth, 15, -13.5, 13.5),
-                 (back + 66, -4, 13.5, -13, 13)])  # fmt: skip
-    wings = union([
-        rod(7.5, 45.2, 56, top=6).rotate([0, 90, 0]), block((47, 57), (-17, 17), (-2, 2)),
-    ]).translate([span, 0, 0]) ^ block((0, 999), (-16, 16), (-9, 9))  # fmt: skip
-    bore = rod(4.2, 0, 90).rotate([0, 90, 0]).translate([span + 2, 0, 0])
-    gap = block((back + 19.2, span + 200), (-20, 20), (-20, 20)) ^ rod(21, 0, 40).rotate([0, 90, 0]).translate(
-        [back + 19, 0, 0]
+    neck = limb(
+        [
+            (back + 6, depth, 11, -9, 9),
+            (back + 8, 0.45 * depth, 8, -8, 8),
+            (back + 6, 0, 9.5, -9, 9),
+            (back + 8, -20, 8, -8, 8),
+        ]
     )
+    bottom = limb([(back + 8, -20, 8, -8, 8), (back + 70, -34, 8, -8, 8)])
+    spine = limb([(back + 6, depth, 11, -9, 9), (back + 46, 0.62 * depth, 11, -9, 9), (back + 70, -34, 9, -9, 9)])
+    grip = limb([(back + 30, 0.78 * depth, 14, -13, 13), (back + 47, 0.58 * depth, 15, -13.5, 13.5),
+                 (back + 65, -14, 13.5, -13, 13)])  # fmt: skip
+    wings = union([
+        rod(7.5, 46, 56, top=6).rotate([0, 90, 0]), block((48, 57), (-2, 2), (-16, 16)),
+    ]).translate([span, 0, 0])  # fmt: skip
+    bore = rod(4.2, 0, 90).rotate([0, 90, 0]).translate([span + 2, 0, 0])
     pieces = [
         Piece("blade", blade - teeth, draw.pick(CARBON_STEEL, STAINLESS_STEEL), (44, 70, 130)),
         Piece("front holder", front, CARBON_STEEL),
         Piece("rear holder", rear, CARBON_STEEL),
         Piece("wing nut", wings - bore, draw.pick(BRASS, CARBON_STEEL)),
         Piece("frame", tube, draw.pick(CARBON_STEEL, STAINLESS_STEEL), (196, 34, 34)),
-        Piece("handle", union([neck, bottom - gap, spine]), draw.pick(ALUMINIUM, MAGNESIUM)),
+        Piece("handle", union([neck, bottom, spine]), draw.pick(ALUMINIUM, MAGNESIUM)),
         Piece("grip", grip, draw.pick(RUBBER, FOAM_RUBBER)),
     ]
     return make_tool("hacksaw", pieces, Grasp((back + 50, 0.5 * depth, 0), "x", "z"), draw)

@@ -116,20 +116,12 @@ def knurled(radius: float, low: float, high: float, teeth: int, depth: float) ->
 
 
 def without_slivers(solid: Solid, share: float = 2e-3) -> Solid:
-    """Return the solid without pieces below a `share` of its volume, which set operations leave behind."""
+    """Return the solid without pieces and voids below a `share` of its volume, which set operations leave behind."""
     pieces = solid.decompose()
     if len(pieces) < 2:
         return solid
-    least = share * solid.volume()
-    return union([piece for piece in _with_voids(pieces) if piece.volume() > least])
-
-
-def _with_voids(pieces: list[Solid]) -> list[Solid]:
-    """Return solid pieces, the voids among them put back into the piece around them."""
-    voids = [piece for piece in pieces if piece.volume() < 0]
-    if not voids:
-        return pieces
-    return [manifold3d.Manifold.compose(pieces)]
+    kept = [piece for piece in pieces if abs(piece.volume()) > share * solid.volume()]
+    return manifold3d.Manifold.compose(kept)
 
 
 def _section(outline: Sequence[Point]) -> Any:
