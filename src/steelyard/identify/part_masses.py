@@ -86,23 +86,26 @@ class PartMasses:
     def _conclude(self, problem: Problem, linear: Array, score: Array | None) -> Estimate:
         """Return the Estimate after a few rounds: weights and the size of a shape error depend on the answer."""
         data = Effective.of(problem, linear, score)
-        error = self.shape_error.covariance(InertialParameters(linear[:10]))
+        body = InertialParameters(linear[:10])
         for _ in range(RENEWALS - 1):
-            masses = self._masses(data.blurred(error), self.parts)
-            body = self.parts.whole(masses.mean)
-            data, error = Effective.of(problem, data.linear_at(body.vector), score), self.shape_error.covariance(body)
-        masses = self._masses(data.blurred(error), self.parts)
-        estimate = self._estimate(problem, data, error, masses)
-        seen = data.blurred(error)
+            body = self.parts.whole(self._masses(data, body, self.parts).mean)
+            data = Effective.of(problem, data.linear_at(body.vector), score)
+        masses = self._masses(data, body, self.parts)
+        estimate = self._estimate(problem, data, masses)
+        seen = data.blurred(self.shape_error.covariance(estimate.parameters))
         return estimate.with_findings(*part_findings(estimate, self.parts, seen, masses.choices, self.materials))
 
-    def _masses(self, data: Effective, parts: Parts) -> Masses:
-        """Return the masses of the parts by the chosen model."""
+    def _masses(self, data: Effective, body: InertialParameters, parts: Parts) -> Masses:
+        """Return the masses of the parts by the chosen model.
+
+        A list of materials is sharp enough for a shape error of a tenth of a millimetre to decide between two of them,
+        so that the log is blurred by it; a smooth average over densities is better off without.
+        """
         if self.materials:
-            return material_masses(data, parts, self.materials)
+            return material_masses(data.blurred(self.shape_error.covariance(body)), parts, self.materials)
         return (averaged_masses if self.density == "averaged" else free_masses)(data, parts)
 
-    def _estimate(self, problem: Problem, data: Effective, error: Array, masses: Masses) -> Estimate:
+    def _estimate(self, problem: Problem, data: Effective, masses: Masses) -> Estimate:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
 
         phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with the shape (e = 0): letting a log
@@ -111,7 +114,8 @@ class PartMasses:
         B = self.parts.per_mass
         body = self.parts.whole(masses.mean)
         estimate = conclude(problem, Solution.unconstrained(data.linear_at(body.vector)), "part-masses", require=False)
-        moved = self._moved(data.blurred(error))
+        moved = self._moved(data, body)
+        error = self.shape_error.covariance(body)
         covariance = B @ masses.covariance @ B.T + error + moved.T @ moved
         return replace(
             estimate,
@@ -129,7 +133,7 @@ class PartMasses:
         rows = zip(parts.label, masses.mean, std, parts.volume, parts.centroid, names, strict=True)
         return tuple(PartMass(int(k), float(m), float(s), float(v), c, name) for k, m, s, v, c, name in rows)
 
-    def _moved(self, data: Effective) -> Array:
+    def _moved(self, data: Effective, body: InertialParameters) -> Array:
         """Return how phi (10,) changes when the grasp is off by one standard deviation, per axis (6, 10)."""
         steps = self.shape_error.grasp_steps()
         if not steps:
@@ -137,7 +141,7 @@ class PartMasses:
 
         def found(X: Pose) -> Array:
             parts = self.parts.in_frame(X)
-            return parts.whole(self._masses(data, parts).mean).vector
+            return parts.whole(self._masses(data, body, parts).mean).vector
 
         return np.stack([(found(X) - found(X.inverse())) / 2 for X in steps])
 
