@@ -39,13 +39,13 @@ SCENARIOS = ("none", "low", "moderate", "high")
 ZERO_SHARE = 1e-3
 RULES = (
     "Every method sees per row: noisy acceleration and angular acceleration, exact angular velocity and gravity in S, "
-    "noisy physical wrench (gravity down, no bias); rows shuffled (seeded), no pose, no velocity, no time; standard "
-    "deviations of the noise given (nothing at level 'none', which has one seed). ours-still: rows whose true speed is "
-    "below 0.05 m/s and 0.1 rad/s. halves: 'uniform' where the uniform-density centre of mass is within 0.5 mm of the "
-    "truth, else 'mixed'. riemannian over consistent results; consistent_pct over all runs, a failure counting as "
-    "inconsistent. com_pct_floored: the same error cut to whole percents per axis, as the published code does. bound: "
-    "Cramer-Rao with the true parts and free masses, to first order; groups: parts of equal density known as such. "
-    "zeroed: parts below 0.1 % of the mass whose true share is above."
+    "noisy physical wrench (gravity down, no bias); rows shuffled (seeded), no pose, no velocity, no time, a mark on "
+    "rows at rest; standard deviations of the noise given (nothing at level 'none', which has one seed). ours-still: "
+    "rows whose true speed is below 0.05 m/s and 0.1 rad/s. halves: 'uniform' where the uniform-density centre of "
+    "mass is within 0.5 mm of the truth, else 'mixed'. riemannian over consistent results; consistent_pct over all "
+    "runs, a failure counting as inconsistent. com_pct_floored: the same error cut to whole percents per axis, as the "
+    "published code does. bound: Cramer-Rao with the true parts and free masses, to first order; groups: parts of "
+    "equal density known as such. zeroed: parts below 0.1 % of the mass whose true share is above."
 )
 TIMING = (
     "CPU time of the calling thread, warm, median of the repeats, first seed: moments to Estimate; hps: rows to "
