@@ -15,7 +15,8 @@ def hacksaw(draw: Draw) -> Tool:
     span, depth, width, wall = draw.sizes(300, 88, 13, 1.5, spread=0.08)
     back = span + 30
     path = [(-10, -9), (-10, depth - 22), (4, depth), (back - 14, depth), (back + 2, depth - 8)]
-    tube = _bar(path, 18, width) - _bar(path, 18 - 2 * wall, width - 2 * wall, ends=1.5 * wall)
+    filled = _bar(path, 18, width)
+    tube = filled - _bar(path, 18 - 2 * wall, width - 2 * wall, ends=1.5 * wall)
     blade = block((-9, span + 5), (-6, 6.5), (-0.33, 0.33)) - union([
         rod(2, -9, 9, facets=16).translate([x, 0, 0]) for x in (-4, span)
     ])  # fmt: skip
@@ -51,7 +52,7 @@ def hacksaw(draw: Draw) -> Tool:
         Piece("rear holder", rear, CARBON_STEEL),
         Piece("wing nut", wings - bore, draw.pick(BRASS, CARBON_STEEL)),
         Piece("frame", tube, draw.pick(CARBON_STEEL, STAINLESS_STEEL), (196, 34, 34)),
-        Piece("handle", union([neck, bottom, spine]), draw.pick(ALUMINIUM, MAGNESIUM)),
+        Piece("handle", union([neck, bottom, spine]) - filled, draw.pick(ALUMINIUM, MAGNESIUM)),
         Piece("grip", grip, draw.pick(RUBBER, FOAM_RUBBER)),
     ]
     return make_tool("hacksaw", pieces, Grasp((back + 50, 0.5 * depth, 0), "x", "z"), draw)

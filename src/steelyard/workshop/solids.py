@@ -121,7 +121,18 @@ def without_slivers(solid: Solid, share: float = 2e-3) -> Solid:
     if len(pieces) < 2:
         return solid
     kept = [piece for piece in pieces if abs(piece.volume()) > share * solid.volume()]
-    return manifold3d.Manifold.compose(kept)
+    if len(kept) == len(pieces):
+        return solid
+    voids = union([_inverted(piece) for piece in kept if piece.volume() < 0])
+    return union([piece for piece in kept if piece.volume() > 0]) - voids
+
+
+def _inverted(solid: Solid) -> Solid:
+    """Return the solid whose surface is turned inside out."""
+    mesh = solid.to_mesh64()
+    return manifold3d.Manifold(
+        manifold3d.Mesh64(mesh.vert_properties[:, :3].copy(), np.ascontiguousarray(mesh.tri_verts[:, ::-1]))
+    )
 
 
 def _section(outline: Sequence[Point]) -> Any:
