@@ -115,9 +115,7 @@ def test_only_permitted_imports() -> None:
         f"{name or '__init__'} imports {target or 'the package itself'}"
         for name in modules()
         for target in own_imports(name)
-        if unit(target) != unit(name)
-        and (name, target) != VERB
-        and not admits(MAY_IMPORT[unit(name)] | SHARED, target)
+        if unit(target) != unit(name) and (name, target) != VERB and not admits(MAY_IMPORT[unit(name)] | SHARED, target)
     ]
     assert offences == []
 
