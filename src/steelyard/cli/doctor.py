@@ -11,7 +11,7 @@ from steelyard import __version__
 from steelyard.cli.console import print_json
 from steelyard.errors import CannotAnswer
 
-CORE = ("numpy", "scipy", "numba", "click")
+CORE = ("numpy", "scipy", "numba", "click", "manifold3d")
 EXTRAS = {"pyarrow": "parquet", "pin": "peers", "rigeo": "peers"}
 # A noise-free log must give the answer to rounding; the weak prior alone moves it by less than this share.
 TOLERANCE = 1e-4
@@ -36,10 +36,10 @@ def doctor(as_json: bool) -> None:
             f"steelyard {__version__}, Python {platform.python_version()} on {platform.system()} {platform.machine()}"
         )
         for name in CORE:
-            click.echo(f"  {name:8s} {versions[name]}")
+            click.echo(f"  {name:10s} {versions[name]}")
         for name, extra in EXTRAS.items():
             hint = versions[name] or f"not installed (optional: pip install 'steelyard[{extra}]')"
-            click.echo(f"  {name:8s} {hint}")
+            click.echo(f"  {name:10s} {hint}")
         click.echo(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
     if not healthy:
         raise CannotAnswer(

@@ -13,7 +13,7 @@ from steelyard.findings import Finding
 from steelyard.shape.mesh import Integers, TriangleMesh, part_moments, require_closed
 
 TOUCHING = 0.02  # of the smaller solid: rounded, faceted surfaces that touch share up to this much
-TOO_MUCH = 0.05  # of the whole: mass counted twice beyond this is no longer a detail
+TOO_MUCH = 0.1  # of the whole: mass counted twice beyond this is no longer a detail
 _INSIDE = 0.5  # winding number between outside (0) and inside (1)
 
 
@@ -116,7 +116,7 @@ def overlaps(mesh: TriangleMesh) -> tuple[Overlap, ...]:
 def overlap_finding(mesh: TriangleMesh) -> Finding | None:
     """Return the finding `parts-overlap` where solids share a little volume, else None.
 
-    Raises BadValue that names the two solids where they share over 5 % of the object's volume.
+    Raises BadValue that names the two solids where they share over 10 % of the object's volume.
     """
     found = overlaps(mesh)
     for overlap in found:
