@@ -2,9 +2,13 @@
 
 from __future__ import annotations
 
-import numpy as np
+from pathlib import Path
 
-from steelyard.errors import CannotAnswer
+import numpy as np
+import pytest
+
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.spatial import Rotation
@@ -23,3 +27,13 @@ def test_zero_torque_breaks_nothing() -> None:
     except CannotAnswer:
         return
     assert np.isfinite(estimate.std).all()
+
+
+def test_zero_torque_in_a_file_is_bad_input(tmp_path: Path) -> None:
+    rows = "\n".join(f"{0.01 * k},1,2,{3 + 0.01 * k},0,0,0,1,0,0,0" for k in range(20))
+    (tmp_path / "log.csv").write_text("t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz\n" + rows + "\n")
+    with pytest.raises(BadValue) as caught:
+        read_recording(tmp_path / "log.csv")
+    assert str(caught.value).endswith(
+        'torque is zero in every row. Give the columns that hold it or say torque = "zero" if the wrist passes no moment.'
+    )

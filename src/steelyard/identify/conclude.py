@@ -24,7 +24,7 @@ from steelyard.logs.log import Mask
 MASS_SHARE, COM_SHARE, INERTIA_SHARE = 0.1, 0.2, 0.1
 SMALLEST_RADIUS = 0.02
 # There is no answer at all where mass or centre of mass are looser than these shares of the same sizes.
-LOST_MASS, LOST_COM = 0.5, 2.5
+LOST_MASS, LOST_COM = 1 / 3, 2.5
 # Fewer blocks left out in turn say too little about error bars; below this factor they agree.
 ENOUGH_BLOCKS, WORTH_WIDENING = 10, 1.5
 # Share of its size that no number is known better than.

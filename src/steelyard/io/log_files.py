@@ -135,6 +135,11 @@ def _channels(spec: StreamSpec, table: Table, cells: Cells, gravity: Array) -> d
     for quantity in spec.quantities:
         columns = [cells[n].astype(np.float64, copy=False) for n in _numbers(quantity, table)]
         out[quantity.name] = channel(quantity, columns, gravity)
+        if quantity.name in ("force", "torque") and len(out[quantity.name]) > 1 and not out[quantity.name].any():
+            passive = ' or say torque = "zero" if the wrist passes no moment' if quantity.name == "torque" else ""
+            raise BadValue(
+                f"{spec.where}: {quantity.name} is zero in every row. Give the columns that hold it{passive}."
+            )
     if spec.zero_torque:
         if "force" not in out:
             raise BadDescription(f'{spec.where}: torque = "zero" belongs in the stream that holds "force".')

@@ -293,7 +293,8 @@ def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[
     if gravity is None:
         raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
     bare = MotionLog(wrench, gravity, acceleration, motion.omega, motion.alpha)
-    still = still_rows(time, motion.omega, motion.velocity, wrench)
+    turning = motion.rotation is not None or "angular_velocity" in given.kinematics.channels
+    still = still_rows(time, motion.omega, motion.velocity, wrench, turning)
     index = classes(still, motion.alpha_variance)
     residual = wrench - bare.predicted(clocks.body)
     share = 1.0 if given.cutoff is None else min(1.0, 2 * given.cutoff / sampling_rate(given.clock))

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.logs.conditioning import noise_std
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 Numbers = np.ndarray[Any, np.dtype[np.int64]]
@@ -14,24 +15,30 @@ Numbers = np.ndarray[Any, np.dtype[np.int64]]
 _SHORTEST_S = 0.25
 _TURNING = 0.02  # [rad/s]
 _MOVING = 0.005  # [m/s]
+_NOISES = 1.5  # times the white noise of a channel: its spread at rest, and a little
 
 
-def still_rows(time: Array, omega: Array, velocity: Array | None, wrench: Array) -> Mask:
+def still_rows(time: Array, omega: Array, velocity: Array | None, wrench: Array, turning_known: bool = True) -> Mask:
     """Return which rows (N,) are at rest for at least 0.25 s.
 
     At rest means turning below 0.02 rad/s and, where the velocity is known, moving below 5 mm/s; a motion
-    that nobody measured shows in the wrench, whose local spread must be near its least.
+    that nobody measured shows in the wrench, whose local spread must be near its least. Where nobody measured the
+    turning (`turning_known` false) a smooth motion may be the least there is: then the wrench must stay within its noise.
     """
     quiet = np.linalg.norm(omega, axis=1) < _TURNING
     if velocity is not None:
         quiet &= np.linalg.norm(velocity, axis=1) < _MOVING
     quiet &= steady(time, wrench[:, 3:])
+    if not turning_known:
+        quiet &= steady(time, wrench[:, 3:], limit=_NOISES * float(np.linalg.norm(noise_std(wrench[:, 3:]))))
     return _long_enough(time, quiet)
 
 
-def steady(time: Array, values: Array) -> Mask:
-    """Return where `values` (N, 3) hardly change within 0.25 s, judged against the quietest tenth of the
-    log."""
+def steady(time: Array, values: Array, limit: float | None = None) -> Mask:
+    """Return where `values` (N, 3) hardly change within 0.25 s, judged against the quietest tenth of the log.
+
+    limit  largest local spread; None = three times that of the quietest tenth
+    """
     step = float(np.median(np.diff(time)))
     width = max(round(_SHORTEST_S / step), 3)
     if len(time) < 2 * width:
@@ -41,7 +48,7 @@ def steady(time: Array, values: Array) -> Mask:
     mean = (sums[width:] - sums[:-width]) / width
     spread = np.sqrt(np.maximum((squares[width:] - squares[:-width]) / width - mean**2, 0).sum(1))
     least = float(np.quantile(spread, 0.1))
-    calm = spread < 3 * least + 0.003 * float(np.linalg.norm(np.ptp(values, axis=0)))
+    calm = spread < (3 * least + 0.003 * float(np.linalg.norm(np.ptp(values, axis=0))) if limit is None else limit)
     # A row is steady when any window that holds it is.
     hits = np.cumsum(np.concatenate([[0], calm]))
     rows = np.arange(len(time))
