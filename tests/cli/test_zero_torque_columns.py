@@ -34,6 +34,5 @@ def test_zero_torque_in_a_file_is_bad_input(tmp_path: Path) -> None:
     (tmp_path / "log.csv").write_text("t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz\n" + rows + "\n")
     with pytest.raises(BadValue) as caught:
         read_recording(tmp_path / "log.csv")
-    assert str(caught.value).endswith(
-        'torque is zero in every row. Give the columns that hold it or say torque = "zero" if the wrist passes no moment.'
-    )
+    text = 'Give the columns that hold it or say torque = "zero" if the wrist passes no moment.'
+    assert str(caught.value).endswith(f"torque is zero in every row. {text}")

@@ -12,6 +12,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
@@ -20,9 +21,9 @@ from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias
-from steelyard.identify.linear import reweighted
+from steelyard.identify.linear import inverse_scaled, reweighted
 from steelyard.identify.noise_levels import with_noise
-from steelyard.identify.part_findings import named_materials, part_findings
+from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import Masses, averaged_masses, free_masses, material_masses
 from steelyard.identify.problem import Problem
 from steelyard.identify.shape_error import MEASURED, ShapeError
@@ -36,6 +37,10 @@ from steelyard.spatial import Pose
 
 # The weights depend on the answer, and settle in so many rounds.
 RENEWALS = 3
+# A shape that is wrong by more than this many doublings of its error says nothing.
+DOUBLINGS = 12
+# A loosened answer keeps at least this share of the shape's second moment in every direction.
+LEAST_SHARE = 0.3
 
 
 @dataclass(frozen=True)
@@ -84,16 +89,54 @@ class PartMasses:
         return replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
 
     def _conclude(self, problem: Problem, linear: Array, score: Array | None) -> Estimate:
-        """Return the Estimate after a few rounds: weights and the size of a shape error depend on the answer."""
+        """Return the Estimate after a few rounds: weights depend on the answer.
+
+        Where homogeneous parts cannot give the wrench, the shape is trusted less, step by step, until it can: the
+        answer then moves off the shape as far as the log says.
+        """
         data = Effective.of(problem, linear, score)
         body = InertialParameters(linear[:10])
         for _ in range(RENEWALS - 1):
             body = self.parts.whole(self._masses(data, body, self.parts).mean)
             data = Effective.of(problem, data.linear_at(body.vector), score)
         masses = self._masses(data, body, self.parts)
+        first = self._estimate(problem, data, masses)
+        seen = data.blurred(self.shape_error.covariance(first.parameters))
+        findings = part_findings(first, self.parts, seen, masses.choices, self.materials)
+        if not any(f.code == "part-not-homogeneous" for f in findings):
+            return first.with_findings(*findings)
+        return self._loosened(problem, data).with_findings(*findings)
+
+    def _loosened(self, problem: Problem, data: Effective) -> Estimate:
+        """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
+        body = InertialParameters(inverse_scaled(data.information) @ data.pull)
+        limit = misfit_limit(data, len(self.parts))
+        for doubling in range(1, DOUBLINGS):
+            error = self.shape_error.scaled(2.0**doubling).covariance(self._sane(body))
+            seen = data.blurred(error)
+            masses = (averaged_masses if self.density == "averaged" else free_masses)(seen, self.parts)
+            body = self.parts.whole(masses.mean)
+            if seen.misfit(body.vector) < limit:
+                break
+        gain = error @ seen.information
+        rest = np.eye(10) - gain
         estimate = self._estimate(problem, data, masses)
-        seen = data.blurred(self.shape_error.covariance(estimate.parameters))
-        return estimate.with_findings(*part_findings(estimate, self.parts, seen, masses.choices, self.materials))
+        B = self.parts.per_mass
+        covariance = rest @ B @ masses.covariance @ B.T @ rest.T + error - gain @ error
+        moved = body.vector + error @ seen.pull - gain @ body.vector
+        note = f"the shape was trusted {2**doubling} times less than given, so that the wrench fits"
+        return replace(
+            estimate,
+            parameters=_nearest_body(body.vector, moved),
+            covariance=0.5 * (covariance + covariance.T),
+            notes=(*estimate.notes, note),
+        )
+
+    def _sane(self, body: InertialParameters) -> InertialParameters:
+        """Return the body if it is one, else one density of the same mass: the size of a shape error needs a body."""
+        if body.validity().consistent:
+            return body
+        return self.parts.whole(self.parts.volume * (abs(float(body.mass)) / self.parts.volume.sum()))
 
     def _masses(self, data: Effective, body: InertialParameters, parts: Parts) -> Masses:
         """Return the masses of the parts by the chosen model.
@@ -152,3 +195,25 @@ def _start(problem: Problem) -> Array:
     if not linear[0] > 0:
         raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
     return linear
+
+
+def _nearest_body(inside: Array, target: Array) -> InertialParameters:
+    """Return the mass and centre of `target` (10,) with as much of its inertia as stays well inside the bodies.
+
+    Between the inertia of `inside` (10,), scaled to the mass, and that of `target` the farthest point counts where no
+    principal second moment falls below a share of the former's.
+    """
+    shape, aim = InertialParameters(inside), InertialParameters(target)
+    if not aim.mass > 0:
+        return shape
+    central = shape.inertia_com * (aim.mass / shape.mass)
+    for step in np.linspace(1.0, 0.0, 21):
+        body = InertialParameters.from_com(aim.mass, aim.com, central + step * (aim.inertia_com - central))
+        if step == 0.0 or _least_share(body, InertialParameters.from_com(aim.mass, aim.com, central)) > LEAST_SHARE:
+            break
+    return body
+
+
+def _least_share(body: InertialParameters, other: InertialParameters) -> float:
+    """Return the least ratio of second moments of two bodies in any direction."""
+    return float(eigh(body.pseudo_inertia, other.pseudo_inertia, eigvals_only=True)[0])

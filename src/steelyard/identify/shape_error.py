@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -30,6 +30,11 @@ class ShapeError:
         values = (self.com_m, self.inertia_share, self.grasp_m, self.grasp_rad)
         if not all(np.isfinite(v) and v >= 0 for v in values):
             raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
+
+    def scaled(self, factor: float) -> ShapeError:
+        """Return the error with its shape part `factor` times as large, not below that of a measured shape."""
+        com = factor * max(self.com_m, MEASURED.com_m)
+        return replace(self, com_m=com, inertia_share=factor * max(self.inertia_share, MEASURED.inertia_share))
 
     def grasp_steps(self) -> list[Pose]:
         """Return displacements of one standard deviation along and about each axis that has one."""

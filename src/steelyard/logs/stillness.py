@@ -23,7 +23,7 @@ def still_rows(time: Array, omega: Array, velocity: Array | None, wrench: Array,
 
     At rest means turning below 0.02 rad/s and, where the velocity is known, moving below 5 mm/s; a motion
     that nobody measured shows in the wrench, whose local spread must be near its least. Where nobody measured the
-    turning (`turning_known` false) a smooth motion may be the least there is: then the wrench must stay within its noise.
+    turning (`turning_known` false) a smooth motion may be the least there is: then the wrench must stay in its noise.
     """
     quiet = np.linalg.norm(omega, axis=1) < _TURNING
     if velocity is not None:
