@@ -75,14 +75,17 @@ def test_a_uniform_object_is_found_uniform() -> None:
     assert density.std() / density.mean() < 0.02
 
 
-def test_intervals_hold_the_truth() -> None:
-    inside = []
+def test_intervals_hold_the_truth_and_are_not_idle() -> None:
+    errors, stds = [], []
     for seed in range(40):
         found = PartMasses(boxes(), bias="none", shape_error=EXACT).identify(log_of(TRUTH, "moderate", seed))
-        inside.append(np.abs(people(found.parameters) - people(TRUTH)) < 1.96 * found.std)
         masses = np.array([[p.mass, p.std] for p in found.parts])
-        inside.append(np.resize(np.abs(masses[:, 0] - MASSES) < 1.96 * masses[:, 1], 10))
-    assert 0.88 < np.mean(inside) < 0.995
+        errors.append(np.concatenate([people(found.parameters) - people(TRUTH), masses[:, 0] - MASSES]))
+        stds.append(np.concatenate([found.std, masses[:, 1]]))
+    inside = np.abs(errors) < 1.96 * np.array(stds)
+    assert inside.mean() > 0.9
+    width = 1.96 * np.mean(stds, 0) / np.sqrt(np.mean(np.square(errors), 0))
+    assert np.median(width) < 3.0, width
 
 
 def test_same_input_same_answer_and_order_of_rows_does_not_matter() -> None:

@@ -36,7 +36,7 @@ from steelyard.parts.parts import Parts
 from steelyard.spatial import Pose
 
 # The weights depend on the answer, and settle in so many rounds.
-RENEWALS = 3
+RENEWALS = 2
 # A shape that is wrong by more than this many doublings of its error says nothing.
 DOUBLINGS = 12
 # A loosened answer keeps at least this share of the shape's second moment in every direction.
@@ -191,7 +191,7 @@ class PartMasses:
 
 def _start(problem: Problem) -> Array:
     """Return the linear parameters (p,) of ten free numbers: the first weights come from them."""
-    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, RENEWALS)
+    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
     if not linear[0] > 0:
         raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
     return linear
