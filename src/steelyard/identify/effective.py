@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from dataclasses import dataclass, replace
 
+import numba
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
-from steelyard.identify.linear import inverse_scaled, nonnegative
+from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
+from steelyard.identify.newton import residual_map_of
 from steelyard.identify.problem import Problem
 
 
@@ -28,9 +30,9 @@ class Effective:
         H is the information with the noise of the acceleration taken out of the scatter, so that H phi = g is
         consistent; V adds what that noise does to the score, or is `score` where the log's own correlation is known.
         """
-        K = problem.residual_map(linear)
-        H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-        _, g = problem.normal_equations(problem.noise_weights(K))
+        H, extra, plain, g = _statistics(linear, problem.T, problem.scatter, problem.acceleration, problem.wrench)
+        if problem.with_bias:
+            g[10:16] += problem.bias_prior.precision @ problem.bias_prior.mean
         H = nonnegative(H, plain)
         V = problem.plus_bias_prior(H + extra if score is None else score)
         H = problem.plus_bias_prior(H)
@@ -55,3 +57,17 @@ class Effective:
         best = inverse_scaled(self.information) @ self.pull
         gap = phi - best
         return max(float(gap @ self.information @ gap), 0.0)
+
+
+@numba.njit(cache=True)
+def _statistics(
+    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
+) -> tuple[Array, Array, Array, Array]:
+    """Return the information H, what noise adds to it, the plain normal matrix and its right side at `linear` (p,)."""
+    K = residual_map_of(T, linear)
+    H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
+    weights = np.zeros((scatter.shape[0], 6, 6))
+    for c in range(scatter.shape[0]):
+        weights[c] = noise_cost.weight(K, acceleration[c], wrench[c])
+    _, g = normal_equations(T, scatter, weights)
+    return H, extra, plain, g
