@@ -1,4 +1,4 @@
-"""`steelyard bench identify|coverage|held-object`."""
+"""`steelyard bench identify|coverage|held-object|part-coverage|materials`."""
 
 from __future__ import annotations
 
@@ -91,3 +91,37 @@ def held_object(data: Path, as_json: bool, **choices: Any) -> None:
 
     result = job.run(data, progress=progress_bar("bench held-object"), **choices)
     print_json(result) if as_json else click.echo(held_object_table(result))
+
+
+_FOLDERS = click.option(
+    "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
+)
+
+
+@bench.command("part-coverage")
+@_FOLDERS
+@click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True, help="Logs per case.")
+@click.option("--noise", "noises", default="low,high", show_default=True, help="Scenarios, with commas between them.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@_JSON
+def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bool) -> None:
+    """Do 95 % intervals of part masses and of the whole hold the truth, and how long does an answer take?"""
+    from steelyard.bench import part_coverage as job
+    from steelyard.bench.part_tables import part_coverage_table
+
+    progress = progress_bar("bench part-coverage")
+    result = job.run(data, seeds, progress, noises=tuple(noises.split(",")), workers=workers)
+    print_json(result) if as_json else click.echo(part_coverage_table(result))
+
+
+@bench.command()
+@_FOLDERS
+@click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
+@_JSON
+def materials(data: Path, seeds: int, as_json: bool) -> None:
+    """How often is the right density picked from a list, at low noise?"""
+    from steelyard.bench import materials as job
+    from steelyard.bench.part_tables import materials_table
+
+    result = job.run(data, seeds, progress_bar("bench materials"))
+    print_json(result) if as_json else click.echo(materials_table(result))

@@ -1,0 +1,62 @@
+"""How long PartMasses takes on object folders: from a log in memory, and from the files."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+from pathlib import Path
+
+from steelyard.bench.held_object_cases import exact_rows, load_case, noisy_rows
+from steelyard.bench.timing import thread_ms
+from steelyard.errors import BadValue
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.part_masses import PartMasses
+from steelyard.io.object_folders import _track as read_track
+from steelyard.io.object_folders import read_object
+from steelyard.logs.log import Noise
+from steelyard.parts.known import KnownObject
+from steelyard.parts.parts import Parts
+from steelyard.simulate.handling import noise_std
+
+NOISE = "high"
+
+TIMING = (
+    "CPU time of the calling thread [ms], warm, median of the repeats, one log at noise 'high': free_ms, averaged_ms = "
+    "log in memory to Estimate with parts; log_file_ms = motion.npz to Estimate, parts in memory; read_ms = the whole "
+    "folder read and checked (mesh, cloud, truth, motion); folder_ms = folder to Estimate; both densities averaged."
+)
+
+
+def timings(folders: Sequence[Path], repeats: int) -> dict[str, dict[str, float]]:
+    """Return times [ms] per object folder."""
+    return {folder.name: _times(folder, repeats) for folder in folders}
+
+
+def _times(folder: Path, repeats: int) -> dict[str, float]:
+    case = load_case(folder, "truth")
+    if case is None:
+        raise BadValue(f"{folder.name} has no parts to identify.")
+    log = noisy_rows(case, NOISE, 0)
+    free = partial(PartMasses(case.parts, bias="none", density="free").identify, log)
+    averaged = partial(PartMasses(case.parts, bias="none").identify, log)
+    return {
+        "parts": len(case.parts),
+        "free_ms": thread_ms(free, repeats),
+        "averaged_ms": thread_ms(averaged, repeats),
+        "log_file_ms": thread_ms(
+            lambda: _from_rows(replace(case.known, track=read_track(folder / "motion.npz")), case.parts), repeats
+        ),
+        "read_ms": thread_ms(partial(read_object, folder), repeats),
+        "folder_ms": thread_ms(partial(_from_folder, folder), repeats),
+    }
+
+
+def _from_folder(folder: Path) -> Estimate:
+    known = read_object(folder)
+    return _from_rows(known, known.parts_in_sensor)
+
+
+def _from_rows(known: KnownObject, parts: Parts) -> Estimate:
+    log = replace(exact_rows(known), noise=(Noise.of_std(*noise_std(NOISE)),))
+    return PartMasses(parts, bias="none").identify(log)
