@@ -350,7 +350,7 @@ def test_streams_without_a_clock_and_of_different_lengths(tmp_path: Path) -> Non
     bare: tuple[Stream, ...] = tuple(replace(s, time=None) for s in made.streams)
     text = steelyard("identify", write(replace(made, streams=bare), tmp_path), "--json").failed(2)
     assert text.endswith(
-        'streams without time are matched by row, but their lengths differ: "wrench.csv" 5000, "pose.csv" 2500 rows.'
+        'streams without time are matched by row, but their lengths differ: "wrench.csv" 4900, "pose.csv" 2450 rows.'
     )
 
 
@@ -448,11 +448,29 @@ def test_demo(tmp_path: Path) -> None:
     run = steelyard("demo", "--json")
     assert run.status == 0
     close_to_the_hammer(run.json)
+    assert run.json["method"] == "part-masses"
+    assert run.json["findings"] == []
     np.testing.assert_allclose(run.json["truth"], BODY.vector)
+    for part, mass in zip(run.json["parts"], run.json["truth_part_masses_kg"], strict=True):
+        assert abs(part["mass_kg"] - mass) < 4 * part["std_kg"]
+    off = np.array(run.json["inertia_com_kgm2"]) - BODY.inertia_com
+    for rival in ("without_parts", "ols", "geo"):
+        assert run.json[rival]["error"]["inertia_com_kgm2"]["length"] > 3 * np.linalg.norm(np.triu(off))
     table = steelyard("demo", "--keep", tmp_path / "log")
     assert f"truth {float(BODY.mass):.2f}" in table.out
+    assert "part 1 head" in table.out
+    assert table.out.index("part 1 head") < table.out.index("GEO, uniform shape")
     assert table.err.startswith(f"The log is in {tmp_path / 'log'}; identify it with: steelyard identify ")
-    assert (tmp_path / "log" / "log.toml").exists()
+    mesh = tmp_path / "log" / "hammer.ply"
+    again = steelyard("identify", tmp_path / "log" / "log.toml", "--parts", mesh, "--json")
+    assert again.json["parts"] == run.json["parts"]
+
+
+def test_the_demo_is_slow_enough_beside_people() -> None:
+    seen = hammer.motion().at(np.linspace(0, hammer.DURATION, 5001))
+    far = float(np.linalg.norm(hammer.tool().X_OS.inverse().apply(hammer.tool().mesh.vertices), axis=1).max())
+    speed = np.linalg.norm(seen.velocity, axis=1) + far * np.linalg.norm(seen.angular_velocity, axis=1)
+    assert float(speed.max()) < 0.25
 
 
 def test_bench_identify() -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 
 import click
 import numpy as np
@@ -28,16 +28,22 @@ def plus_minus(value: float, std: float, unit: str) -> str:
     return f"{value:.{places}f} ± {std:.{places}f} {unit}"
 
 
-def estimate_table(estimate: Estimate, title: str, truth: Array | None = None) -> str:
+def estimate_table(
+    estimate: Estimate,
+    title: str,
+    truth: Array | None = None,
+    parts_truth: Mapping[int, tuple[str, float]] | None = None,
+) -> str:
     """Return the table: what is held with ±, sensor bias, evidence, findings with remedies.
 
-    `truth` (10,) of mass, com, inertia about the CoM stands beside where it is known.
+    `truth` (10,) of mass, com, inertia about the CoM and `parts_truth`, label -> name and mass [kg], stand beside
+    where they are known.
     """
     blocks = [
         click.style(title, bold=True),
-        _columns(_body_rows(estimate, truth)),
+        columns(_body_rows(estimate, truth)),
         *_inertia_note(estimate),
-        *_part_lines(estimate),
+        *_part_lines(estimate, parts_truth or {}),
         "",
         *_evidence_lines(estimate),
         "",
@@ -68,7 +74,7 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
     return rows
 
 
-def _columns(rows: Sequence[tuple[str, ...]]) -> str:
+def columns(rows: Sequence[tuple[str, ...]]) -> str:
     """Return rows as aligned columns."""
     widths = [max(len(cell) for cell in column) for column in zip(*rows, strict=True)]
     return "\n".join("  " + "   ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows)
@@ -80,15 +86,20 @@ def _inertia_note(estimate: Estimate) -> list[str]:
     return ["  inertia    not identified by these data"]
 
 
-def _part_lines(estimate: Estimate) -> list[str]:
-    """Return the parts with their masses and densities."""
+def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> list[str]:
+    """Return the parts with their masses and densities, and where it is known the truth."""
     if not estimate.parts:
         return []
-    rows = [
-        (f"part {p.label}", plus_minus(1e3 * p.mass, 1e3 * p.std, "g"), f"{p.density:.0f} kg/m³", p.material or "")
-        for p in estimate.parts
-    ]
-    return ["", _columns(rows)]
+    rows = []
+    for part in estimate.parts:
+        name, known = "", ""
+        if part.label in truth:
+            name, mass = truth[part.label]
+            known = f"truth {1e3 * mass:.{decimals(1e3 * part.std)}f}"
+        mass_cell = plus_minus(1e3 * part.mass, 1e3 * part.std, "g")
+        row = (f"part {part.label} {name}".rstrip(), mass_cell, known, f"{part.density:.0f} kg/m³", part.material or "")
+        rows.append(tuple(cell for cell, shown in zip(row, (1, 1, truth, 1, 1), strict=True) if shown))
+    return ["", columns(rows)]
 
 
 def _evidence_lines(estimate: Estimate) -> list[str]:

@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.io.result_files import write_text
 from steelyard.logs.recording import Recording, Stream
-from steelyard.spatial import Rotation
+from steelyard.spatial import Pose, Rotation
 
 _COLUMNS = {
     "force": (("fx", "fy", "fz"), 'unit = "N"'),
@@ -33,12 +33,24 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
     gravity = ", ".join(f"{g:g}" for g in recording.gravity)
     text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
+    if recording.object_pose is not None:
+        text.append(_placed(recording.object_pose, recording.object_pose_std))
     for stream in recording.streams:
         text.append(_described(stream))
         write_text(folder / stream.name, _csv(stream))
     description = folder / "log.toml"
     write_text(description, "\n".join(text))
     return description
+
+
+def _placed(pose: Pose, std: tuple[float, float] | None) -> str:
+    """Return the [object] table."""
+    position, rotation = (
+        ", ".join(f"{v:.12g}" for v in values) for values in (pose.position, pose.rotation.matrix.ravel())
+    )
+    spread = "" if std is None else f", std_mm = {1e3 * std[0]:.9g}, std_deg = {np.degrees(std[1]):.9g}"
+    place = f'position = [{position}], unit = "m", rotation = [{rotation}], form = "matrix"{spread}'
+    return f"[object]\npose_in_sensor = {{ {place} }}   # of the mesh's frame\n"
 
 
 def _described(stream: Stream) -> str:

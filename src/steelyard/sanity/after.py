@@ -125,9 +125,10 @@ def _prior(estimate: Estimate) -> tuple[Finding, ...]:
     """Return `prior-dominated` where an inertia that is given out owes its precision to the prior.
 
     Mass and centre of mass are refused, and an inertia that is not identified is withheld, before a prior could lead.
+    An answer that stands on parts has their shape, which is given and not assumed.
     """
     spread = estimate.evidence.spread
-    if spread is None or not estimate.identified.all():
+    if spread is None or estimate.parts or not estimate.identified.all():
         return ()
     alone = spread / 2
     names = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")

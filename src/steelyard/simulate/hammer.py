@@ -1,4 +1,4 @@
-"""The demo's hammer: closed-form solids, a cobot-safe motion, and the recording that a robot would have made.
+"""The demo's hammer: the workshop's, a cobot-safe motion, and the recording that a robot would have made.
 
 The recording is what real ones are: a force-torque sensor that reports the reaction with a bias, on its own clock, and
 poses from the robot's encoders on another, no accelerometer.
@@ -7,19 +7,21 @@ poses from the robot's encoders on another, no accelerometer.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 
 from steelyard.check import Array, frozen
-from steelyard.inertia import InertialParameters, solids
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate.motions import Kinematics, Step, StopAndGo
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Rotation
+from steelyard.workshop import catalogue
+from steelyard.workshop.tools import Tool
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
-WOOD, STEEL = 700.0, 7800.0
-WRENCH_HZ, POSE_HZ, DURATION = 250.0, 125.0, 20.0
+WRENCH_HZ, POSE_HZ, DURATION = 100.0, 50.0, 49.0
 FORCE_STD, TORQUE_STD = 0.1, 0.005
 BIAS = np.array([0.12, -0.31, 0.05, 3.2, -1.4, 7.9])
 ENCODER_M, ENCODER_RAD = 2e-5, 5e-5
@@ -27,32 +29,31 @@ ENCODER_M, ENCODER_RAD = 2e-5, 5e-5
 
 @dataclass(frozen=True, eq=False)
 class Example:
-    """A recording with its known answer."""
+    """A recording with its known answer, and the tool with its parts."""
 
     recording: Recording
     truth: InertialParameters
+    tool: Tool
+
+
+@cache
+def tool() -> Tool:
+    """Return the hammer of the workshop: aluminium shaft, steel head, rubber grip."""
+    return catalogue.build("hammer")
 
 
 def body() -> InertialParameters:
-    """Return the hammer in S: a wooden handle along z from 40 mm, a steel head across x with a conical peen."""
-    handle = solids.cylinder(0.014, 0.26, WOOD).in_frame(_at(0, 0, 0.17))
-    face = solids.cylinder(0.014, 0.06, STEEL).in_frame(_at(0.035, 0, 0.315, pitch=90))
-    neck = solids.box(0.03, 0.024, 0.024, STEEL).in_frame(_at(-0.01, 0, 0.315))
-    peen = solids.cone(0.012, 0.05, STEEL).in_frame(_at(-0.0375, 0, 0.315, pitch=-90))
-    return handle + face + neck + peen
-
-
-def _at(x: float, y: float, z: float, pitch: float = 0.0) -> Pose:
-    return Pose(Rotation.from_rpy([0.0, np.deg2rad(pitch), 0.0]), np.array([x, y, z]))
+    """Return the hammer in S."""
+    return tool().truth_in_sensor
 
 
 def motion() -> StopAndGo:
-    """Return seven stops over 20 s, gravity along every axis of S, turns of 1.1 s between them."""
+    """Return seven stops, gravity along every axis of S; turns of 6 s keep the tool's far end below 0.25 m/s."""
     keys = np.deg2rad([
         [0, 0, 0], [90, 0, 25], [180, 10, -20], [90, 60, 40], [0, -70, 30], [-80, 20, 0], [0, 0, 0],
     ])  # fmt: skip
     lift = Step(0.0, 2.0, np.array([0.0, 0.0, 0.15]))
-    return StopAndGo(keys, DURATION / len(keys), 1.1, (lift, Step(10.0, 2.0, np.array([0.1, 0.0, 0.0]))))
+    return StopAndGo(keys, DURATION / len(keys), 6.0, (lift, Step(DURATION / 2, 2.0, np.array([0.1, 0.0, 0.0]))))
 
 
 def recording(seed: int = 0) -> Example:
@@ -69,7 +70,8 @@ def recording(seed: int = 0) -> Example:
         Stream("wrench.csv", {"force": frozen(wrench[:, 3:]), "torque": frozen(wrench[:, :3])}, frozen(time)),
         Stream("pose.csv", {"rotation": turned.matrix, "position": frozen(position)}, frozen(poses.time)),
     )
-    return Example(Recording(streams, frozen(GRAVITY), -1, name="hammer"), truth)
+    made = Recording(streams, frozen(GRAVITY), -1, object_pose=tool().X_OS.inverse(), name="hammer")
+    return Example(made, truth, tool())
 
 
 def _exact(seen: Kinematics) -> MotionLog:
