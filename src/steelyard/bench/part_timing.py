@@ -7,6 +7,8 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from steelyard.bench.held_object_cases import exact_rows, load_case, noisy_rows
 from steelyard.bench.timing import thread_ms
 from steelyard.errors import BadValue
@@ -14,17 +16,16 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses
 from steelyard.io.object_folders import _track as read_track
 from steelyard.io.object_folders import read_object
-from steelyard.logs.log import Noise
 from steelyard.parts.known import KnownObject
 from steelyard.parts.parts import Parts
-from steelyard.simulate.handling import noise_std
+from steelyard.simulate.handling import with_noise
 
 NOISE = "high"
-
 TIMING = (
     "CPU time of the calling thread [ms], warm, median of the repeats, one log at noise 'high': free_ms, averaged_ms = "
     "log in memory to Estimate with parts; log_file_ms = motion.npz to Estimate, parts in memory; read_ms = the whole "
-    "folder read and checked (mesh, cloud, truth, motion); folder_ms = folder to Estimate; both densities averaged."
+    "folder read and checked (mesh, cloud, truth, motion); folder_ms = folder to Estimate; both densities averaged, the noise "
+    "drawn in between."
 )
 
 
@@ -58,5 +59,6 @@ def _from_folder(folder: Path) -> Estimate:
 
 
 def _from_rows(known: KnownObject, parts: Parts) -> Estimate:
-    log = replace(exact_rows(known), noise=(Noise.of_std(*noise_std(NOISE)),))
+    """Return the estimate from the object's rows; the files hold exact ones, and noise declared must be there."""
+    log = with_noise(exact_rows(known), NOISE, np.random.default_rng(0))
     return PartMasses(parts, bias="none").identify(log)
