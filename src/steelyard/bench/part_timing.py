@@ -24,8 +24,8 @@ NOISE = "high"
 TIMING = (
     "CPU time of the calling thread [ms], warm, median of the repeats, one log at noise 'high': free_ms, averaged_ms = "
     "log in memory to Estimate with parts; log_file_ms = motion.npz to Estimate, parts in memory; read_ms = the whole "
-    "folder read and checked (mesh, cloud, truth, motion); folder_ms = folder to Estimate; both densities averaged, the noise "
-    "drawn in between."
+    "folder read and checked (mesh, cloud, truth, motion); folder_ms = folder to Estimate; both densities averaged, "
+    "the noise drawn in between."
 )
 
 
