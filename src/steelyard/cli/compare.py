@@ -17,6 +17,7 @@ from steelyard.cli.console import print_json
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
     """Say whether two results can be the same object, held the same way."""
+    from steelyard.cli.table import plus_minus
     from steelyard.identify import same
     from steelyard.io import read_result
 
@@ -26,6 +27,9 @@ def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
         print_json(asdict(found) | {"same": found.same})
         return
     verdict = "the same object" if found.same else "not the same object"
-    click.echo(f"{verdict}: p = {found.p_value:.3g} (chi² {found.chi2:.1f}, {found.dof} degrees of freedom)")
+    p = f"{found.p_value:.3g}" if found.p_value > 0 else "0 to rounding"
+    click.echo(f"{verdict}: p = {p} (chi² {found.chi2:.1f}, {found.dof} degrees of freedom)")
     for name, gap, std in found.compared:
-        click.echo(f"  {name:20s} {gap:+.3e} ± {std:.1e}" + ("   <-" if abs(gap) > 3 * std else ""))
+        factor, unit = (1.0, "kg") if name == "mass" else (1e3, "mm") if name.startswith("com") else (1e6, "kg mm²")
+        far = f"   {abs(gap) / std:.0f} standard deviations" if abs(gap) > 3 * std > 0 else ""
+        click.echo(f"  {name:20s} {plus_minus(factor * gap, factor * std, unit)}{far}")

@@ -222,7 +222,7 @@ def _findings(estimate: Estimate) -> list[Finding]:
         least = (
             f"one standard deviation is at least {share:.0f} % of half its trace"
             if share < 1e3
-            else "no rotation shows it"
+            else "no measured acceleration shows it"
         )
         out.append(
             Finding.of(

@@ -13,6 +13,7 @@ from typing import Literal
 import numpy as np
 
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
 from steelyard.identify.geodesic import Geodesic
@@ -93,6 +94,9 @@ def identify(
         estimate, shared = _with_tool(options, log, bias, estimate, _in_log_sign(known, recording))
         notes = (*notes, *shared)
     notes = (*notes, *level, *unmeasured)
+    if unmeasured:
+        estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
+        aligned = replace(aligned, notes=())
     return _in_recording_sign(
         replace(
             _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late),
@@ -131,6 +135,14 @@ def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLo
         return at_rest, ("no stream measures the acceleration: only the rows at rest were used",)
     quiet = None if log.noise is None else tuple(Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) for n in log.noise)
     return replace(log, noise=quiet), ("no stream measures the acceleration: it was taken as zero throughout",)
+
+
+def _needs_acceleration(finding: Finding) -> Finding:
+    """Return the finding with the remedy that helps where nothing measured the acceleration of S."""
+    if finding.code != "inertia-not-identified":
+        return finding
+    remedy = "Record the position of the sensor or an accelerometer as well: without its acceleration only rest counts."
+    return replace(finding, remedy=remedy)
 
 
 def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
@@ -173,11 +185,11 @@ def _estimator(
     )
     if options.method == "noise-aware":
         return estimator, (prior,)
-    moving = bool((log.angular_acceleration.any(1) & ~log.still).any())
+    moving = not bool(log.still.all())
     why = (
-        "the log has rotation, and noise in its acceleration would bias least squares"
+        "noise in the acceleration of the moving rows would bias least squares"
         if moving
-        else "the log is at rest, so that the answer is that of weighted least squares kept physically consistent"
+        else "all rows used are at rest, where it is weighted least squares kept physically consistent"
     )
     return estimator, (f"method: auto chose noise-aware, because {why}", prior)
 

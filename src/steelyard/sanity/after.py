@@ -15,6 +15,7 @@ from steelyard.sanity.coverage import coverage
 from steelyard.sanity.full_fit import Rows
 from steelyard.sanity.glance import channel
 from steelyard.sanity.gravity import fitted_gravity
+from steelyard.sanity.plausible import implausible
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
 CHI2, NOISE_RATIO = 2.5, 2.5
@@ -37,7 +38,8 @@ def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recor
     rotation = rotation_of(log, aligned)
     tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
     drift = () if tilted else bias_drift(log)
-    return (*seen, *tilted, *drift, *_noise_level(estimate, recording), *_prior(estimate))
+    size = implausible(estimate, float(np.linalg.norm(recording.gravity)))
+    return (*seen, *tilted, *drift, *_noise_level(estimate, recording), *_prior(estimate), *size)
 
 
 def base_tilted(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> tuple[Finding, ...]:
