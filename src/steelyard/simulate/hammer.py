@@ -21,7 +21,7 @@ from steelyard.workshop import catalogue
 from steelyard.workshop.tools import Tool
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
-WRENCH_HZ, POSE_HZ, DURATION = 100.0, 50.0, 49.0
+WRENCH_HZ, POSE_HZ, DURATION = 100.0, 25.0, 49.0
 FORCE_STD, TORQUE_STD = 0.1, 0.005
 BIAS = np.array([0.12, -0.31, 0.05, 3.2, -1.4, 7.9])
 ENCODER_M, ENCODER_RAD = 2e-5, 5e-5
