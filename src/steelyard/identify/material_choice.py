@@ -101,7 +101,7 @@ def _all(
 def _search(
     A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, starts: Integers
 ) -> tuple[Array, Array, Array, Integers, int]:
-    """Return what was tried from the starts (S, P): one part, or all parts of one material, changed at a time."""
+    """Return what was tried from the starts (S, P): one part, all parts of one material, or two exchanged."""
     P, K = len(volume), len(centre)
     masses, evidence, spread = np.zeros((MOST, P)), np.full(MOST, -np.inf), np.zeros((MOST, P, P))
     known, count = np.full((MOST, P), -1), 0
@@ -111,12 +111,14 @@ def _search(
             improved = False
             for move in range(P + K):
                 base = current.copy()
-                for material in range(K):
+                for choice in range(K + (P if move < P else 0)):
                     trial = base.copy()
-                    if move < P:
-                        trial[move] = material
+                    if move >= P:
+                        trial[base == move - P] = choice
+                    elif choice < K:
+                        trial[move] = choice
                     else:
-                        trial[base == move - P] = material
+                        trial[move], trial[choice - K] = base[choice - K], base[move]
                     place = -1
                     for i in range(count):
                         if (known[i] == trial).all():
