@@ -4,7 +4,8 @@ import numpy as np
 
 from steelyard.io.object_writing import write_object
 from steelyard.parts.from_mesh import parts_of_mesh
-from steelyard.parts.known import Cloud, KnownObject, Track
+from steelyard.parts.known import KnownObject, Track
+from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.simulate.handling import motion_arrays
 from steelyard.spatial import Pose, Rotation

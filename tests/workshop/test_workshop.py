@@ -15,7 +15,7 @@ from steelyard.cli.workshop import workshop
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters, forms, solids
 from steelyard.io.object_folders import object_folders, read_object
-from steelyard.parts.known import Cloud
+from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import open_edges, part_moments
 from steelyard.shape.nesting import body_of, overlaps, winding_number
 from steelyard.simulate.workshop import known_object

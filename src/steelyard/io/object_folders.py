@@ -17,8 +17,9 @@ from steelyard.inertia import InertialParameters
 from steelyard.io.array_table import ArrayTable
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
-from steelyard.parts.known import MOTION, Cloud, KnownObject, Track, unseen_finding
+from steelyard.parts.known import MOTION, KnownObject, Track, unseen_finding
 from steelyard.parts.parts import Parts
+from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import overlap_finding
 from steelyard.spatial import Pose
@@ -145,7 +146,7 @@ def _cloud(path: Path, mesh: TriangleMesh) -> Cloud:
     """Return the points; every label must be one of the mesh."""
     arrays = _arrays(path, ("xyz", "rgb", "label"))
     cloud: Cloud = _value(path, lambda: Cloud(arrays["xyz"], arrays["rgb"], arrays["label"]))
-    strange = np.setdiff1d(cloud.label, mesh.labels)
+    strange = np.setdiff1d(cloud.labels, mesh.labels)
     if len(strange):
         raise BadFile(f"{path}: points carry the label {strange[0]}, and mesh.ply has no such part.")
     return cloud

@@ -35,7 +35,7 @@ def write_object(known: KnownObject, folder: Path | str) -> None:
         temporary.mkdir(parents=True)
         write_mesh(known.mesh, temporary / "mesh.ply")
         cloud = known.cloud
-        points = {"xyz": cloud.xyz, "rgb": cloud.rgb, "label": cloud.label.astype(np.int32)}
+        points = {"xyz": cloud.xyz, "rgb": cloud.rgb, "label": cloud.labels.astype(np.int32)}
         write_bytes(temporary / "points.npz", _npz(points))
         write_bytes(temporary / "motion.npz", _npz(known.track.columns()))
         write_bytes(temporary / "truth.json", (json.dumps(truth_dict(known), indent=1) + "\n").encode())
@@ -105,7 +105,7 @@ def _part(known: KnownObject, k: int) -> dict[str, Any]:
     return {
         "label": label,
         "name": known.part_names[k] if known.part_names else "",
-        "n_points": int((known.cloud.label == label).sum()),
+        "n_points": int((known.cloud.labels == label).sum()),
         "mesh_volume_m3": volume,
         "centroid_mesh_m": parts.centroid[k].tolist(),
         "kind": "solid",

@@ -14,38 +14,10 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.parts.parts import Labels, Parts
+from steelyard.parts.parts import Parts
+from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.spatial import Pose
-
-
-@dataclass(frozen=True, eq=False)
-class Cloud:
-    """N points of the visible surface in the object's frame.
-
-    xyz    (N, 3) [m]
-    rgb    (N, 3) uint8
-    label  (N,) label of the part that each point lies on
-    """
-
-    xyz: Array
-    rgb: np.ndarray[Any, np.dtype[np.uint8]]
-    label: Labels
-
-    def __post_init__(self) -> None:
-        xyz, rgb, label = check.vectors("points", self.xyz), np.asarray(self.rgb, np.uint8), np.asarray(self.label)
-        if xyz.ndim != 2 or not len(xyz) or rgb.shape != xyz.shape or label.shape != xyz.shape[:1]:
-            raise BadValue(
-                f"a cloud needs points (N, 3), colours (N, 3) and labels (N,), N > 0; "
-                f"got {xyz.shape}, {rgb.shape} and {label.shape}."
-            )
-        object.__setattr__(self, "xyz", xyz)
-        object.__setattr__(self, "rgb", rgb)
-        object.__setattr__(self, "label", label.astype(np.int64))
-
-    def __len__(self) -> int:
-        return len(self.xyz)
-
 
 # Column of Track -> its name in motion.npz.
 MOTION: Mapping[str, str] = MappingProxyType({
@@ -166,7 +138,7 @@ class KnownObject:
 
 def unseen_finding(parts: Parts, cloud: Cloud) -> Finding | None:
     """Return the finding `part-unseen` about parts on which no point lies, else None."""
-    missing = np.setdiff1d(parts.label, cloud.label)
+    missing = np.setdiff1d(parts.label, cloud.labels)
     if not len(missing):
         return None
     named = ", ".join(map(str, missing))

@@ -6,7 +6,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.parts.known import Cloud
+from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers, TriangleMesh
 from steelyard.shape.nesting import body_of
 from steelyard.workshop.finish import finished

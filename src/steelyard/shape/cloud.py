@@ -1,0 +1,74 @@
+"""Coloured points of a visible surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.shape.mesh import Colours, Integers
+from steelyard.spatial import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Cloud:
+    """N points of the visible surface in one frame.
+
+    xyz      (N, 3) [m]
+    rgb      (N, 3) uint8, None where colours are not known
+    label    (N,) label of the true part that each point lies on, None where it is not known
+    normals  (N, 3) unit vectors that leave the solid, None where they are not known
+    """
+
+    xyz: Array
+    rgb: Colours | None = None
+    label: Integers | None = None
+    normals: Array | None = None
+
+    def __post_init__(self) -> None:
+        xyz = check.vectors("points", self.xyz)
+        if xyz.ndim != 2 or not len(xyz):
+            raise BadValue(f"a cloud needs points (N, 3), N > 0; got {xyz.shape}.")
+        object.__setattr__(self, "xyz", xyz)
+        if self.rgb is not None:
+            object.__setattr__(self, "rgb", _column("colours", self.rgb, xyz.shape, np.uint8))
+        if self.label is not None:
+            object.__setattr__(self, "label", _column("labels", self.label, xyz.shape[:1], np.int64))
+        if self.normals is not None:
+            object.__setattr__(self, "normals", _column("normals", self.normals, xyz.shape, np.float64))
+
+    def __len__(self) -> int:
+        return len(self.xyz)
+
+    @property
+    def labels(self) -> Integers:
+        """The label (N,) of each point; raises BadValue where the cloud has none."""
+        if self.label is None:
+            raise BadValue("this needs a cloud whose points carry the label of their part; it has none.")
+        return self.label
+
+    @property
+    def diagonal(self) -> float:
+        """Diagonal of the box around the points along the axes of their frame [m]."""
+        return float(np.linalg.norm(np.ptp(self.xyz, axis=0)))
+
+    def chosen(self, rows: Any) -> Cloud:
+        """Return the points of `rows`, numbers or a mask."""
+        return Cloud(self.xyz[rows], *(None if c is None else c[rows] for c in (self.rgb, self.label, self.normals)))
+
+    def in_frame(self, X_AB: Pose) -> Cloud:
+        """Return the same points, given in B, seen from frame A."""
+        normals = None if self.normals is None else X_AB.rotation.apply(self.normals)
+        return Cloud(X_AB.apply(self.xyz), self.rgb, self.label, normals)
+
+
+def _column(name: str, values: Any, shape: tuple[int, ...], dtype: type) -> Any:
+    array: Any = np.array(values, dtype=dtype)
+    if array.shape != shape:
+        raise BadValue(f"a cloud of {shape[0]} points needs {name} of shape {shape}; got {array.shape}.")
+    array.flags.writeable = False
+    return array

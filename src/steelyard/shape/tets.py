@@ -1,0 +1,118 @@
+"""Tetrahedral meshes: a solid as cells of exact volume and moments, and which cells touch."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.inertia import InertialParameters
+from steelyard.shape.mesh import Integers
+from steelyard.spatial import Pose, Rotation, cross
+
+# The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.
+FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+
+
+@dataclass(frozen=True, eq=False)
+class TetMesh:
+    """T tetrahedra over V vertices, each of positive volume.
+
+    vertices  (V, 3) [m]
+    tets      (T, 4) numbers of the corners; a cell given with negative orientation has two of them exchanged
+    """
+
+    vertices: Array
+    tets: Integers
+
+    def __post_init__(self) -> None:
+        vertices = check.vectors("vertices", self.vertices)
+        tets = np.array(self.tets, dtype=np.int64)
+        if vertices.ndim != 2 or tets.ndim != 2 or tets.shape[1] != 4 or not len(tets):
+            raise BadValue(f"a solid needs vertices (V, 3) and tets (T, 4), T > 0; got {vertices.shape}, {tets.shape}.")
+        if tets.min() < 0 or tets.max() >= len(vertices):
+            raise BadValue(f"tets must name vertices 0..{len(vertices) - 1}; got {tets.min()}..{tets.max()}.")
+        turned = _volumes(vertices, tets) < 0
+        tets[turned] = tets[turned][:, [0, 1, 3, 2]]
+        tets.flags.writeable = False
+        object.__setattr__(self, "vertices", vertices)
+        object.__setattr__(self, "tets", tets)
+
+    def __len__(self) -> int:
+        return len(self.tets)
+
+    @cached_property
+    def volumes(self) -> Array:
+        """Volume (T,) of each cell [m^3]."""
+        return _volumes(self.vertices, self.tets)
+
+    @property
+    def volume(self) -> float:
+        """Volume of the solid [m^3]."""
+        return float(self.volumes.sum())
+
+    @cached_property
+    def centroids(self) -> Array:
+        """Centroid (T, 3) of each cell [m]."""
+        return np.asarray(self.vertices[self.tets].mean(1))
+
+    @cached_property
+    def neighbours(self) -> Integers:
+        """The cell (T, 4) behind the face opposite each corner, -1 at the surface."""
+        corners = np.sort(self.tets[:, FACES].reshape(-1, 3), axis=1)
+        order = np.lexsort(corners.T)
+        same = (corners[order[1:]] == corners[order[:-1]]).all(1)
+        first, second = order[:-1][same], order[1:][same]
+        found = np.full(4 * len(self), -1, dtype=np.int64)
+        found[first], found[second] = second // 4, first // 4
+        return found.reshape(-1, 4)
+
+    @cached_property
+    def dual(self) -> Integers:
+        """Pairs (E, 2) of cells that share a face, each once, the lower number first."""
+        cell = np.repeat(np.arange(len(self)), 4)
+        other = self.neighbours.ravel()
+        once = cell < other
+        return np.stack([cell[once], other[once]], axis=1)
+
+    @property
+    def surface(self) -> Integers:
+        """Triangles (F, 3) of the boundary, counter-clockwise seen from outside."""
+        return self.tets[:, FACES].reshape(-1, 3)[self.neighbours.ravel() < 0]
+
+    def moments(self, group: Any, count: int) -> Array:
+        """Return the ten parameters (count, 10) of groups of cells at 1 kg/m^3; `group` (T,) numbers each cell's.
+
+        Source: a tetrahedron's second moment about a point is V/20 (sum v v^T + s s^T), s the sum of its corners.
+        """
+        group = np.asarray(group, np.int64)
+        middle = self.vertices[self.tets.ravel()].mean(0)
+        corners = np.moveaxis(self.vertices[self.tets] - middle, 1, 0)
+        total = corners.sum(0)
+        pseudo = np.empty((count, 4, 4))
+        for i in range(3):
+            pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(group, self.volumes / 4 * total[:, i], count)
+            for j in range(i, 3):
+                second = (corners[..., i] * corners[..., j]).sum(0) + total[:, i] * total[:, j]
+                pseudo[:, i, j] = pseudo[:, j, i] = np.bincount(group, self.volumes / 20 * second, count)
+        pseudo[:, 3, 3] = np.bincount(group, self.volumes, count)
+        about_middle = InertialParameters.from_pseudo_inertia(pseudo)
+        return about_middle.in_frame(Pose(Rotation.identity(count), np.tile(middle, (count, 1)))).vector
+
+    def chosen(self, cells: Any) -> TetMesh:
+        """Return some of the cells over the same vertices, numbers or a mask."""
+        return TetMesh(self.vertices, self.tets[cells])
+
+    def in_frame(self, X_AB: Pose) -> TetMesh:
+        """Return the same solid, given in B, seen from frame A."""
+        return TetMesh(X_AB.apply(self.vertices), self.tets)
+
+
+def _volumes(vertices: Array, tets: Integers) -> Array:
+    a, b, c, d = np.moveaxis(vertices[tets], 1, 0)
+    return np.asarray((cross(b - a, c - a) * (d - a)).sum(-1) / 6)
