@@ -217,7 +217,7 @@ BAD: dict[str, tuple[Callable[[Path], None], str]] = {
     "points are no npz": (lambda d: (d / "points.npz").write_text("x y z") and None, "DIR/points.npz: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."),
     "pickle": (pickled, 'DIR/points.npz: array "xyz" holds pickled Python objects, which can run code when opened; it was not opened. Save it as plain numbers (float64).'),
     "no labels": (change_array("points.npz", "label", None), 'DIR/points.npz: array "label" is missing. It needs xyz, rgb, label.'),
-    "few labels": (change_array("points.npz", "label", [0, 1]), "DIR/points.npz: a cloud needs points (N, 3), colours (N, 3) and labels (N,), N > 0; got (2000, 3), (2000, 3) and (2,)."),
+    "few labels": (change_array("points.npz", "label", [0, 1]), "DIR/points.npz: a cloud of 2000 points needs labels of shape (2000,); got (2,)."),
     "strange label": (change_array("points.npz", "label", np.full(2000, 9)), "DIR/points.npz: points carry the label 9, and mesh.ply has no such part."),
     "words for labels": (change_array("points.npz", "label", np.full(2000, "a")), 'DIR/points.npz: array "label" must hold real numbers; it holds <U1.'),
     "no torque": (change_array("motion.npz", "torque_sensor", None), 'DIR/motion.npz: array "torque_sensor" is missing. It needs time, rotation_world_from_sensor, position_world, linear_velocity_sensor, angular_velocity_sensor, linear_acceleration_sensor, angular_acceleration_sensor, gravity_sensor, force_sensor, torque_sensor.'),
