@@ -28,23 +28,28 @@ def workshop() -> None:
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of variants and clouds.")
 @click.option("--tools", multiple=True, help="Only these families (repeat the option).")
+@click.option("--graded", is_flag=True, help="The graded families: tools with parts that are not homogeneous.")
 @click.option("--motion", type=click.Choice(["paper", "slow", "static"]), default="paper", show_default=True)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def build(folder: Path, variants: int, seed: int, tools: tuple[str, ...], motion: str, as_json: bool) -> None:
+def build(
+    folder: Path, variants: int, seed: int, tools: tuple[str, ...], graded: bool, motion: str, as_json: bool
+) -> None:
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
     from steelyard.io.object_writing import write_object
     from steelyard.simulate.workshop import known_object
-    from steelyard.workshop.catalogue import FAMILIES
-    from steelyard.workshop.catalogue import build as build_tool
+    from steelyard.workshop.catalogue import FAMILIES, build_graded
+    from steelyard.workshop.catalogue import build as build_even
+    from steelyard.workshop.graded import GRADED
 
     begun = time.perf_counter()
-    jobs = [(name, k) for k in range(max(variants, 1)) for name in tools or FAMILIES]
+    build_tool, families = (build_graded, GRADED) if graded else (build_even, FAMILIES)
+    jobs = [(name, k) for k in range(max(variants, 1)) for name in tools or families]
     progress = progress_bar("workshop build")
     rows: list[dict[str, Any]] = []
     for done, (name, k) in enumerate(jobs, start=1):
         tool = build_tool(name, (seed, k) if variants else None)
         known = known_object(tool, seed, motion)
-        known = replace(known, name=f"{name}-s{seed}-{k}" if variants else name)
+        known = replace(known, name=f"{tool.name}-s{seed}-{k}" if variants else tool.name)
         write_object(known, folder / known.name)
         rows.append({
             "name": known.name, "mass_kg": float(known.truth.mass), "parts": len(known.parts), "half": known.half,

@@ -72,6 +72,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
         box=np.asarray(facts["reference_extents_sensor_m"], float),
         track=_track(folder / "motion.npz") if motion else None,
         part_names=_names(facts, parts),
+        gradings=_gradings(facts, parts),
         facts=facts,
         findings=tuple(finding for finding in (overlapping, unseen) if finding),
     )
@@ -129,6 +130,12 @@ def _names(facts: dict[str, Any], parts: Parts) -> tuple[str, ...]:
     """Return the name of each part where all have one."""
     names = tuple(str(row.get("name", "")) for row in _rows(facts, parts))
     return names if all(names) else ()
+
+
+def _gradings(facts: dict[str, Any], parts: Parts) -> tuple[str, ...]:
+    """Return how the density changes within each part; empty where all are homogeneous."""
+    said = tuple(str(row.get("grading", "")) for row in _rows(facts, parts))
+    return said if any(said) else ()
 
 
 def _masses(path: Path, facts: dict[str, Any], parts: Parts) -> Array | None:

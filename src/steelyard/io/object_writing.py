@@ -20,6 +20,10 @@ PARTS_NOTE = (
     "Exact integrals over the closed solids of the mesh; material, density and mass are the truth from which the whole "
     "is summed. The *_fitted keys repeat them under the names of the published set."
 )
+GRADED_NOTE = (
+    " Where homogeneous is false the density changes within the part as grading says: density is its mean, and the "
+    "whole is exact for the density as it is."
+)
 
 
 def write_object(known: KnownObject, folder: Path | str) -> None:
@@ -75,7 +79,7 @@ def truth_dict(known: KnownObject) -> dict[str, Any]:
         "uniform_density_reference": _uniform(known, float(in_mesh.mass)),
         "wrench_note": "force_sensor, torque_sensor: sensor on object, gravity_sensor points down; no noise",
         "parts": [_part(known, k) for k in range(len(known.parts))],
-        "parts_note": PARTS_NOTE,
+        "parts_note": PARTS_NOTE + (GRADED_NOTE if any(known.gradings) else ""),
         "parts_fit_error": {"mass_percent": 0.0, "com_max_mm": 0.0, "inertia_max_percent_of_mean_diag": 0.0},
         "source": {"made_by": "steelyard workshop build"},
     }
@@ -118,4 +122,5 @@ def _part(known: KnownObject, k: int) -> dict[str, Any]:
         "density_fitted_kg_m3": mass / volume,
         "mass_fitted_kg": mass,
         "material_alternatives_not_excluded": [],
+        **({"homogeneous": not known.gradings[k], "grading": known.gradings[k]} if any(known.gradings) else {}),
     }

@@ -101,6 +101,7 @@ class KnownObject:
     box            (3,) edges of the object's box along the axes of S, for size-based errors [m]
     track          its exact motion, None where there is none
     part_names     (P,) what each part is; empty where nothing says
+    gradings       (P,) how the density changes within each part, "" where it is even; empty where all are
     facts          further entries of the file, as they stand there
     findings       what a reader must know about the files
     """
@@ -116,6 +117,7 @@ class KnownObject:
     box: Array
     track: Track | None = None
     part_names: tuple[str, ...] = ()
+    gradings: tuple[str, ...] = ()
     facts: Mapping[str, Any] = field(default_factory=dict)
     findings: tuple[Finding, ...] = ()
 

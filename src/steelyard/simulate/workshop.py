@@ -26,5 +26,6 @@ def known_object(tool: Tool, seed: int = 0, variant: str = "paper") -> KnownObje
         box=box_in_sensor(cloud, X_SO),
         track=Track.from_columns(motion_arrays(variant, tool.truth_in_sensor)),
         part_names=tool.part_names,
+        gradings=tool.gradings,
         findings=(unseen,) if unseen else (),
     )

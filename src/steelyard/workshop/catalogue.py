@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import zlib
 from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from types import MappingProxyType
 
 import numpy as np
@@ -14,6 +15,8 @@ import numpy as np
 from steelyard.errors import BadValue
 from steelyard.workshop import calipers, clamps, drivers, hammers, locking, plain, pliers, saws, wrenches
 from steelyard.workshop.draw import Draw
+from steelyard.workshop.graded import GRADED
+from steelyard.workshop.grading import graded
 from steelyard.workshop.tools import Tool
 
 FAMILIES: Mapping[str, Callable[[Draw], Tool]] = MappingProxyType({
@@ -59,3 +62,15 @@ def build(name: str, seed: int | Sequence[int] | None = None) -> Tool:
         raise BadValue(f"There is no tool '{name}'; there are: {', '.join(FAMILIES)}.")
     rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(name.encode())])
     return FAMILIES[name](Draw(rng))
+
+
+def build_graded(name: str, seed: int | Sequence[int] | None = None) -> Tool:
+    """Return the tool of `build` with parts that are not homogeneous, under the name graded-NAME.
+
+    Surfaces, labels and colours are those of the even tool. Raises BadValue where the family has no graded form.
+    """
+    if name not in GRADED:
+        raise BadValue(f"There is no graded tool '{name}'; there are: {', '.join(GRADED)}.")
+    rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(f"graded-{name}".encode())])
+    tool = build(name, seed)
+    return replace(graded(tool, GRADED[name](Draw(rng))), name=f"graded-{name}")

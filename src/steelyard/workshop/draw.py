@@ -38,3 +38,7 @@ class Draw:
     def density(self, material: Material) -> float:
         """Return a density within the material's tolerance [kg/m^3]."""
         return self.size(material.density, material.tolerance)
+
+    def sign(self) -> float:
+        """Return 1, or with a generator 1 or -1."""
+        return 1.0 if self.rng is None or self.rng.random() < 0.5 else -1.0

@@ -62,9 +62,11 @@ class Tool:
     parts      the P solids, labels 0..P-1
     part_names (P,) what each part is
     materials  (P,)
-    densities  (P,) [kg/m^3]
+    densities  (P,) [kg/m^3], the mean over each part
     X_OS       pose of the sensor frame in O
     finish     how the surface looks: "even", "scuffed" or "shaded"
+    gradings   (P,) how the density changes within each part, "" where it is even; empty where all are
+    graded_moments  (P, 10) the ten parameters of each part in O where some are not even; None where all are
     """
 
     name: str
@@ -75,6 +77,8 @@ class Tool:
     densities: Array
     X_OS: Pose
     finish: Finish = "even"
+    gradings: tuple[str, ...] = ()
+    graded_moments: Array | None = None
 
     @property
     def masses(self) -> Array:
@@ -84,6 +88,8 @@ class Tool:
     @property
     def truth(self) -> InertialParameters:
         """The whole tool in O: the sum over its parts of density times volume moments."""
+        if self.graded_moments is not None:
+            return InertialParameters(self.graded_moments.sum(0))
         return InertialParameters(self.densities @ self.parts.moments)
 
     @property
