@@ -48,6 +48,11 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
     help="Mesh (.ply) of the object whose faces carry part numbers; needs [object] pose_in_sensor.",
 )
 @click.option(
+    "--pose-in-sensor",
+    metavar="TOML",
+    help="Where the object sits in the sensor: a file with [object] pose_in_sensor, or the table itself in quotes.",
+)
+@click.option(
     "--object-size",
     type=float,
     metavar="M",
@@ -57,7 +62,7 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, pendant: bool,
-             output: Path | None, as_json: bool, **chosen: Any) -> None:  # fmt: skip
+             pose_in_sensor: str | None, output: Path | None, as_json: bool, **chosen: Any) -> None:  # fmt: skip
     """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
     if pendant == (log is not None):
         raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
@@ -68,7 +73,8 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     from steelyard.pipelines.held_object import Options
 
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
-    estimate = api.identify(recording, Options(**chosen), tool=tool, parts=parts, data=data)
+    given = {"tool": tool, "parts": parts, "pose_in_sensor": pose_in_sensor, "data": data}
+    estimate = api.identify(recording, Options(**chosen), **given)  # type: ignore[arg-type]
     if output is not None:
         write_result(estimate, output)
     if as_json:

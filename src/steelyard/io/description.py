@@ -13,9 +13,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.entries import Entry
-from steelyard.io.stream_entries import StreamSpec, parse_pose, parse_stream
+from steelyard.io.object_pose import ObjectPose, parse_object_pose
+from steelyard.io.stream_entries import StreamSpec, parse_stream
 from steelyard.logs.recording import STANDARD_GRAVITY
-from steelyard.spatial import Pose
 
 EXAMPLE = """\
 [log]
@@ -51,7 +51,7 @@ class Description:
     wrench_sign  +1 on-object, -1 on-sensor
     noise        standard deviations, SI
     tool         path of a result, as written
-    object_pose, object_pose_std   pose of O in S and its spread (m, rad)
+    placed       pose of O in S, None where nothing says
     """
 
     streams: tuple[StreamSpec, ...]
@@ -59,8 +59,7 @@ class Description:
     wrench_sign: int = 1
     noise: Mapping[str, float] = field(default_factory=dict)
     tool: str | None = None
-    object_pose: Pose | None = None
-    object_pose_std: tuple[float, float] | None = None
+    placed: ObjectPose | None = None
 
 
 def read_description(path: Path) -> Description:
@@ -98,15 +97,14 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         raise log.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
     if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
         raise log.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
-    pose, spread = _object_pose(_section(top, "object"))
+    placed = parse_object_pose(_section(top, "object"))
     return Description(
         streams=_streams(top),
         gravity=gravity,
         wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
         noise=_noise(_section(top, "noise")),
         tool=log.text("tool"),
-        object_pose=pose,
-        object_pose_std=spread,
+        placed=placed,
     )
 
 
@@ -124,20 +122,6 @@ def _section(top: Entry, key: str) -> Entry:
 def _noise(entry: Entry) -> dict[str, float]:
     entry.only(*_NOISE)
     return {key: entry.positive(key, _LOUDEST) for key in _NOISE if key in entry}
-
-
-def _object_pose(entry: Entry) -> tuple[Pose | None, tuple[float, float] | None]:
-    entry.only("pose_in_sensor")
-    if "pose_in_sensor" not in entry:
-        return None, None
-    table = entry.table("pose_in_sensor")
-    rotation, position = parse_pose(table, "std_mm", "std_deg")
-    if rotation is None or position is None:
-        raise table.error('give both "rotation" and "position".')
-    spread = None
-    if "std_mm" in table or "std_deg" in table:
-        spread = (table.positive("std_mm") * 1e-3, float(np.radians(table.positive("std_deg"))))
-    return Pose(rotation, position), spread
 
 
 def _streams(top: Entry) -> tuple[StreamSpec, ...]:

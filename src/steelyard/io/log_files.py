@@ -118,14 +118,15 @@ def _recording(
     )
     require_matched_rows(streams, path.name)
     tool = None if description.tool is None else str(find_file(description.tool, path.parent, data))
+    placed = description.placed
     return Recording(
         streams,
         gravity=check.frozen(description.gravity),
         wrench_sign=description.wrench_sign,
         noise=description.noise,
         tool=tool,
-        object_pose=description.object_pose,
-        object_pose_std=description.object_pose_std,
+        object_pose=None if placed is None else placed.pose,
+        object_pose_std=None if placed is None else placed.std,
         name=path.stem,
     )
 

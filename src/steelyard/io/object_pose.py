@@ -1,0 +1,67 @@
+"""Where the object sits in the sensor: the one entry that shapes need, in a description or on its own."""
+
+from __future__ import annotations
+
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from steelyard.errors import BadDescription
+from steelyard.io.entries import Entry
+from steelyard.io.stream_entries import parse_pose
+from steelyard.spatial import Pose
+
+_EXAMPLE = '{ position = [0, 0, 0.12], unit = "m", rotation = [1,0,0, 0,1,0, 0,0,1], form = "matrix" }'
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectPose:
+    """Pose of the scan's frame O in the sensor frame S, and its spread.
+
+    pose  X_SO
+    std   (position [m], rotation [rad]), None where nothing says
+    """
+
+    pose: Pose
+    std: tuple[float, float] | None = None
+
+
+def parse_object_pose(entry: Entry) -> ObjectPose | None:
+    """Return what `pose_in_sensor` of an [object] section says, None where it is not there; raises BadDescription."""
+    entry.only("pose_in_sensor")
+    if "pose_in_sensor" not in entry:
+        return None
+    table = entry.table("pose_in_sensor")
+    rotation, position = parse_pose(table, "std_mm", "std_deg")
+    if rotation is None or position is None:
+        raise table.error('give both "rotation" and "position".')
+    if "std_mm" not in table and "std_deg" not in table:
+        return ObjectPose(Pose(rotation, position))
+    return ObjectPose(
+        Pose(rotation, position), (table.positive("std_mm") * 1e-3, float(np.radians(table.positive("std_deg"))))
+    )
+
+
+def read_object_pose(text: str) -> ObjectPose:
+    """Return the pose that `text` gives: a TOML file with an [object] section, or the inline table itself.
+
+    Raises BadDescription.
+    """
+    written = text.strip()
+    try:
+        if not written.startswith("{"):
+            written = Path(written).read_text(encoding="utf-8")
+            top = tomllib.loads(written)
+        else:
+            top = {"object": tomllib.loads(f"pose_in_sensor = {written}")}
+    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
+        raise BadDescription(f"pose in sensor: {error}. Give a TOML file with [object], or {_EXAMPLE}") from None
+    section = top.get("object", {})
+    found = parse_object_pose(Entry(section if isinstance(section, dict) else {}, "pose in sensor, [object]"))
+    if found is None:
+        raise BadDescription(
+            f"pose in sensor: {text} has no [object] pose_in_sensor. Write pose_in_sensor = {_EXAMPLE}"
+        )
+    return found
