@@ -1,0 +1,125 @@
+"""TeamRows: a recording of a team on one even clock, robots stacked, with masks of what was measured."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array, frozen
+from steelyard.errors import BadValue
+from steelyard.logs.team_log import TeamRecording
+from steelyard.logs.team_track import Mask, Track
+from steelyard.spatial import Rotation
+
+_EVEN = 0.01  # a step that differs from the median by less than this share is jitter of the stamps
+_BRIDGED = 2.5  # median steps: a value between two samples nearer than this is measured, farther it is missing
+
+
+@dataclass(frozen=True, eq=False)
+class TeamRows:
+    """Rows (T,) at one even clock for robots (N,), in the order of `names`.
+
+    rotation, position   poses X_HG (N, T, 3, 3), (N, T, 3) [m]
+    twist                body twists (N, T, 6) [rad/s, m/s] of the grasp
+    twist_rate           their derivative, component by component (N, T, 6) [rad/s^2, m/s^2]
+    gravity              (N, T, 3) [m/s^2] in the grasp's axes
+    wrench               (N, T, 6) [N m, N] applied to the payload at the grasp
+    has_pose, has_twist, has_rate, has_gravity, has_wrench   (N, T) what was measured; values elsewhere mean nothing
+    """
+
+    names: tuple[str, ...]
+    time: Array
+    rotation: Array
+    position: Array
+    twist: Array
+    twist_rate: Array
+    gravity: Array
+    wrench: Array
+    has_pose: Mask
+    has_twist: Mask
+    has_rate: Mask
+    has_gravity: Mask
+    has_wrench: Mask
+
+    def __post_init__(self) -> None:
+        for name in ("time", "rotation", "position", "twist", "twist_rate", "gravity", "wrench"):
+            object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def index(self, name: str) -> int:
+        """Return the place of a robot along the first axis."""
+        return self.names.index(name)
+
+    def trimmed(self, seconds: float) -> TeamRows:
+        """Return the rows without the first and last `seconds`; raises BadValue where nothing is left."""
+        keep = (self.time >= self.time[0] + seconds) & (self.time <= self.time[-1] - seconds)
+        if not keep.any():
+            raise BadValue(f"a recording must be longer than twice the {seconds:g} s cut from its ends.")
+        parts = {n: getattr(self, n)[:, keep] for n in self.__dataclass_fields__ if n not in ("names", "time")}
+        return TeamRows(self.names, self.time[keep], **parts)
+
+
+def common_time(recording: TeamRecording, names: Sequence[str]) -> Array:
+    """Return the even clock (T,) [s] of the robots in `names` that have a track.
+
+    The stamps themselves where all agree and are even; else even steps of the median rate over the time that all cover.
+    """
+    tracks = [recording.tracks[name] for name in names if name in recording.tracks]
+    first = tracks[0].time
+    if len(first) > 1 and recording.synchronised:
+        steps = np.diff(first)
+        if np.abs(steps - np.median(steps)).max() < _EVEN * np.median(steps):
+            return first
+    begin, end = max(float(t.time[0]) for t in tracks), min(float(t.time[-1]) for t in tracks)
+    rates = [1 / float(np.median(np.diff(t.time))) for t in tracks if len(t) > 1]
+    if not rates or end <= begin:
+        raise BadValue(f"'{recording.name}' needs at least two samples of every robot in the time that all cover.")
+    return begin + np.arange(int((end - begin) * max(rates) * (1 + 1e-9)) + 1) / max(rates)
+
+
+def mean_rotation(track: Track) -> Rotation:
+    """Return the rotation nearest to the mean of the measured ones."""
+    return Rotation.nearest(track.channels["rotation"][track.mask("rotation")].mean(0))
+
+
+def channel_at(track: Track, name: str, time: Array) -> tuple[Array, Mask]:
+    """Return a channel (M, 3) at `time` (M,), and where (M,) it was measured.
+
+    A rotation is returned as rotation vectors in G, away from `mean_rotation`. Samples at the very stamps are taken
+    as they are; between them, and over missing rows, a curve without overshoot stands in.
+    """
+    values, good = _vectors(track, name), track.valid[name]
+    same = len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6)
+    if good.all() and same:
+        return values, good
+    known = track.time[good]
+    if len(known) < 2:
+        return np.zeros((len(time), 3)), np.zeros(len(time), np.bool_)
+    step = float(np.median(np.diff(track.time)))
+    return _between(known, values[good], time), good if same else _near_samples(known, time, step)
+
+
+def _vectors(track: Track, name: str) -> Array:
+    if name != "rotation":
+        return track.channels[name]
+    return (mean_rotation(track).inverse() @ Rotation(track.channels["rotation"])).log()
+
+
+def _between(known: Array, values: Array, time: Array) -> Array:
+    """Return values at `time`: cubic where samples are near, monotone where they are not; ends held."""
+    from scipy.interpolate import CubicSpline, PchipInterpolator
+
+    inside = np.clip(time, known[0], known[-1])
+    steps = np.diff(known)
+    if len(known) > 3 and steps.max() <= _BRIDGED * np.median(steps):
+        return np.asarray(CubicSpline(known, values)(inside))
+    return np.asarray(PchipInterpolator(known, values)(inside))
+
+
+def _near_samples(known: Array, time: Array, step: float) -> Mask:
+    """Return which of `time` lie between two samples that are near each other."""
+    after = np.clip(np.searchsorted(known, time - 1e-6), 0, len(known) - 1)
+    before = np.clip(np.searchsorted(known, time + 1e-6, "right") - 1, 0, len(known) - 1)
+    inside = (time >= known[0] - 1e-6) & (time <= known[-1] + 1e-6)
+    return np.asarray(inside & (known[after] - known[before] <= _BRIDGED * step))
