@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from steelyard.check import Array
 from steelyard.identify import density_priors
 from steelyard.identify.effective import Effective
-from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.material_choice import Choices, choose
+from steelyard.identify.nonnegative import nonnegative_masses, spread_about
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
 
@@ -29,11 +28,8 @@ class Masses:
 def free_masses(data: Effective, parts: Parts) -> Masses:
     """Return masses that are only kept from falling below zero."""
     A, b = _in_masses(data, parts)
-    mean = _nonnegative(A, b)
-    held = mean > 0
-    covariance = np.zeros_like(A)
-    covariance[np.ix_(held, held)] = inverse_scaled(A[np.ix_(held, held)])
-    return Masses(mean, covariance)
+    mean = nonnegative_masses(A, b)
+    return Masses(mean, spread_about(A, b, mean))
 
 
 def averaged_masses(data: Effective, parts: Parts) -> Masses:
@@ -62,19 +58,9 @@ def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:
 
 def _families(A: Array, b: Array, volume: Array) -> list[tuple[Array, Array, Array]]:
     """Return both families of density models: masses, log evidence and covariances of each model."""
-    start = np.full(len(volume), np.log(max(float(_nonnegative(A, b).sum()), 1e-6) / volume.sum()))
+    start = np.full(len(volume), np.log(max(float(nonnegative_masses(A, b).sum()), 1e-6) / volume.sum()))
     common = density_priors.common_density(A, b, volume, start)
     widest = np.log(common[0][-1] / volume)
     starts = density_priors.first_partitions(widest)
     masses, evidence, spread, _, looked = density_priors.equal_groups(A, b, volume, widest, starts)
     return [common, (masses[:looked], evidence[:looked], spread[:looked])]
-
-
-def _nonnegative(A: Array, b: Array) -> Array:
-    """Return m >= 0 that minimises m^T A m / 2 - b^T m (Lawson and Hanson on a root of A)."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(A), 1e-300))
-    values, vectors = np.linalg.eigh(A * np.outer(scale, scale))
-    kept = values > 1e-12 * values[-1]
-    root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
-    target = (vectors[:, kept].T @ (scale * b)) / np.sqrt(values[kept])
-    return np.asarray(scale * nnls(root, target, maxiter=50 * len(b))[0])
