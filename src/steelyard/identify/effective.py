@@ -30,17 +30,9 @@ class Effective:
         H is the information with the noise of the acceleration taken out of the scatter, so that H phi = g is
         consistent; V adds what that noise does to the score, or is `score` where the log's own correlation is known.
         """
-        H, extra, plain, g = _statistics(linear, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-        if problem.with_bias:
-            g[10:16] += problem.bias_prior.precision @ problem.bias_prior.mean
-        H = nonnegative(H, plain)
-        V = problem.plus_bias_prior(H + extra if score is None else score)
-        H = problem.plus_bias_prior(H)
-        bread = inverse_scaled(H[10:, 10:]) if problem.with_bias else np.zeros((0, 0))
-        project = np.concatenate([np.eye(10), -H[:10, 10:] @ bread], 1)
-        half = (project @ H[:, :10]) @ inverse_scaled(project @ V @ project.T)
-        information = half @ (project @ H[:, :10])
-        return cls(0.5 * (information + information.T), half @ (project @ g), bread @ g[10:], bread @ H[10:, :10])
+        data = (linear, problem.T, problem.scatter, problem.acceleration, problem.wrench)
+        score = np.zeros((0, 0)) if score is None else score
+        return cls(*_effective(*data, problem.bias_prior.mean, problem.bias_prior.precision, score))
 
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
@@ -57,6 +49,36 @@ class Effective:
         best = inverse_scaled(self.information) @ self.pull
         gap = phi - best
         return max(float(gap @ self.information @ gap), 0.0)
+
+
+@numba.njit(cache=True)
+def _effective(
+    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
+    bias_mean: Array, bias_precision: Array, score: Array,
+) -> tuple[Array, Array, Array, Array]:  # fmt: skip
+    """Return the fields of `Effective` at `linear` (p,); an empty `score` means that noise is white."""
+    size = len(linear)
+    H, extra, plain, g = _statistics(linear, T, scatter, acceleration, wrench)
+    H = nonnegative(H, plain)
+    V = H + extra if score.shape[0] == 0 else score.copy()
+    if size > 10:
+        g[10:16] += bias_precision @ bias_mean
+        H, bread = H.copy(), np.zeros((size - 10, size - 10))
+        V[10:16, 10:16] += bias_precision
+        H[10:16, 10:16] += bias_precision
+        bread = inverse_scaled(H[10:, 10:])
+    else:
+        bread = np.zeros((0, 0))
+    project = np.zeros((10, size))
+    project[:, :10] = np.eye(10)
+    if size > 10:
+        project[:, 10:] = -np.ascontiguousarray(H[:10, 10:]) @ bread
+    slope = project @ np.ascontiguousarray(H[:, :10])
+    half = slope @ inverse_scaled(project @ V @ project.T)
+    information = half @ slope
+    bias_at = bread @ g[10:]
+    bias_slope = bread @ np.ascontiguousarray(H[10:, :10])
+    return 0.5 * (information + information.T), half @ (project @ g), bias_at, bias_slope
 
 
 @numba.njit(cache=True)

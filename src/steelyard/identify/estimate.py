@@ -11,7 +11,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.inertia import InertialParameters, forms
+from steelyard.identify.people import people_jacobian
+from steelyard.inertia import InertialParameters
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,9 +91,7 @@ class Estimate:
     @cached_property
     def people_covariance(self) -> Array:
         """Covariance (10, 10) of mass, com, inertia about the CoM (first order)."""
-        jacobian = np.zeros((10, 10))
-        jacobian[0, 0] = 1
-        jacobian[1:] = forms.com_jacobian(self.parameters.vector)
+        jacobian = people_jacobian(self.parameters.vector)
         return np.asarray(jacobian @ self.covariance @ jacobian.T)
 
     @cached_property

@@ -8,7 +8,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.inertia import InertialParameters, forms
+from steelyard.identify.people import half_trace_com, parameter_jacobian
+from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose, Rotation
 
 
@@ -43,12 +44,18 @@ class ShapeError:
 
     def covariance(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
-        jacobian = np.zeros((10, 10))
-        jacobian[0, 0], jacobian[1:] = 1, forms.com_jacobian(body.vector)
-        half_trace = float(np.trace(body.inertia_com)) / 2
-        variance = np.repeat([0.0, self.com_m**2, (self.inertia_share * half_trace) ** 2], [1, 3, 6])
-        back = np.linalg.inv(jacobian)
+        variance = np.zeros(10)
+        variance[1:4], variance[4:] = self.com_m**2, (self.inertia_share * half_trace_com(body.vector)) ** 2
+        back = parameter_jacobian(body.vector)
         return np.asarray((back * variance) @ back.T)
+
+    def with_grasp(self, body: InertialParameters) -> Array:
+        """Return the covariance (10, 10) that a wrong shape and a wrong grasp give the parameters of a body."""
+        out = self.covariance(body)
+        for X in self.grasp_steps():
+            off = (body.in_frame(X).vector - body.in_frame(X.inverse()).vector) / 2
+            out += np.outer(off, off)
+        return out
 
 
 EXACT = ShapeError()
