@@ -16,6 +16,7 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import Finding
 from steelyard.identify.conclude import conclude
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
@@ -25,6 +26,7 @@ from steelyard.identify.linear import inverse_scaled, reweighted
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import Masses, averaged_masses, free_masses, material_masses
+from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.problem import Problem
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
@@ -91,8 +93,9 @@ class PartMasses:
     def _conclude(self, problem: Problem, linear: Array, score: Array | None) -> Estimate:
         """Return the Estimate after a few rounds: weights depend on the answer.
 
-        Where homogeneous parts cannot give the wrench, the shape is trusted less, step by step, until it can: the
-        answer then moves off the shape as far as the log says.
+        Where homogeneous parts cannot give the wrench, densities are freed within parts. Where that does not help
+        either, the shape is trusted less, step by step, until it can: the answer then moves off the shape as far as
+        the log says.
         """
         data = Effective.of(problem, linear, score)
         body = InertialParameters(linear[:10])
@@ -101,11 +104,23 @@ class PartMasses:
             data = Effective.of(problem, data.linear_at(body.vector), score)
         masses = self._masses(data, body, self.parts)
         first = self._estimate(problem, data, masses)
-        seen = data.blurred(self.shape_error.covariance(first.parameters))
+        seen = data.blurred(self.shape_error.with_grasp(first.parameters))
         findings = part_findings(first, self.parts, seen, masses.choices, self.materials)
+        if not self.materials and suspicious(seen, first.parameters.vector, self.parts):
+            found = uneven(seen, self.parts)
+            if found is not None:
+                others = (f for f in findings if f.code != "part-not-homogeneous")
+                said = Finding.of("part-not-homogeneous", found.message)
+                return self._with_freed(problem, data, found).with_findings(*others, said)
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
         return self._loosened(problem, data).with_findings(*findings)
+
+    def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
+        """Return the Estimate with densities freed within parts."""
+        body = InertialParameters(found.vector)
+        covariance = found.covariance + self.shape_error.with_grasp(body)
+        return self._built(problem, data, found.masses, body, covariance)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
@@ -156,12 +171,19 @@ class PartMasses:
         """
         B = self.parts.per_mass
         body = self.parts.whole(masses.mean)
-        estimate = conclude(problem, Solution.unconstrained(data.linear_at(body.vector)), "part-masses", require=False)
         moved = self._moved(data, body)
         error = self.shape_error.covariance(body)
         covariance = B @ masses.covariance @ B.T + error + moved.T @ moved
+        return self._built(problem, data, masses, body, covariance)
+
+    def _built(
+        self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array
+    ) -> Estimate:
+        """Return the Estimate of a body that is known up to `covariance` (10, 10), with the masses of its parts."""
+        estimate = conclude(problem, Solution.unconstrained(data.linear_at(body.vector)), "part-masses", require=False)
         return replace(
             estimate,
+            parameters=body,
             covariance=0.5 * (covariance + covariance.T),
             part_covariance=masses.covariance,
             parts=self._found(masses),

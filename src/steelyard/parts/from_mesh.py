@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.parts.interior import Interior
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers, TriangleMesh
 from steelyard.shape.nesting import solids_of
@@ -17,7 +18,8 @@ def parts_of_mesh(mesh: TriangleMesh) -> Parts:
     area. Raises BadValue where a part is open, flat, or inside out on its own.
     """
     solids = solids_of(mesh)
-    return Parts(solids.label, solids.moments, _mean_colours(mesh, solids.label))
+    surfaces = tuple((int(k), *solids.void[solids.parent == k].tolist()) for k in solids.label)
+    return Parts(solids.label, solids.moments, _mean_colours(mesh, solids.label), Interior(mesh, surfaces))
 
 
 def _mean_colours(mesh: TriangleMesh, label: Integers) -> Array | None:

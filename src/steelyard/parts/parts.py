@@ -17,6 +17,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
+from steelyard.parts.interior import Interior
 from steelyard.spatial import Pose
 
 Labels = np.ndarray[Any, np.dtype[np.int64]]
@@ -29,11 +30,13 @@ class Parts:
     label    (P,) number of each part
     moments  (P, 10) the ten parameters of each part at a density of 1 kg/m^3: volume [m^3], first and second moments
     rgb      (P, 3) mean colour 0..255, None where it is not known
+    interior where their volume is, None where only the moments are known
     """
 
     label: Labels
     moments: Array
     rgb: Array | None = None
+    interior: Interior | None = None
 
     def __post_init__(self) -> None:
         moments = check.vectors("part moments", self.moments, 10)
@@ -81,7 +84,8 @@ class Parts:
 
     def in_frame(self, X_AB: Pose) -> Parts:
         """Return the same parts, given in B, seen from frame A."""
-        return Parts(self.label, InertialParameters(self.moments).in_frame(X_AB).vector, self.rgb)
+        interior = None if self.interior is None else self.interior.in_frame(X_AB)
+        return Parts(self.label, InertialParameters(self.moments).in_frame(X_AB).vector, self.rgb, interior)
 
     def merged(self, groups: Sequence[Sequence[int]]) -> Parts:
         """Return parts joined: each group is a list of indices; it takes the label of its first part."""
@@ -92,4 +96,5 @@ class Parts:
         rgb = None
         if self.rgb is not None:
             rgb = np.stack([np.average(self.rgb[g], axis=0, weights=self.volume[g]) for g in rows])
-        return Parts(self.label[[g[0] for g in rows]], moments, rgb)
+        interior = None if self.interior is None else self.interior.merged(rows)
+        return Parts(self.label[[g[0] for g in rows]], moments, rgb, interior)

@@ -1,0 +1,94 @@
+"""Parts that are not homogeneous: whether the log says so, the answer with their densities freed, and words for it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.effective import Effective
+from steelyard.identify.part_findings import misfit_limit
+from steelyard.identify.part_gradients import Freed, even, freed
+from steelyard.identify.part_models import Masses
+from steelyard.identify.part_profiles import Profile
+from steelyard.parts.parts import Parts
+
+# Worth a look: a chi-square that right, homogeneous parts exceed once in so many logs.
+SUSPICIOUS = 1e-2
+# Freed parts must be so many times likelier than homogeneous ones, what is common among tools counted.
+ODDS = 1000.0
+# A part is named where it is freed with at least this probability, and as sure where with that.
+NAMED, SURE = 0.2, 0.9
+
+
+@dataclass(frozen=True, eq=False)
+class Uneven:
+    """The answer with freed parts: ten parameters (10,) with covariance (10, 10), part masses, and what to say."""
+
+    vector: Array
+    covariance: Array
+    masses: Masses
+    message: str
+
+
+def suspicious(data: Effective, vector: Array, parts: Parts) -> bool:
+    """Say whether the misfit of homogeneous parts is worth a look."""
+    return data.misfit(vector) > misfit_limit(data, len(parts), SUSPICIOUS)
+
+
+def uneven(data: Effective, parts: Parts) -> Uneven | None:
+    """Return the answer averaged over freed parts, None where homogeneous ones are likely enough or nothing fits."""
+    profiles = [Profile.of(parts, k) for k in range(len(parts))]
+    models = freed(data, parts, profiles)
+    evidence = np.array([model.evidence for model in models])
+    weight = np.exp(evidence - evidence.max())
+    odds = float(evidence.max() + np.log(weight.sum())) - even(data, parts)
+    weight /= weight.sum()
+    vector, covariance = _average(weight, [m.vector for m in models], [m.covariance for m in models])
+    if odds < np.log(ODDS) or data.misfit(vector) > misfit_limit(data, 1):
+        return None
+    masses = Masses(*_average(weight, [m.masses.mean for m in models], [m.masses.covariance for m in models]))
+    return Uneven(vector, covariance, masses, _message(parts, profiles, models, weight))
+
+
+def _average(weight: Array, means: list[Array], covariances: list[Array]) -> tuple[Array, Array]:
+    """Return mean (n,) and covariance (n, n) of a mixture."""
+    mean = weight @ np.stack(means)
+    off = np.stack(means) - mean
+    return mean, np.einsum("k,kij->ij", weight, np.stack(covariances)) + np.einsum("k,ki,kj->ij", weight, off, off)
+
+
+def _message(parts: Parts, profiles: list[Profile], models: list[Freed], weight: Array) -> str:
+    """Return which parts are not homogeneous, and how."""
+    chance = np.array([sum(w for m, w in zip(models, weight, strict=True) if k in m.free) for k in range(len(parts))])
+    named = [k for k in np.argsort(-chance, kind="stable") if chance[k] > NAMED] or [int(chance.argmax())]
+    if chance[named[0]] > SURE:
+        named = [k for k in named if chance[k] > SURE]
+        who = "Part " + " and ".join(str(parts.label[k]) for k in named) + " is not of one density"
+    else:
+        who = "Part " + " or ".join(f"{parts.label[k]} ({100 * chance[k]:.0f} %)" for k in named)
+        who += " is not of one density"
+    falls = [_fall(profiles[k], _shift(k, profiles[k], models, weight)) for k in named]
+    how = [f"part {parts.label[k]}: {text}" for k, text in zip(named, falls, strict=True)]
+    return f"{who}; {'; '.join(how)}."
+
+
+def _shift(part: int, profile: Profile, models: list[Freed], weight: Array) -> Array:
+    """Return the mean shift (3,) of the centre of mass of a part, where it is freed, in standard deviations."""
+    told = [(w, m.tilts[part]) for m, w in zip(models, weight, strict=True) if part in m.free]
+    return np.asarray(sum(w * profile.shift(tilt) for w, tilt in told) / sum(w for w, _ in told))
+
+
+def _fall(profile: Profile, shift: Array) -> str:
+    """Return words for a shift: how far, where to, and the linear fall of density that would give it."""
+    moved = profile.axes @ (profile.size * shift)
+    distance = float(np.linalg.norm(moved))
+    along = profile.place @ (shift / max(float(np.linalg.norm(shift)), 1e-12))
+    share = float(np.linalg.norm(shift) * np.ptp(along))
+    toward = ", ".join(f"{value:.2f}" for value in moved / max(distance, 1e-12))
+    fall = f"by {100 * share:.0f} %" if share < 1.5 else "to a small part"
+    return (
+        f"its centre of mass lies {1e3 * distance:.1f} mm from its centroid toward ({toward}) in the sensor's axes, "
+        f"as if its density fell {fall} from one end to the other"
+    )

@@ -1,0 +1,42 @@
+"""Interior: where the volume of parts is, for what their ten moments do not say."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.inside import inside
+from steelyard.shape.mesh import TriangleMesh
+from steelyard.spatial import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class Interior:
+    """The inside of P parts, filled with points only when asked.
+
+    mesh      closed surfaces in their own frame M
+    surfaces  (P,) labels of the surfaces around each part, voids among them
+    X_AM      pose of M in the frame A of the parts
+    """
+
+    mesh: TriangleMesh
+    surfaces: tuple[tuple[int, ...], ...]
+    X_AM: Pose = field(default_factory=Pose.identity)
+
+    def points(self, part: int, count: int) -> tuple[Array, Array]:
+        """Return about `count` points (K, 3) in part number `part` (its row) in A [m], and the volume (K,) of each."""
+        chosen = np.isin(self.mesh.part, self.surfaces[part])
+        surface = TriangleMesh(self.mesh.vertices, self.mesh.triangles[chosen], self.mesh.part[chosen])
+        points, volume = inside(surface, count)
+        return self.X_AM.apply(points), volume
+
+    def in_frame(self, X_BA: Pose) -> Interior:
+        """Return the same inside seen from frame B."""
+        return replace(self, X_AM=X_BA @ self.X_AM)
+
+    def merged(self, groups: Sequence[Sequence[int]]) -> Interior:
+        """Return the inside of parts joined: each group is a list of rows."""
+        return replace(self, surfaces=tuple(tuple(k for row in g for k in self.surfaces[row]) for g in groups))
