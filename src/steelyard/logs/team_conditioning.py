@@ -45,6 +45,7 @@ def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 
             np.stack([getattr(c, part) for c in columns])
             for part in ("rotation", "position", "twist", "twist_rate", "gravity", "wrench")
         ),
+        np.stack([_carries(recording, name, time) for name in names]),
         *(np.stack([c.has[part] for c in columns]) for part in ("pose", "twist", "rate", "gravity", "wrench")),
     )
 
@@ -52,6 +53,19 @@ def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 
 def all_conditioned(log: TeamLog, recordings: Sequence[TeamRecording], cutoff_hz: float | None) -> tuple[TeamRows, ...]:
     """Return every recording conditioned alike."""
     return tuple(condition(log, recording, cutoff_hz) for recording in recordings)
+
+
+def _carries(recording: TeamRecording, name: str, time: Array) -> Mask:
+    """Return the rows (T,) in which a robot holds the payload, or may."""
+    if name in recording.away:
+        return np.zeros(len(time), np.bool_)
+    track = recording.tracks.get(name)
+    if track is None or track.carrying is None:
+        return np.ones(len(time), np.bool_)
+    nearest = np.clip(
+        np.searchsorted(track.time, time - 0.5 * float(np.median(np.diff(track.time)))), 0, len(track) - 1
+    )
+    return track.carrying[nearest]
 
 
 class _Columns:

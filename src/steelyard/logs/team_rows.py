@@ -26,6 +26,7 @@ class TeamRows:
     twist_rate           their derivative, component by component (N, T, 6) [rad/s^2, m/s^2]
     gravity              (N, T, 3) [m/s^2] in the grasp's axes
     wrench               (N, T, 6) [N m, N] applied to the payload at the grasp
+    carries              (N, T) False where a robot is known to hold nothing
     has_pose, has_twist, has_rate, has_gravity, has_wrench   (N, T) what was measured; values elsewhere mean nothing
     """
 
@@ -37,6 +38,7 @@ class TeamRows:
     twist_rate: Array
     gravity: Array
     wrench: Array
+    carries: Mask
     has_pose: Mask
     has_twist: Mask
     has_rate: Mask
@@ -46,6 +48,10 @@ class TeamRows:
     def __post_init__(self) -> None:
         for name in ("time", "rotation", "position", "twist", "twist_rate", "gravity", "wrench"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
+
+    def complete_wrench(self) -> Mask:
+        """Return the rows (T,) in which somebody carries and every robot that does has a wrench: a sum is not short."""
+        return np.asarray((self.has_wrench | ~self.carries).all(0) & self.carries.any(0))
 
     def index(self, name: str) -> int:
         """Return the place of a robot along the first axis."""

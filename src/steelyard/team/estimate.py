@@ -1,0 +1,71 @@
+"""TeamEstimate: an Estimate in the reference grasp, with every grasp, clock offset and principal frame."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from functools import cached_property
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
+from steelyard.spatial import Pose
+
+
+@dataclass(frozen=True, eq=False)
+class GraspEstimate:
+    """Pose X_RG of one grasp in the reference grasp R.
+
+    covariance  (6, 6) of its rotation vector and position, both in R's axes [rad, m]: the true rotation is
+                exp(error) times the one found
+    lost        directions (k, 6) in the same coordinates that the motion does not show; empty when it shows all
+    """
+
+    pose: Pose
+    covariance: Array
+    lost: Array = field(default_factory=lambda: np.zeros((0, 6)))
+
+    @property
+    def std(self) -> Array:
+        """Standard deviations (6,) [rad, m] along R's axes."""
+        return np.sqrt(np.maximum(np.diag(self.covariance), 0))
+
+    @property
+    def std_deg(self) -> Array:
+        """Standard deviations (3,) of the rotation about R's axes [deg]."""
+        return np.rad2deg(self.std[:3])
+
+    @property
+    def std_m(self) -> Array:
+        """Standard deviations (3,) of the position [m]."""
+        return self.std[3:]
+
+
+@dataclass(frozen=True, eq=False)
+class TeamEstimate(Estimate):
+    """What the team found: the ten parameters about the origin of the reference grasp R, and where everybody holds.
+
+    reference           name of the robot whose grasp is R
+    grasps              pose of every grasp in R, by name; the reference's own is exact
+    clock_offsets_s     by how much each robot's stamps are late, against the reference; empty where not estimated
+    clock_offset_std_s  their standard deviations
+    """
+
+    reference: str = ""
+    grasps: Mapping[str, GraspEstimate] = field(default_factory=dict)
+    clock_offsets_s: Mapping[str, float] = field(default_factory=dict)
+    clock_offset_std_s: Mapping[str, float] = field(default_factory=dict)
+
+    @cached_property
+    def principal_moments(self) -> Array | None:
+        """Principal moments (3,), rising [kg m^2]; None where the data do not fix the inertia."""
+        return self.parameters.principal()[0] if self.inertia_com is not None else None
+
+    @cached_property
+    def principal_frames(self) -> dict[str, Pose]:
+        """Pose of the principal frame, at the centre of mass, in every grasp; empty without an inertia."""
+        if self.inertia_com is None:
+            return {}
+        frame = self.parameters.principal()[1]
+        return {name: grasp.pose.inverse() @ frame for name, grasp in self.grasps.items()}

@@ -1,0 +1,76 @@
+"""Inertia about the centre of mass from the moments that the team applies in motion.
+
+Source: "Cooperative Payload Estimation by a Team of Mocobots", III-D, eq. 17-33 and its footnote.
+"""
+
+from __future__ import annotations
+
+from typing import Literal
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.inertia.forms import UPPER
+from steelyard.spatial import cross, cross_matrix
+
+Negative = Literal["clamp", "discard"]
+# Least singular value of the column-scaled stack over its largest: below it a moment is not fixed.
+LEAST_SPREAD = 1e-6
+
+
+def regressor(omega: Array, alpha: Array) -> Array:
+    """Return A (T, 3, 6): alpha and omega (T, 3) make I alpha + omega x I omega = A (xx, xy, xz, yy, yz, zz) (eq. 20)."""
+    return np.asarray(_times(alpha) + cross_matrix(omega) @ _times(omega))
+
+
+def moment_about(wrench: Array, point: Array) -> Array:
+    """Return moments (T, 3) about `point` (3,) from wrenches (T, 6) about the origin of the same axes (eq. 18)."""
+    return np.asarray(wrench[:, :3] - cross(np.broadcast_to(point, wrench[:, 3:].shape), wrench[:, 3:]))
+
+
+def inertia(omega: Array, alpha: Array, moment: Array) -> tuple[Array, Array]:
+    """Return the inertia (3, 3) [kg m^2] about the centre of mass and the formal covariance (6, 6) of its entries.
+
+    omega, alpha, moment  (T, 3) in the axes of the answer, the moment about the centre of mass
+    Raises CannotAnswer where the motion leaves an entry open.
+    """
+    stacked = regressor(omega, alpha).reshape(-1, 6)
+    size = np.linalg.norm(stacked, axis=0)
+    values = np.linalg.svd(stacked / np.where(size == 0, 1.0, size), compute_uv=False)
+    if len(stacked) < 6 or not (size > 0).all() or not values[-1] > LEAST_SPREAD * values[0]:
+        raise CannotAnswer(
+            "the payload must turn about three axes, faster and slower, to tell its inertia; this motion leaves entries "
+            f"open (least singular value {values[-1]:.1g} of {values[0]:.1g}). Turn it about all three axes."
+        )
+    entries, *_ = np.linalg.lstsq(stacked, moment.ravel(), rcond=None)
+    left = moment.ravel() - stacked @ entries
+    variance = float(left @ left) / max(len(left) - 6, 1)
+    matrix = np.zeros((3, 3))
+    for value, (i, j) in zip(entries, UPPER, strict=True):
+        matrix[i, j] = matrix[j, i] = value
+    return matrix, np.asarray(variance * np.linalg.inv(stacked.T @ stacked))
+
+
+def made_positive(matrix: Array, negative: Negative = "clamp") -> tuple[Array, int]:
+    """Return the inertia with its negative eigenvalues set to zero, and how many there were.
+
+    Raises CannotAnswer instead where `negative` is "discard" (the other choice of the paper's footnote). A moment of zero
+    is no rigid body's either: the triangle inequality is not mended here.
+    """
+    values, axes = np.linalg.eigh(matrix)
+    below = int((values < 0).sum())
+    if below and negative == "discard":
+        raise CannotAnswer(
+            f"the inertia came out with {below} negative eigenvalue(s), the least {values[0]:.3g} kg m^2, and is "
+            "discarded. Move faster, or average more rows."
+        )
+    return (matrix if not below else np.asarray(axes @ np.diag(np.maximum(values, 0)) @ axes.T)), below
+
+
+def _times(vector: Array) -> Array:
+    """Return L (T, 3, 6) so that L (xx, xy, xz, yy, yz, zz) = I vector."""
+    x, y, z = vector.T
+    zero = np.zeros_like(x)
+    rows = [[x, y, z, zero, zero, zero], [zero, x, zero, y, z, zero], [zero, zero, x, zero, y, z]]
+    return np.moveaxis(np.array(rows), 2, 0)

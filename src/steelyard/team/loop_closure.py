@@ -1,0 +1,162 @@
+"""Loop closure: all grasps refined together from the twists of every pair of robots.
+
+The unknowns are the N - 1 poses in the reference grasp, so that every closed loop T_ij T_jk T_ki = 1 holds exactly,
+whatever weight it would have been given; the cost is the weighted sum of squares of all N (N - 1) / 2 pairs. It depends on
+the twists through their second moments only.
+Source: "Cooperative Payload Estimation by a Team of Mocobots", III-B2, which minimises pairs and loops by BFGS and gives
+no weights; here every residual is weighed by the inverse variance that the star of pairs leaves.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.team_track import Mask
+from steelyard.spatial import Pose, Rotation, cross_matrix
+from steelyard.spatial.screws import exp_pose
+from steelyard.team.grasp_kinematics import Pair, pair
+from steelyard.team.grasps import Grasps
+
+_SERIES = 8  # terms of the right Jacobian: corrections are a few degrees at most
+
+
+def _brackets() -> Array:
+    """Return C (6, 6, 6), so that ad_V = sum_a V_a C_a (angular part first)."""
+    out = np.zeros((6, 6, 6))
+    for a in range(3):
+        unit = cross_matrix(np.eye(3)[a])
+        out[a, :3, :3] = out[a, 3:, 3:] = unit
+        out[3 + a, 3:, :3] = unit
+    return out
+
+
+_BRACKETS = _brackets()
+
+
+@dataclass(frozen=True, eq=False)
+class _Moments:
+    """Second moments (P, 6, 6) of the twists of each pair (i, j), over the rows that both measured."""
+
+    first: np.ndarray[tuple[int], np.dtype[np.int64]]
+    second: np.ndarray[tuple[int], np.dtype[np.int64]]
+    ii: Array
+    ij: Array
+    jj: Array
+
+    @classmethod
+    def of(cls, twists: Array, measured: Mask) -> _Moments:
+        pairs = np.array(list(combinations(range(len(twists)), 2)), np.int64)
+        seen = [measured[i] & measured[j] for i, j in pairs]
+        rows = [(twists[i, m], twists[j, m]) for (i, j), m in zip(pairs, seen, strict=True)]
+        return cls(
+            pairs[:, 0],
+            pairs[:, 1],
+            np.array([a.T @ a for a, _ in rows]),
+            np.array([a.T @ b for a, b in rows]),
+            np.array([b.T @ b for _, b in rows]),
+        )
+
+
+def refine(grasps: Grasps, pairs: Mapping[str, Pair], twists: Array, measured: Mask) -> Grasps:
+    """Return the grasps that fit the twists of all pairs of robots best, starting from those of the star.
+
+    pairs     of the reference with every other robot, for the weights and the scale of the unknowns
+    twists    (N, T, 6) at the grasps in the order of `grasps.names`; measured (N, T) which rows are true
+    """
+    from scipy.optimize import minimize
+
+    moments = _Moments.of(twists, measured)
+    left = np.mean([p.residual**2 for p in pairs.values()], axis=0)
+    spread = np.repeat([left[:3].mean(), left[3:].mean()], 3)
+    if not (spread > 0).all():
+        return grasps  # nothing is left to refine
+    free = [i for i, name in enumerate(grasps.names) if name != grasps.reference]
+    # The star's own covariance scales the unknowns, its error in the reference's axes carried to the grasp's.
+    scale = np.array([_in_grasp_axes(pairs[grasps.names[i]]) for i in free])
+    factor = np.linalg.cholesky(scale)
+
+    def cost(s: Array) -> tuple[float, Array]:
+        xi = np.einsum("nab,nb->na", factor, s.reshape(-1, 6))
+        value, slope = _pair_cost(_moved(grasps.poses, free, xi), moments, 1 / spread)
+        inner = np.einsum("nba,nb->na", _right_jacobian(xi), slope[free])
+        return value, np.einsum("nab,na->nb", factor, inner).ravel()
+
+    found = minimize(cost, np.zeros(6 * len(free)), jac=True, method="BFGS", options={"gtol": 1e-6})
+    xi = np.einsum("nab,nb->na", factor, found.x.reshape(-1, 6))
+    return Grasps(grasps.names, _moved(grasps.poses, free, xi), grasps.reference)
+
+
+def loop_gaps(names: Sequence[str], twists: Array, measured: Mask) -> dict[tuple[str, str, str], tuple[float, float]]:
+    """Return how far every loop of three separately estimated pairs is from closed: angle [rad] and distance [m].
+
+    Raises CannotAnswer where a pair does not tell its pose.
+    """
+    poses = {}
+    for i, j in combinations(range(len(names)), 2):
+        rows = measured[i] & measured[j]
+        poses[i, j] = pair(twists[i, rows], twists[j, rows]).pose
+    gaps = {}
+    for i, j, k in combinations(range(len(names)), 3):
+        round_trip = poses[i, j] @ poses[j, k] @ poses[i, k].inverse()
+        distance = float(np.linalg.norm(round_trip.position))
+        gaps[names[i], names[j], names[k]] = (float(round_trip.rotation.angle()), distance)
+    return gaps
+
+
+def adjoint(pose: Pose) -> Array:
+    """Return Ad(T) (..., 6, 6) = [[R, 0], [[p]R, R]]."""
+    turn = pose.rotation.matrix
+    out = np.zeros((*pose.batch, 6, 6))
+    out[..., :3, :3] = out[..., 3:, 3:] = turn
+    out[..., 3:, :3] = cross_matrix(pose.position) @ turn
+    return out
+
+
+def _pair_cost(poses: Pose, moments: _Moments, weight: Array) -> tuple[float, Array]:
+    """Return half the weighted sum of squares and its slope (N, 6) against body screws of the grasps.
+
+    With A = Ad(T_ij) and r = V_i - A V_j, a screw of grasp j changes r by A ad(V_j), one of grasp i by -ad(A V_j).
+    """
+    i, j = moments.first, moments.second
+    A = adjoint(poses[i].inverse() @ poses[j])
+    At = np.swapaxes(A, -1, -2)
+    crossed = np.swapaxes(moments.ij, -1, -2) - moments.jj @ At  # sum V_j r^T
+    squares = moments.ii - moments.ij @ At - A @ crossed
+    value = 0.5 * float((np.einsum("paa->pa", squares) * weight).sum())
+    weighed = crossed * weight
+    slope = np.zeros((len(poses.position), 6))
+    np.add.at(slope, j, np.einsum("pab,abc->pc", weighed @ A, _BRACKETS))
+    np.add.at(slope, i, -np.einsum("pab,abc->pc", A @ weighed, _BRACKETS))
+    return value, slope
+
+
+def _moved(poses: Pose, free: list[int], xi: Array) -> Pose:
+    """Return the poses, those in `free` moved by body screws `xi` (len(free), 6)."""
+    step = exp_pose(xi)
+    turn, place = poses.rotation.matrix.copy(), poses.position.copy()
+    moved = poses[free] @ step
+    turn[free], place[free] = moved.rotation.matrix, moved.position
+    return Pose(Rotation(turn), place)
+
+
+def _right_jacobian(xi: Array) -> Array:
+    """Return J (n, 6, 6): exp(xi + d) = exp(xi) exp(J d) to first order, by its series sum (-ad)^k / (k + 1)!."""
+    ad = -np.einsum("na,abc->nbc", xi, _BRACKETS)
+    term = np.broadcast_to(np.eye(6), ad.shape)
+    total = term.copy()
+    for k in range(1, _SERIES):
+        term = term @ ad / (k + 1)
+        total += term
+    return total
+
+
+def _in_grasp_axes(found: Pair) -> Array:
+    """Return the pair's covariance (6, 6) as that of a body screw of the second grasp."""
+    back = found.pose.rotation.inverse().matrix
+    turn = np.block([[back, np.zeros((3, 3))], [np.zeros((3, 3)), back]])
+    return np.asarray(turn @ found.covariance @ turn.T)

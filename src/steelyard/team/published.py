@@ -1,0 +1,214 @@
+"""The paper's estimator, step by step: grasp kinematics, loop closure, mass and centre of mass, inertia matrix.
+
+Source: "Cooperative Payload Estimation by a Team of Mocobots", III and IV-B. It gives no cut-off, no weights and no
+covariance; ours are the default of `cutoff_hz`, the residuals of the star of pairs, and formal least-squares covariances.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
+from steelyard.identify.estimate import Evidence
+from steelyard.inertia import InertialParameters
+from steelyard.inertia.forms import com_jacobian
+from steelyard.logs.team_conditioning import all_conditioned
+from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_rows import TeamRows
+from steelyard.logs.team_track import Mask
+from steelyard.spatial import Pose
+from steelyard.team import grasp_kinematics
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.team.grasp_kinematics import Pair
+from steelyard.team.grasps import Grasps
+from steelyard.team.inertia_matrix import Negative, inertia, made_positive, moment_about
+from steelyard.team.loop_closure import refine
+from steelyard.team.mass_and_com import MassAndCom, mass_and_com
+
+_STILL_RATE, _STILL_SPEED = 0.02, 0.005  # [rad/s, m/s] as for one arm: below them a row of a moving log is at rest
+FORMAL = (
+    "Standard deviations are formal, from white residuals of each step by itself: the paper gives none, and with "
+    "correlated noise or force bias these are too small."
+)
+
+
+@dataclass(frozen=True)
+class PublishedTeam:
+    """The published sequence.
+
+    cutoff_hz   of the zero-phase fourth-order Butterworth filter; None = data that need none
+    close_loops whether the star of pairs is refined over all pairs and loops (with three robots or more)
+    trim_s      cut from both ends of motion recordings, as the paper does for its inertia (4 s there)
+    negative    what happens to negative eigenvalues of the inertia: "clamp" to zero, or "discard" the answer
+    """
+
+    cutoff_hz: float | None = 3.0
+    close_loops: bool = True
+    trim_s: float = 0.0
+    negative: Negative = "clamp"
+
+    def identify(self, log: TeamLog) -> TeamEstimate:
+        """Return the team's answer in the reference grasp.
+
+        Raises BadValue for clocks that cannot be joined, CannotAnswer where a step lacks motion, poses or wrenches.
+        """
+        require_wrenches(log)
+        grasps, pairs = self.grasps(log)
+        rest = self.mass_and_com(log, grasps)
+        matrix, covariance, rows, notes, findings = self._inertia_or_not(log, grasps, rest)
+        return _assembled(log, grasps, pairs, rest, (matrix, covariance), rows, notes, findings)
+
+    def grasps(self, log: TeamLog) -> tuple[Grasps, dict[str, Pair]]:
+        """Return the grasps in the reference grasp, and the star of pairs that they started from (eq. 1-8)."""
+        moving = all_conditioned(log, log.of_kind("grasp"), self.cutoff_hz)
+        twists = np.concatenate([rows.twist for rows in moving], axis=1)
+        measured = np.concatenate([rows.has_twist for rows in moving], axis=1)
+        pairs = grasp_kinematics.star(log.names, twists, measured, log.reference)
+        found = Grasps.of({n: pairs[n].pose if n in pairs else Pose.identity() for n in log.names}, log.reference)
+        if self.close_loops and len(log.names) > 2:
+            found = refine(found, pairs, twists, measured)
+        return found, pairs
+
+    def mass_and_com(self, log: TeamLog, grasps: Grasps) -> MassAndCom:
+        """Return mass and centre of mass in the reference grasp from still rows (eq. 9-16)."""
+        if len(log.names) == 2 and all(log.force_only(name) for name in log.names):
+            raise CannotAnswer(
+                "two robots with passive gimbals cannot hold a payload still: nothing resists the moment about the line "
+                "that joins their grasps, so still poses tell nothing sound. Add a third robot or a six-axis wrist, or "
+                "use the joint method, which works from motion."
+            )
+        still = tuple(r for r in log.recordings if r.kind == "still")
+        resting = all_conditioned(log, still or log.of_kind("motion"), self.cutoff_hz)
+        chosen = [_full_rows(log, rows, _at_rest(rows, bool(still))) for rows in resting]
+        gravity = np.concatenate(
+            [_gravity(log, grasps, rows)[keep] for rows, keep in zip(resting, chosen, strict=True)]
+        )
+        wrench = [grasps.total_wrench(rows.wrench)[keep] for rows, keep in zip(resting, chosen, strict=True)]
+        if not len(gravity):
+            raise CannotAnswer(
+                "mass and centre of mass need rows at rest in which every carrying robot has a wrench; there are none. "
+                "Record still poses, at least two, tilted against each other."
+            )
+        return mass_and_com(gravity, np.concatenate(wrench))
+
+    def inertia(self, log: TeamLog, grasps: Grasps, com: Array) -> tuple[Array, Array, int]:
+        """Return the inertia (3, 3) [kg m^2] about `com` (3,) [m] in R's axes, covariance (6, 6) and rows used (eq. 17-32).
+
+        Rates and angular accelerations are the reference robot's alone. Negative eigenvalues are still there.
+        """
+        omega, alpha, moment = [], [], []
+        for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):
+            if self.trim_s:
+                rows = rows.trimmed(self.trim_s)
+            hub = rows.index(log.reference)
+            keep = rows.has_rate[hub] & rows.complete_wrench()
+            omega.append(rows.twist[hub, keep, :3])
+            alpha.append(rows.twist_rate[hub, keep, :3])
+            moment.append(moment_about(grasps.total_wrench(rows.wrench)[keep], com))
+        matrix, covariance = inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
+        return matrix, covariance, sum(len(part) for part in omega)
+
+    def _inertia_or_not(
+        self, log: TeamLog, grasps: Grasps, rest: MassAndCom
+    ) -> tuple[Array | None, Array, int, tuple[str, ...], tuple[Finding, ...]]:
+        """Return inertia, covariance, rows, notes and findings; None and a finding where the motion does not tell it."""
+        try:
+            raw, covariance, rows = self.inertia(log, grasps, rest.com)
+        except CannotAnswer as error:
+            return None, np.zeros((6, 6)), 0, (), (Finding.of("inertia-not-identified", str(error)),)
+        matrix, below = made_positive(raw, self.negative)
+        note = (f"{below} negative principal moment(s) were set to zero.",) if below else ()
+        return matrix, covariance, rows, note, ()
+
+
+def require_wrenches(log: TeamLog) -> None:
+    """Raise CannotAnswer where nobody, or not every robot, has measured a wrench."""
+    dumb = [name for name in log.names if not log.has_wrench(name)]
+    if len(dumb) == len(log.names):
+        raise CannotAnswer("no robot of the team measured a force, so mass, centre of mass and inertia stay open.")
+    silent = [name for name in dumb if not all(name in r.away for r in log.recordings if r.kind != "grasp")]
+    if silent:
+        raise CannotAnswer(
+            f"every robot that carries must measure its force, or the sum falls short; '{silent[0]}' has none. Add it, "
+            "or say that the robot was away."
+        )
+
+
+def _at_rest(rows: TeamRows, declared: bool) -> Mask:
+    """Return rows (T,) at rest: all of a still recording; else those in which no robot that is seen moves."""
+    if declared:
+        return np.ones(len(rows.time), np.bool_)
+    quick = (np.linalg.norm(rows.twist[..., :3], axis=-1) > _STILL_RATE) | (
+        np.linalg.norm(rows.twist[..., 3:], axis=-1) > _STILL_SPEED
+    )
+    return np.asarray(~(quick & rows.has_twist).any(0) & rows.has_twist.any(0))
+
+
+def _full_rows(log: TeamLog, rows: TeamRows, wanted: Mask) -> Mask:
+    """Return the wanted rows with every wrench and with gravity known to the reference, or to somebody."""
+    known = rows.has_gravity[_level(log, rows)]
+    return np.asarray(wanted & rows.complete_wrench() & known)
+
+
+def _level(log: TeamLog, rows: TeamRows) -> int:
+    """Return the robot that tells gravity: the reference, or the first other one that can."""
+    order: Sequence[str] = (log.reference, *log.others)
+    for name in order:
+        if rows.has_gravity[rows.index(name)].any():
+            return rows.index(name)
+    raise CannotAnswer(
+        "somebody must know where gravity points: give [team] gravity for level bases and rotations, or a gravity "
+        "channel; the joint method estimates a base's tilt."
+    )
+
+
+def _gravity(log: TeamLog, grasps: Grasps, rows: TeamRows) -> Array:
+    """Return gravity (T, 3) [m/s^2] in R's axes."""
+    teller = _level(log, rows)
+    return grasps.poses[teller].rotation.apply(rows.gravity[teller])
+
+
+def _assembled(
+    log: TeamLog,
+    grasps: Grasps,
+    pairs: dict[str, Pair],
+    rest: MassAndCom,
+    found: tuple[Array | None, Array],
+    rows: int,
+    notes: tuple[str, ...],
+    findings: tuple[Finding, ...],
+) -> TeamEstimate:
+    matrix, covariance = found
+    known = matrix is not None
+    people = np.zeros((10, 10))
+    people[0, 0] = rest.mass_std**2
+    people[1:4, 1:4] = rest.com_covariance
+    # Nothing of the payload is much farther from its centre of mass than the grasps are from each other.
+    reach = float(np.linalg.norm(grasps.poses.position, axis=1).max())
+    people[4:, 4:] = covariance if known else (rest.mass * reach**2) ** 2 * np.eye(6)
+    body = InertialParameters.from_com(rest.mass, rest.com, matrix if matrix is not None else np.zeros((3, 3)))
+    jacobian = np.zeros((10, 10))
+    jacobian[0, 0] = 1
+    jacobian[1:] = com_jacobian(body.vector)
+    back = np.linalg.inv(jacobian)
+    estimates = {
+        name: GraspEstimate(grasps[name], pairs[name].covariance if name in pairs else np.zeros((6, 6)))
+        for name in log.names
+    }
+    return TeamEstimate(
+        parameters=body,
+        covariance=back @ people @ back.T,
+        method="paper",
+        evidence=Evidence(10 if known else 4, 1.0, rows, 0, rest.residual_force, rest.residual_moment),
+        identified=np.array([True] * 4 + [known] * 6),
+        frame=log.reference,
+        findings=findings,
+        notes=(FORMAL, *notes),
+        reference=log.reference,
+        grasps=estimates,
+    )
