@@ -1,4 +1,4 @@
-"""Slopes between the ten parameters and the numbers people read: against the batched form, and inverse to each other."""
+"""Slopes between the ten parameters and the numbers people read: against the batched form, and inverse."""
 
 from __future__ import annotations
 

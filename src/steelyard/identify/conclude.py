@@ -14,14 +14,17 @@ from steelyard.identify import noise_cost
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
 from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
+from steelyard.identify.newton import residual_map_of
+from steelyard.identify.people import people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
-from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import Mask
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of
 # the mass, of the radius of gyration, and of half the trace of the inertia about the centre of mass.
 MASS_SHARE, COM_SHARE, INERTIA_SHARE = 0.1, 0.2, 0.1
+SHARES = np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6])
 SMALLEST_RADIUS = 0.02
 # There is no answer at all where mass or centre of mass are looser than these shares of the same sizes.
 LOST_MASS, LOST_COM = 1 / 3, 2.5
@@ -59,12 +62,11 @@ def conclude(
     """
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
-    K = problem.residual_map(solution.linear)
-    data = (K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    H, extra, plain = noise_cost.information(*data)
-    H = nonnegative(H, plain)
-    chi2 = noise_cost.value(*data[:1], *data[2:]) / max(6 * problem.samples - len(solution.linear), 1.0)
-    chi2 = max(float(chi2), 0.0)
+    data = (problem.T, problem.scatter, problem.acceleration, problem.wrench)
+    K, H, extra, cost, square = _weighed(solution.linear, *data)
+    rows = problem.samples
+    chi2 = max(cost / max(6 * rows - len(solution.linear), 1.0), 0.0)
+    residual_torque, residual_force = (float(np.sqrt(max(s.mean() / rows, 0))) for s in (square[:3], square[3:]))
     white = max(chi2, 1.0) * (H + extra)
     bread, meat = H, white
     if solution.weights is not None:
@@ -75,7 +77,7 @@ def conclude(
     covariance = _sandwich(bread, meat, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
     seen = meat if solution.weights is None else problem.plus_bias_prior(white)
-    sight = _sight(problem.plus_bias_prior(H), seen, solution.linear[:10])
+    sight = Sight(*_sight(problem.plus_bias_prior(H), seen, solution.linear[:10]))
     if require:
         _require_answer(sight, problem)
     estimate = Estimate(
@@ -83,7 +85,7 @@ def conclude(
         covariance[:10, :10],
         method,
         Evidence(
-            sight.rank, sight.condition, int(problem.samples), int(problem.still_samples), *_residual(problem, K), chi2,
+            sight.rank, sight.condition, int(rows), int(problem.still_samples), residual_force, residual_torque, chi2,
             spread=2 * sight.std,
         ),
         sight.identified,
@@ -92,8 +94,10 @@ def conclude(
         covariance[:10, 10:16] if problem.with_bias else np.zeros((10, 6)),
     )  # fmt: skip
     left_out = leave_one_out(problem, solution, bread)
-    estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out)).with_findings(*_findings(estimate))
-    return _widened(estimate)
+    if left_out:
+        estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
+    found = _findings(estimate)
+    return _widened(estimate.with_findings(*found) if found else estimate)
 
 
 def _widened(estimate: Estimate) -> Estimate:
@@ -119,12 +123,6 @@ def _widened(estimate: Estimate) -> Estimate:
     )
 
 
-def _residual(problem: Problem, K: Array) -> tuple[float, float]:
-    """Return the rms residual per axis: force [N], torque [N m]."""
-    square = np.einsum("ij,jk,ik->i", K, problem.scatter.sum(0), K) / problem.samples
-    return float(np.sqrt(max(square[3:].mean(), 0))), float(np.sqrt(max(square[:3].mean(), 0)))
-
-
 @dataclass(frozen=True, eq=False)
 class Sight:
     """What the data alone see: rank, condition, std (10,) of mass, com, inertia about the CoM, and their sizes."""
@@ -140,50 +138,70 @@ class Sight:
         return identified(self.std, self.sizes)
 
 
+@numba.njit(cache=True)
 def natural_sizes(phi: Array) -> Array:
     """Return (10,) mass [kg], radius of gyration [m] for com x y z, half the trace of the inertia about it."""
-    mass = max(abs(float(phi[0])), 1e-6)
-    trace = abs(float(phi[4] + phi[7] + phi[9]) / 2 - float(phi[1:4] @ phi[1:4]) / mass)
-    radius = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
-    return np.repeat([mass, radius, max(trace, mass * SMALLEST_RADIUS**2)], [1, 3, 6])
+    mass = max(abs(phi[0]), 1e-6)
+    square = phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]
+    trace = abs((phi[4] + phi[7] + phi[9]) / 2 - square / mass)
+    out = np.full(10, max(trace, mass * SMALLEST_RADIUS**2))
+    out[0], out[1:4] = mass, max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    return out
 
 
 def identified(std: Array, sizes: Array) -> Mask:
     """Return which of mass, com and inertia about the CoM (10,) have standard deviations small beside their sizes."""
-    return np.asarray(std < np.repeat([MASS_SHARE, COM_SHARE, INERTIA_SHARE], [1, 3, 6]) * sizes)
+    return np.asarray(std < SHARES * sizes)
 
 
-def _sight(H: Array, V: Array, phi: Array) -> Sight:
-    """Return what is seen from the information H and the score variance V (p, p), the bias projected out.
+@numba.njit(cache=True)
+def _sight(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, Array]:
+    """Return the fields of `Sight` from the information H and the score variance V (p, p), the bias projected out.
 
     In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
     """
     sizes = natural_sizes(phi)
-    mass, radius = sizes[:2]
-    natural = mass * np.repeat([1.0, radius, radius**2], [1, 3, 6])
+    mass, radius = sizes[0], sizes[1]
+    natural = np.full(10, mass * radius * radius)
+    natural[0], natural[1:4] = mass, mass * radius
     F, G = _without_bias(H, V)
     values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
-    people = np.zeros((10, 10))
-    people[0, 0], people[1:] = 1, forms.com_jacobian(phi)
-    directions = people @ (natural[:, None] * vectors)
+    directions = people_jacobian(phi) @ (natural.reshape(-1, 1) * vectors)
     # Directions that the data leave open may be off by several times their natural size, not by anything at all.
-    hidden = values < max(OPEN, UNSEEN * float(values[-1]))
-    bread = (directions[:, ~hidden] / values[~hidden]) @ vectors[:, ~hidden].T * natural
+    hidden = values < max(OPEN, UNSEEN * values[-1])
+    inverse = np.where(hidden, 0.0, 1 / np.where(hidden, 1.0, values))
+    bread = (directions * inverse) @ np.ascontiguousarray(vectors.T) * natural
     variance = ((bread @ G) * bread).sum(1)
-    open_end = (directions[:, hidden] ** 2).sum(1) / OPEN
-    std = np.sqrt(np.maximum(variance, 0) + open_end)
-    std[open_end > sizes**2] = np.inf
+    open_end = (np.where(hidden, directions, 0.0) ** 2).sum(1) / OPEN
+    std = np.where(open_end > sizes**2, np.inf, np.sqrt(np.maximum(variance, 0.0) + open_end))
     fixed = values > RANK_INFORMATION
-    condition = float(np.sqrt(values[-1] / values[fixed][0])) if fixed.any() else np.inf
-    return Sight(int(fixed.sum()), condition, std, sizes)
+    condition = np.sqrt(values[-1] / values[fixed][0]) if fixed.any() else np.inf
+    return int(fixed.sum()), condition, std, sizes
 
 
+@numba.njit(cache=True)
 def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
     """Return information and score variance (10, 10) of phi with the bias projected out."""
-    if len(H) == 10:
+    size = H.shape[0]
+    if size == 10:
         return H, V
-    project = np.concatenate([np.eye(10), -H[:10, 10:] @ inverse_scaled(H[10:, 10:])], 1)
-    return project @ H[:, :10], project @ V @ project.T
+    project = np.zeros((10, size))
+    project[:, :10] = np.eye(10)
+    project[:, 10:] = -np.ascontiguousarray(H[:10, 10:]) @ inverse_scaled(np.ascontiguousarray(H[10:, 10:]))
+    return project @ np.ascontiguousarray(H[:, :10]), project @ V @ project.T
+
+
+@numba.njit(cache=True)
+def _weighed(
+    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
+) -> tuple[Array, Array, Array, float, Array]:
+    """Return the residual map K, the information H, what noise adds to its score, the cost and sum r^2 (6,)."""
+    K = residual_map_of(T, linear)
+    H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
+    cost, square = noise_cost.value(K, scatter, acceleration, wrench), np.zeros(6)
+    for c in range(scatter.shape[0]):
+        square += ((K @ scatter[c]) * K).sum(1)
+    return K, nonnegative(H, plain), extra, cost, square
 
 
 def _require_answer(sight: Sight, problem: Problem) -> None:

@@ -39,7 +39,8 @@ def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
     if log.noise is None:
         log = _with_classes(log)
     noise = tuple(_no_more_than_rest_shows(log, c, n) for c, n in enumerate(log.noise or ()))
-    log = replace(log, noise=noise)
+    if any(new is not old for new, old in zip(noise, log.noise or (), strict=True)):
+        log = replace(log, noise=noise)
     unknown = np.stack([n.wrench for n in noise]) <= 0
     if not unknown.any():
         return log
@@ -85,7 +86,7 @@ def _no_more_than_rest_shows(log: MotionLog, number: int, noise: Noise) -> Noise
     More would explain residuals that are the wrench's own, and leave it too little noise.
     """
     rows = log.noise_class == number
-    if not rows.any() or not log.still[rows].all():
+    if not rows.any() or (rows & ~log.still).any():
         return noise
     readings = np.concatenate([log.angular_acceleration[rows], log.acceleration[rows]], 1)
     seen = np.maximum((readings**2).mean(0), RIPPLE)

@@ -44,15 +44,15 @@ def nonnegative_masses(A: Array, b: Array) -> Array:
             aim, step = np.zeros(P), 1.0
             chosen = np.flatnonzero(free)
             aim[chosen] = solve_scaled(A[chosen][:, chosen], b[chosen])
-            for k in chosen:
-                if aim[k] <= 0.0 and m[k] > aim[k]:
-                    step = min(step, m[k] / (m[k] - aim[k]))
+            for j in chosen:
+                if aim[j] <= 0.0 and m[j] > aim[j]:
+                    step = min(step, m[j] / (m[j] - aim[j]))
             m = m + step * (aim - m)
             if step == 1.0 and aim[chosen].min() > 0.0:
                 break
-            for k in chosen:
-                if aim[k] <= 0.0 and m[k] <= 1e-12 * m.max():
-                    free[k], m[k] = False, 0.0
+            for j in chosen:
+                if aim[j] <= 0.0 and m[j] <= 1e-12 * m.max():
+                    free[j], m[j] = False, 0.0
             if not free[enters]:
                 break
         if not free[enters]:
