@@ -19,6 +19,8 @@ from steelyard.team.poses import Team, TeamMotion
 TURNS = 24
 # Fewer common rows than this start nothing.
 FEWEST = 8
+# [rad] Rotations below this are noise and place nothing.
+ROTATION_NOISE = 1e-3
 # Evenly spread rows that are enough.
 ENOUGH = 300
 
@@ -83,10 +85,11 @@ def _wahba(H: Array) -> Rotation:
 
 
 def _position(A: Pose, B: Pose, R: Rotation) -> tuple[Array, float]:
-    """Return the least-squares position (3,), of least length where it is open, and the squares left."""
+    """Return the position (3,) by least squares, near zero where no rotation shows it, and the squares left."""
     left = A.rotation.matrix - np.eye(3)
     right = R.apply(B.position) - A.position
     # An offset of the row m itself is noise: means are taken away.
     left, right = left - left.mean(0), right - right.mean(0)
-    p = np.linalg.lstsq(left.reshape(-1, 3), right.ravel(), rcond=1e-4)[0]
-    return p, float(((left @ p - right) ** 2).sum())
+    ridge = len(left) * ROTATION_NOISE**2
+    p = np.linalg.solve(np.einsum("tki,tkj->ij", left, left) + ridge * np.eye(3), np.einsum("tki,tk->i", left, right))
+    return p, float(((left @ p - right) ** 2).sum() + ridge * (p @ p))
