@@ -105,16 +105,19 @@ class Moments:
     def of_log(cls, log: MotionLog, by_block: bool = True) -> Moments:
         """Return the statistic of a log, grouped by noise class, stillness and (by default) block."""
         groups, label = _groups(log, by_block)
-        columns = [log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench]
+        alpha, accel, gravity, omega, wrench = (
+            log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench,
+        )  # fmt: skip
         starts = np.concatenate([[0], np.flatnonzero(label[1:] != label[:-1]) + 1, [len(log)]])
         if len(starts) > len(log) / SHORTEST_RUN + 2:
             # Rows of many groups mixed: gather them first, so that products run over long stretches.
             order = np.argsort(label, kind="stable")
-            columns, label = [values[order] for values in columns], label[order]
+            alpha, accel, gravity, omega, wrench = (v[order] for v in (alpha, accel, gravity, omega, wrench))
+            label = label[order]
             starts = np.searchsorted(label, np.arange(len(groups) + 1))
         out = np.zeros((len(groups), SIZE, SIZE))
         if len(log):
-            _scatter_pass(*columns, starts.astype(np.int64), label[starts[:-1]], out)
+            _scatter_pass(alpha, accel, gravity, omega, wrench, starts.astype(np.int64), label[starts[:-1]], out)
         return cls(out, groups[:, 0], groups[:, 1], groups[:, 2].astype(np.bool_), log.noise)
 
     @classmethod
