@@ -1,0 +1,153 @@
+"""The scene as the page's script draws it: packed buffers in base64, and what is marked on it.
+
+A vertex takes 16 bytes: place as three 16 bit shares of the box and two bytes of nothing, normal as three signed bytes,
+colour as three bytes; a surface of 20 000 triangles then takes about half a megabyte of page.
+"""
+
+from __future__ import annotations
+
+import base64
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
+from steelyard.report.contents import Report
+from steelyard.report.numbers import fixed, mass_unit, principal
+from steelyard.report.palette import density_colours, hexadecimal, part_colour
+from steelyard.report.scene import Body, Scene
+from steelyard.report.surfaces import corner_normals
+from steelyard.shape.mesh import Integers
+
+_CHI2_95 = 7.815  # three degrees of freedom
+_VISIBLE = 0.05  # of the diagonal: how large the ellipsoid of the centre of mass is drawn at least
+_VERTEX = np.dtype([("xyz", "<u2", 4), ("normal", "i1", 4), ("rgb", "u1", 4)])
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """The box that places are shares of, and how to look at it: `view` (3, 3) rows right, up, toward."""
+
+    low: Array
+    size: float
+    view: Array
+
+    @classmethod
+    def around(cls, vertices: Array) -> Frame:
+        """Return the box of vertices, seen with their longest direction across and their thinnest towards the eye."""
+        low = vertices.min(0)
+        size = float(np.ptp(vertices, axis=0).max())
+        gap = vertices - vertices.mean(0)
+        axes = np.linalg.eigh(gap.T @ gap)[1][:, ::-1].T
+        axes = axes * np.sign(axes[np.arange(3), np.abs(axes).argmax(1)])[:, None]
+        axes[2] = np.cross(axes[0], axes[1])
+        return cls(low, size, axes)
+
+
+def placed(scene: Scene) -> list[Body]:
+    """Return the bodies in the sensor frame where it is known, else as they are."""
+    X = scene.X_SO
+    return [b if X is None else Body(b.label, X.apply(b.vertices), b.triangles, b.rgb) for b in scene.bodies]
+
+
+def colours_of(report: Report) -> dict[int, tuple[int, int, int]]:
+    """Return the colour that tells each part apart, in the legend and in the picture."""
+    labels = {part.label for part in report.estimate.parts}
+    if report.scene is not None:
+        labels |= {body.label for body in report.scene.bodies}
+    return {label: part_colour(number) for number, label in enumerate(sorted(labels))}
+
+
+def drawing(report: Report, scene: Scene) -> dict[str, Any]:
+    """Return everything the script needs, as plain values."""
+    bodies = placed(scene)
+    frame = Frame.around(np.concatenate([b.vertices for b in bodies]))
+    known = {part.label: part for part in report.estimate.parts}
+    told = [known[b.label] for b in bodies if b.label in known]
+    density = dict(zip([p.label for p in told], density_colours(np.array([p.density for p in told])), strict=True))
+    apart = colours_of(report)
+    rows = []
+    for body in bodies:
+        part = known.get(body.label)
+        factor, unit = mass_unit(report.estimate.mass)
+        rows.append({
+            "label": body.label,
+            "name": report.name_of(body.label)[:80],
+            "says": "" if part is None else f"{fixed(factor * part.mass, 1 if factor > 1 else 3)} {unit}",
+            "colour": hexadecimal(apart[body.label]),
+            "dense": hexadecimal(density.get(body.label, (150, 150, 150))),
+            "middle": _plain(body.vertices.mean(0)),
+            **_packed(body, frame),
+        })  # fmt: skip
+    return {
+        "low": _plain(frame.low), "size": frame.size, "view": _plain(frame.view), "bodies": rows,
+        "points": _points(scene, frame), "marks": _marks(report.estimate, scene, frame),
+    }  # fmt: skip
+
+
+def _packed(body: Body, frame: Frame) -> dict[str, Any]:
+    """Return the vertices, split where normals differ, and the triangles over them."""
+    table = np.zeros(3 * len(body.triangles), _VERTEX)
+    corners = body.triangles.ravel()
+    table["xyz"][:, :3] = _shares(body.vertices, frame)[corners]
+    table["normal"][:, :3] = np.rint(127 * corner_normals(body.vertices, body.triangles).reshape(-1, 3))
+    table["rgb"][:, :3] = body.rgb[corners]
+    rows, index = np.unique(table.view([("all", "V16")])["all"], return_inverse=True)
+    return {"vertices": _base64(rows), "indices": _base64(index.astype("<u4")), "count": int(corners.size)}
+
+
+def _points(scene: Scene, frame: Frame) -> dict[str, Any] | None:
+    """Return the cloud as vertices without normals."""
+    cloud = scene.points
+    if cloud is None:
+        return None
+    xyz = cloud.xyz if scene.X_SO is None else scene.X_SO.apply(cloud.xyz)
+    inside = ((xyz >= frame.low - 1e-9) & (xyz <= frame.low + frame.size + 1e-9)).all(1)
+    table = np.zeros(int(inside.sum()), _VERTEX)
+    table["xyz"][:, :3] = _shares(xyz[inside], frame)
+    table["rgb"][:, :3] = 128 if cloud.rgb is None else cloud.rgb[inside]
+    return {"vertices": _base64(table), "count": len(table)}
+
+
+def _marks(estimate: Estimate, scene: Scene, frame: Frame) -> dict[str, Any]:
+    """Return centre of mass with its 95 % ellipsoid, inertia ellipsoid and sensor frame, where they are known."""
+    if scene.X_SO is None or not estimate.mass > 0:
+        return {}
+    com = estimate.com
+    values, axes = np.linalg.eigh(estimate.people_covariance[1:4, 1:4])
+    half = np.sqrt(_CHI2_95 * np.maximum(values, 0))
+    larger = _magnified(float(half.max()), frame.size)
+    marks: dict[str, Any] = {
+        "com": _plain(com),
+        "spread": {"axes": _plain((axes * half * larger).T), "larger": larger},
+        "sensor": {"at": [0.0, 0.0, 0.0], "axes": np.eye(3).tolist()},
+    }
+    if estimate.inertia_com is not None and estimate.parameters.validity().consistent:
+        moments, _, ways = principal(estimate)
+        squares = 5 * (moments.sum() / 2 - moments) / estimate.mass  # an even ellipsoid: I_x = m (b^2 + c^2) / 5
+        marks["ellipsoid"] = _plain((ways * np.sqrt(np.maximum(squares, 0))).T)
+    return marks
+
+
+def _magnified(half: float, size: float) -> int:
+    """Return 1, 2, 5, 10, 20 ... : how many times larger the ellipsoid must be drawn to be seen."""
+    if not 0 < half < _VISIBLE * size:
+        return 1
+    wanted = _VISIBLE * size / half
+    power = 10.0 ** np.floor(np.log10(wanted))
+    return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+
+
+def _shares(xyz: Array, frame: Frame) -> Integers:
+    return np.clip(np.rint((xyz - frame.low) / frame.size * 65535), 0, 65535).astype(np.int64)
+
+
+def _base64(array: Any) -> str:
+    return base64.b64encode(np.ascontiguousarray(array).tobytes()).decode("ascii")
+
+
+def _plain(values: Array) -> Any:
+    """Return nested lists of numbers with the digits that a drawing needs."""
+    return np.vectorize(lambda x: float(f"{x:.7g}"))(values).tolist()

@@ -1,0 +1,134 @@
+"""The panel beside the picture: every part with its mass, and what the picture can show."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.identify.estimate import PartMass
+from steelyard.report.contents import Report
+from steelyard.report.drawing import colours_of
+from steelyard.report.markup import Html, joined, tag
+from steelyard.report.numbers import general, mass_unit, measured
+from steelyard.report.palette import hexadecimal
+from steelyard.report.plots import share_bar
+from steelyard.report.projection import picture
+from steelyard.report.scene import Scene
+
+MOST_PARTS = 200
+
+
+def viewer(report: Report) -> Html:
+    """Return picture, controls and legend; the legend alone where there is nothing to draw."""
+    parts = _legend(report)
+    if report.scene is None:
+        return tag("section", tag("h2", "Parts"), parts, class_="parts alone") if report.estimate.parts else Html("")
+    known = report.scene.X_SO is not None and report.estimate.mass > 0
+    still = picture(report.scene, colours_of(report), report.estimate.com if known else None)
+    stage = tag(
+        "div", still,
+        tag("canvas", tabindex=0, hidden=True, role="img", aria_describedby="how",
+            aria_label="The parts of the object in 3D"),
+        tag("div", class_="chips", aria_hidden="true"), tag("output", class_="hint", hidden=True),
+        class_="stage",
+    )  # fmt: skip
+    return tag(
+        "section",
+        tag("h2", "The object", class_="unseen"),
+        tag("div", tag("div", stage, _controls(report, report.scene, known), class_="view"), parts, class_="viewer"),
+        id="viewer", class_="object",
+    )  # fmt: skip
+
+
+def _controls(report: Report, scene: Scene, known: bool) -> Html:
+    """Return the buttons and sliders; the script shows them when it draws."""
+    coloured = any(len(np.unique(b.rgb, axis=0)) > 1 for b in scene.bodies) or len(
+        {tuple(b.rgb[0].tolist()) for b in scene.bodies}
+    ) > 1  # fmt: skip
+    modes = [
+        ("parts", "Parts", True),
+        ("true", "Own colours", coloured),
+        ("dense", "Density", bool(report.estimate.parts)),
+    ]
+    marks = [
+        ("com", "Centre of mass", known), ("ellipsoid", "Inertia ellipsoid", known and report.estimate.inertia_com is not None),
+        ("sensor", "Sensor frame", known), ("chips", "Labels", True), ("points", "Points", scene.points is not None),
+    ]  # fmt: skip
+    several = len(scene.bodies) > 1
+    return tag(
+        "div",
+        tag("div", *(tag("button", said, type="button", data_mode=key, aria_pressed="true" if key == "parts" else "false")
+                     for key, said, there in modes if there), class_="group", role="group", aria_label="Colour by"),
+        tag("div", *(tag("button", said, type="button", data_show=key, aria_pressed="false")
+                     for key, said, there in marks if there), class_="group", role="group", aria_label="Show"),
+        tag("div", _slider("explode", "Pull apart") if several else "", _slider("cut", "Cut open"),
+            tag("button", "Reset", type="button", data_do="reset"), class_="group sliders"),
+        tag("p", "Drag to turn, shift-drag or two fingers to move, wheel or pinch to zoom. Keys: arrows turn, shift-arrows "
+                 "move, + and − zoom, 0 resets.", id="how", class_="how"),
+        class_="controls", hidden=True,
+    )  # fmt: skip
+
+
+def _slider(name: str, said: str) -> Html:
+    return tag("label", said, tag("input", type="range", min=0, max=100, value=0, data_slide=name))
+
+
+def _legend(report: Report) -> Html:
+    """Return a row per part, the heaviest first."""
+    parts = sorted(report.estimate.parts, key=lambda p: (-p.mass, p.label))
+    colours = colours_of(report)
+    drawn = [] if report.scene is None else [b.label for b in report.scene.bodies]
+    weighed = {p.label for p in parts}
+    total = max(sum(p.mass for p in parts), 1e-300)
+    rows = [_part(report, p, colours[p.label], p.mass / total, p.label in drawn) for p in parts[:MOST_PARTS]]
+    rows += [_bare(report, label, colours[label]) for label in drawn if label not in weighed][:MOST_PARTS]
+    more = len(parts) - MOST_PARTS
+    rest = tag("p", f"and {more} lighter parts", class_="aside") if more > 0 else ""
+    return tag("aside", tag("ul", *rows, class_="legend"), rest, _density_note(parts), aria_label="Parts")
+
+
+def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: float, drawn: bool) -> Html:
+    factor, unit = mass_unit(report.estimate.mass)
+    name = report.name_of(part.label)
+    true = report.truth.masses.get(part.label) if report.truth is not None else None
+    said = [f"{general(1e6 * part.volume)} cm³", f"{general(part.density, 2 if part.density < 1e3 else 3)} kg/m³"]
+    return tag(
+        "li",
+        tag("label", _switch(part.label, name, drawn), _swatch(colour), tag("span", name, class_="name"),
+            tag("span", measured(factor * part.mass, factor * part.std, unit), class_="mass")),
+        share_bar(share),
+        tag("p", " · ".join(said), tag("b", f" {part.material}") if part.material else "", class_="aside"),
+        tag("p", f"truth {general(factor * true, 4)} {unit}", class_="aside") if true is not None else "",
+        data_label=part.label,
+    )  # fmt: skip
+
+
+def _bare(report: Report, label: int, colour: tuple[int, int, int]) -> Html:
+    """Return the row of a part whose mass nobody has found."""
+    name = report.name_of(label)
+    return tag(
+        "li", tag("label", _switch(label, name, True), _swatch(colour), tag("span", name, class_="name")),
+        data_label=label,
+    )  # fmt: skip
+
+
+def _switch(label: int, name: str, drawn: bool) -> Html:
+    if not drawn:
+        return joined()
+    return tag("input", type="checkbox", checked=True, data_part=label, aria_label=f"Show {name}")
+
+
+def _swatch(colour: tuple[int, int, int]) -> Html:
+    return tag(
+        "svg", tag("rect", width=12, height=12, rx=3, fill=hexadecimal(colour)), width=12, height=12, class_="swatch",
+        aria_hidden="true",
+    )  # fmt: skip
+
+
+def _density_note(parts: list[PartMass]) -> Html:
+    """Return the scale of densities."""
+    if not parts:
+        return joined()
+    low, high = min(p.density for p in parts), max(p.density for p in parts)
+    return tag(
+        "p", f"Density: light {general(low, 2)}, dark {general(high, 2)} kg/m³", class_="aside dense", hidden=True
+    )

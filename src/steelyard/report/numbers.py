@@ -1,0 +1,67 @@
+"""Numbers as people read them: two figures of the standard deviation, a minus that is one, units that suit the size."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
+from steelyard.inertia import InertialParameters, forms
+from steelyard.report.markup import Html, tag
+
+_THIN = "\u202f"
+
+
+def decimals(std: float) -> int:
+    """Return how many decimals show two figures of a standard deviation."""
+    if not np.isfinite(std) or std <= 0:
+        return 3
+    return int(np.clip(1 - np.floor(np.log10(std)), 0, 9))
+
+
+def fixed(value: float, places: int) -> str:
+    """Return a number with a true minus sign."""
+    return f"{value:.{places}f}".replace("-", "−") if np.isfinite(value) else "?"
+
+
+def general(value: float | None, figures: int = 3) -> str:
+    """Return a number with so many figures, never in powers of ten below a million; "–" for None."""
+    if value is None or not np.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    places = int(np.clip(figures - 1 - np.floor(np.log10(abs(value))), 0, 12))
+    return f"{value:.{figures}g}".replace("-", "−") if abs(value) >= 1e6 or abs(value) < 1e-5 else fixed(value, places)
+
+
+def measured(value: float, std: float, unit: str) -> Html:
+    """Return value ± std with the unit."""
+    places = decimals(std) if std > 0 else min(decimals(abs(value) / 1e3), 4) if value else 3
+    bar = tag("span", f"{_THIN}±{_THIN}{fixed(std, places)}", class_="pm") if std > 0 else ""
+    return tag(
+        "span", tag("span", fixed(value, places), class_="v"), bar, tag("span", f" {unit}", class_="u"), class_="q"
+    )
+
+
+def mass_unit(mass: float) -> tuple[float, str]:
+    """Return factor and unit for a mass [kg]: grams below one kilogram."""
+    return (1e3, "g") if abs(mass) < 1 else (1.0, "kg")
+
+
+def inertia_unit(moment: float) -> tuple[float, str]:
+    """Return factor and unit for a moment of inertia [kg m^2]."""
+    return (1e6, "kg mm²") if abs(moment) < 0.1 else (1.0, "kg m²")
+
+
+def people(body: InertialParameters) -> Array:
+    """Return mass [kg], com [m], inertia about it xx xy xz yy yz zz [kg m^2] (10,)."""
+    return np.concatenate([[float(body.mass)], body.com, forms.upper(body.inertia_com)])
+
+
+def principal(estimate: Estimate) -> tuple[Array, Array, Array]:
+    """Return principal moments (3,) rising [kg m^2], their standard deviations (3,), and the axes (3, 3) as columns."""
+    moments, pose = estimate.parameters.principal()
+    axes = pose.rotation.matrix
+    slope = np.stack([forms.upper(np.outer(v, v)) for v in axes.T]) * np.array([1, 2, 2, 1, 2, 1])
+    variance = np.einsum("ai,ij,aj->a", slope, estimate.people_covariance[4:, 4:], slope)
+    return moments, np.sqrt(np.maximum(variance, 0)), axes

@@ -1,0 +1,95 @@
+"""The page: sections put into one file that loads nothing, with a policy that lets nothing else run."""
+
+from __future__ import annotations
+
+import base64
+import contextlib
+import hashlib
+import os
+from functools import cache
+from importlib import resources
+from pathlib import Path
+from string import Template
+
+from steelyard import check
+from steelyard.errors import BadFile
+from steelyard.report import sections
+from steelyard.report.contents import Report
+from steelyard.report.drawing import drawing
+from steelyard.report.legend import viewer
+from steelyard.report.markup import joined, script_json, tag, text
+
+
+def write_report(report: Report, path: Path | str) -> None:
+    """Write the page; the file appears complete or not at all. Raises BadFile."""
+    path = Path(path)
+    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
+    try:
+        temporary.write_text(render(report), encoding="utf-8")
+        temporary.replace(path)
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
+    finally:
+        with contextlib.suppress(OSError):
+            temporary.unlink(missing_ok=True)
+
+
+def render(report: Report, version: str | None = None) -> str:
+    """Return the page as one HTML text that needs no network.
+
+    Only the page's own script and style may run, by their digests, so that even markup smuggled into a name would be
+    dead. Raises BadValue where the numbers of the report are not finite.
+    """
+    check.finite("the parameters' covariance", report.estimate.covariance)
+    style, script = _template("page.css"), _template("viewer.js")
+    body = joined(
+        sections.headline(report),
+        viewer(report),
+        sections.comparison(report),
+        sections.residuals(report),
+        sections.findings(report),
+        tag("div", sections.numbers(report), sections.evidence(report), class_="pair"),
+    )
+    scene = "" if report.scene is None else tag("script", script_json(drawing(report, report.scene)),
+                                                 type="application/json", id="scene")  # fmt: skip
+    return Template(_template("page.html")).substitute(
+        title=text(report.title),
+        policy=f"default-src 'none'; img-src data:; style-src '{_digest(style)}'; script-src '{_digest(script)}'",
+        style=style,
+        script=script,
+        subtitle=text(_subtitle(report)),
+        body=body,
+        footer=sections.provenance(report, version or _version()),
+        scene=scene,
+    )
+
+
+def _subtitle(report: Report) -> str:
+    """Return one line on what the answer rests on."""
+    seen = report.estimate
+    said = [f"method {seen.method}"]
+    if seen.evidence.samples:
+        said.append(f"{seen.evidence.samples} samples, {seen.evidence.still_samples} at rest")
+    if seen.parts:
+        said.append(f"{len(seen.parts)} part{'s' if len(seen.parts) > 1 else ''}")
+    count = len(seen.findings)
+    said.append("no findings" if not count else f"{count} finding{'s' if count > 1 else ''}")
+    return " · ".join(said)
+
+
+def _version() -> str:
+    from importlib.metadata import PackageNotFoundError, version
+
+    with contextlib.suppress(PackageNotFoundError):
+        return version("steelyard")
+    return ""
+
+
+@cache
+def _template(name: str) -> str:
+    return (resources.files("steelyard.report") / "templates" / name).read_text(encoding="utf-8")
+
+
+def _digest(source: str) -> str:
+    """Return the digest by which a content security policy knows a script or style."""
+    return "sha256-" + base64.b64encode(hashlib.sha256(source.encode()).digest()).decode()

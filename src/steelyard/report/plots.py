@@ -1,0 +1,148 @@
+"""Small charts as inline SVG: residuals over time, and an interval with the truth on it.
+
+Charts stretch with the page: places are per cent of the width, and curves lie in an inner picture that is stretched
+while its lines keep their width; so text keeps its size on a phone.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.report.contents import Residuals
+from steelyard.report.markup import Html, tag
+from steelyard.report.numbers import general
+
+COLUMNS = 420
+_HEIGHT, _TOP, _BOTTOM = 190, 12, 24
+
+
+def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) -> Html:
+    """Return the three axes of values (N, 3) over time: lowest and highest of each column, and its mean as a line."""
+    time = residuals.time
+    start, length = float(time[0]), max(float(time[-1] - time[0]), 1e-9)
+    column = np.clip(((time - start) / length * COLUMNS).astype(np.int64), 0, COLUMNS - 1)
+    used, place = np.unique(column, return_inverse=True)
+    low, high, mean = (np.full((len(used), 3), fill) for fill in (np.inf, -np.inf, 0.0))
+    np.minimum.at(low, place, values)
+    np.maximum.at(high, place, values)
+    np.add.at(mean, place, values)
+    mean /= np.bincount(place)[:, None]
+    top = max(float(np.abs([low, high]).max()), 1e-12)
+    step = _round_step(top)
+    reach = max(top, step) * 1.06
+    x = used + 0.5
+
+    def y(v: Array) -> Array:
+        return np.asarray(50 - 50 * v / reach)
+
+    layers = [*_still_bands(residuals, start, length)]
+    for k, axis in enumerate("xyz"):
+        edge = np.concatenate([np.stack([x, y(high[:, k])], 1), np.stack([x, y(low[:, k])], 1)[::-1]])
+        layers.append(tag("polygon", points=_points(edge), class_=f"band {axis}"))
+    for k, axis in enumerate("xyz"):
+        layers.append(tag("polyline", points=_points(np.stack([x, y(mean[:, k])], 1)), class_=f"curve {axis}"))
+    inner = tag(
+        "svg", *layers, x=0, y=_TOP, width="100%", height=_HEIGHT - _TOP - _BOTTOM,
+        viewBox=f"0 0 {COLUMNS} 100", preserveAspectRatio="none",
+    )  # fmt: skip
+    rms = np.sqrt((values**2).mean(0))
+    named = [
+        tag("li", tag("b", axis, class_=axis), f" {general(r)} {unit}") for axis, r in zip("xyz", rms, strict=True)
+    ]
+    return tag(
+        "figure",
+        tag("figcaption", tag("h3", title), tag("ul", *named, class_="key", aria_label="root mean square per axis")),
+        tag(
+            "svg", *_grid(step, reach, unit), inner, *_time_axis(start, length),
+            width="100%", height=_HEIGHT, class_="plot", role="img",
+            aria_label=f"{title}: residuals over time, at most {general(top)} {unit}",
+        ),
+    )  # fmt: skip
+
+
+def _still_bands(residuals: Residuals, start: float, length: float) -> list[Html]:
+    """Return a shade for every stretch of rows at rest."""
+    still = residuals.still.astype(np.int8)
+    turns = np.diff(np.concatenate([[0], still, [0]]))
+    first, last = np.flatnonzero(turns == 1), np.flatnonzero(turns == -1) - 1
+    x = (residuals.time - start) / length * COLUMNS
+    shades: list[list[float]] = []
+    for a, b in zip(x[first].tolist(), x[last].tolist(), strict=True):
+        if not shades or a > shades[-1][1] + 0.5:
+            shades.append([a, b])
+        else:
+            shades[-1][1] = b
+    return [
+        tag("rect", x=f"{a:.2f}", y=0, width=f"{max(b - a, 0.3):.2f}", height=100, class_="rest") for a, b in shades
+    ]
+
+
+def _grid(step: float, reach: float, unit: str) -> list[Html]:
+    """Return lines and numbers of the upright axis."""
+    inner = _HEIGHT - _TOP - _BOTTOM
+    rows = []
+    for k in (-1, 0, 1):
+        y = _TOP + inner * (0.5 - 0.5 * k * step / reach)
+        rows.append(tag("line", x1=0, x2="100%", y1=f"{y:.1f}", y2=f"{y:.1f}", class_="grid" if k else "grid zero"))
+        if k:
+            said = f"{'+' if k > 0 else '−'}{general(step, 2)} {unit}"
+            rows.append(tag("text", said, x=0, y=f"{y - 4:.1f}", class_="tick"))
+    return rows
+
+
+def _time_axis(start: float, length: float) -> list[Html]:
+    """Return the numbers of the time axis, about six of them."""
+    step = _round_step(length / 3)
+    marks = np.arange(np.ceil(start / step), np.floor((start + length) / step) + 1) * step
+    out = []
+    for t in marks.tolist():
+        share = 100 * (t - start) / length
+        anchor = "start" if share < 4 else "end" if share > 96 else "middle"
+        said = f"{general(t)} s" if t == marks[-1] else general(t)
+        out.append(tag("text", said, x=f"{share:.2f}%", y=_HEIGHT - 6, text_anchor=anchor, class_="tick"))
+    return out
+
+
+def _round_step(top: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is below `top`."""
+    power = 10.0 ** np.floor(np.log10(top))
+    return float(power * max(s for s in (1, 2, 5) if s * power <= top * (1 + 1e-9)))
+
+
+def _points(places: Array) -> str:
+    return " ".join(f"{x:.1f},{y:.2f}" for x, y in places.tolist())
+
+
+def interval(value: float, std: float, truth: float | None) -> Html:
+    """Return a bar of two standard deviations about the value, and the truth as a mark on it."""
+    if not std > 0:
+        return Html("")
+    away = 0.0 if truth is None else abs(truth - value)
+    reach = max(3.2 * std, 1.15 * away)
+
+    def x(v: float) -> str:
+        return f"{50 + 48 * (v - value) / reach:.2f}%"
+
+    parts = [
+        tag("line", x1="2%", x2="98%", y1=9, y2=9, class_="rail"),
+        tag("line", x1=x(value - 2 * std), x2=x(value + 2 * std), y1=9, y2=9, class_="bar"),
+        tag("circle", cx="50%", cy=9, r=4, class_="dot"),
+    ]
+    if truth is not None:
+        parts.append(tag("line", x1=x(truth), x2=x(truth), y1=1, y2=17, class_="truth"))
+    said = "" if truth is None else f"; the truth lies {general(away / std, 2)} standard deviations away"
+    return tag(
+        "svg", *parts, width="100%", height=18, class_="interval", role="img",
+        aria_label=f"two standard deviations either side{said}",
+    )  # fmt: skip
+
+
+def share_bar(share: float, kind: str = "") -> Html:
+    """Return a thin bar that fills `share` (0..1) of its cell."""
+    width = f"{100 * min(max(share, 0.0), 1.0):.1f}%"
+    return tag(
+        "svg", tag("rect", width="100%", height=5, rx=2.5, class_="rail"),
+        tag("rect", width=width, height=5, rx=2.5, class_=f"fill {kind}".strip()),
+        width="100%", height=5, class_="share", aria_hidden="true",
+    )  # fmt: skip

@@ -1,0 +1,70 @@
+"""Surfaces made ready for drawing: the skin of each part, thinned, with normals that keep sharp edges sharp."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.mesh import Integers
+from steelyard.shape.tets import FACES, TetMesh
+
+CREASE = np.cos(np.deg2rad(42.0))  # faces that turn by more than this keep their edge
+
+
+def part_skins(solid: TetMesh, labels: Integers) -> list[tuple[int, Integers]]:
+    """Return label and triangles (F, 3) of each part's boundary, towards the outside and towards other parts."""
+    behind = solid.neighbours.ravel()
+    own = np.repeat(labels, 4)
+    other = np.where(behind < 0, -1, labels[behind])
+    faces = solid.tets[:, FACES].reshape(-1, 3)
+    return [(int(k), faces[(own == k) & (other != k)]) for k in np.unique(labels)]
+
+
+def compact(vertices: Array, triangles: Integers) -> tuple[Array, Integers]:
+    """Return only the vertices that are used."""
+    used, corners = np.unique(triangles, return_inverse=True)
+    return vertices[used], corners.reshape(-1, 3)
+
+
+def thinned(vertices: Array, triangles: Integers, most: int) -> tuple[Array, Integers]:
+    """Return a surface of at most `most` triangles: vertices in one cell of a grid become their mean.
+
+    The grid is as fine as it can be to a tenth; a surface that is small enough is returned as it is.
+    """
+    vertices, triangles = compact(vertices, triangles)
+    cell = float(np.ptp(vertices, axis=0).max(initial=0.0)) / 512
+    while len(triangles) > most and cell > 0:
+        place = np.floor((vertices - vertices.min(0)) / cell).astype(np.int64)
+        group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
+        count = np.bincount(group)
+        means = np.stack([np.bincount(group, vertices[:, k]) / count for k in range(3)], axis=1)
+        merged = group[triangles]
+        whole = (merged != np.roll(merged, 1, axis=1)).all(1)
+        first = np.unique(np.sort(merged[whole], axis=1), axis=0, return_index=True)[1]
+        if len(first) <= most:
+            return compact(means, merged[whole][np.sort(first)])
+        cell *= 1.1
+    return vertices, triangles
+
+
+def corner_normals(vertices: Array, triangles: Integers) -> Array:
+    """Return a unit normal (F, 3, 3) at every corner: the mean, by area, of the faces there that turn little."""
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    across = np.cross(b - a, c - a)
+    unit = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    corner = triangles.ravel()
+    order = np.argsort(corner, kind="stable")
+    count = np.bincount(corner, minlength=len(vertices))
+    start = np.cumsum(count) - count
+    # Every corner against every corner at the same vertex.
+    many = count[corner]
+    mine = np.repeat(np.arange(len(corner)), many)
+    step = np.arange(len(mine)) - np.repeat(np.cumsum(many) - many, many)
+    theirs = order[start[corner[mine]] + step]
+    alike = (unit[mine // 3] * unit[theirs // 3]).sum(1) > CREASE
+    total = np.zeros((len(corner), 3))
+    for k in range(3):
+        total[:, k] = np.bincount(mine[alike], across[theirs[alike] // 3, k], len(corner))
+    length = np.linalg.norm(total, axis=1, keepdims=True)
+    flat = np.repeat(unit, 3, axis=0)
+    return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), flat).reshape(-1, 3, 3))
