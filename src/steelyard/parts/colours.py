@@ -1,0 +1,184 @@
+"""Colours of a surface: the light taken out, noise averaged, and the few colours that the object is made of.
+
+A single lamp makes brightness a linear function of the normal, colour = albedo (1 + s . n). Most neighbours have one
+albedo, so s is found from pairs of them without knowing any colour, by a robust fit (Lambert's law to first order:
+Basri and Jacobs 2003, "Lambertian reflectance and linear subspaces", sec. 3).
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.parts.skin import Skin
+from steelyard.shape.mesh import Colours, Integers
+
+NEIGHBOURS = 8
+# Distances between colours 0..1 (black to white is 1.7). Steps of eight bits and of a compressed texture are below the
+# finest, and a tint apart from another of the same object is above the coarsest.
+FINEST, COARSEST = 0.03, 0.2
+_STEPS = 3.0  # one colour reaches this many median steps between neighbours
+_RARE = 0.01  # a colour has at least this share of the points
+_LAMP_SEEN = 0.05  # weaker shading is below the difference of two colours
+_LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
+_ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
+
+
+@dataclass(frozen=True, eq=False)
+class ColourModes:
+    """The M colours of an object.
+
+    label  (V,) the colour 0..M-1 of every point
+    rgb    (M, 3) the colours, 0..255, as they are without the lamp
+    lamp   (3,) direction of the lamp times its strength; brightness is 1 + lamp . normal; 0 where none is seen
+    noise  median distance of neighbouring colours, 0..1, before averaging
+    """
+
+    label: Integers
+    rgb: Array
+    lamp: Array
+    noise: float
+
+
+def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
+    """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255."""
+    from scipy.spatial import cKDTree
+
+    colour = np.asarray(rgb, dtype=np.float64) / 255
+    near = cKDTree(skin.vertices).query(skin.vertices, min(17, len(colour)))[1][:, 1:]
+    lamp = _lamp(colour, skin, near)
+    sure = np.ones(len(colour), dtype=bool)
+    if lamp.any():
+        colour = colour / (1 + skin.normals @ lamp)[:, None]
+        sure = skin.flatness > min(0.95, float(np.median(skin.flatness)))
+    near = near[:, :NEIGHBOURS]
+    noise = _step(colour, near, sure)
+    if noise > FINEST / _STEPS:
+        colour = _averaged(colour, near, noise)
+    reach = float(np.clip(_STEPS * _step(colour, near, sure), FINEST, COARSEST))
+    modes = _modes(colour, near, sure, reach)
+    label = _assigned(colour, near, sure, modes, reach)
+    label, modes = _without_blends(label, modes, near)
+    return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise)
+
+
+def _lamp(colour: Array, skin: Skin, near: Integers) -> Array:
+    """Return the lamp (3,): direction times strength; 0 where the brightness does not follow the normals."""
+    flat = skin.flatness > np.clip(np.median(skin.flatness), 0.9, 0.98)
+    apart = near[:, 3::4]  # some rings away: next neighbours share their triangles, and so their errors
+    i, j = np.repeat(np.arange(len(near)), apart.shape[1]), apart.ravel()
+    both = flat[i] & flat[j]
+    i, j = i[both], j[both]
+    one, two, n = colour[i], colour[j], skin.normals
+    # (1 + s.n_j) colour_i = (1 + s.n_i) colour_j, of equal albedo; three rows per pair, relative to the brightness.
+    scale = 1 / np.maximum((one + two).ravel(), 4 / 255)[:, None]
+    rows = (one[:, :, None] * n[j][:, None] - two[:, :, None] * n[i][:, None]).reshape(-1, 3) * scale
+    side = (two - one).reshape(-1, 1) * scale
+    lamp = np.zeros(3)
+    for _ in range(20):
+        off = rows @ lamp - side[:, 0]
+        weight = 1 / (_ROUGH**2 + off**2)
+        weighted = rows * weight[:, None]
+        lamp = np.linalg.solve(weighted.T @ rows + 1e-4 * weight.sum() * np.eye(3), weighted.T @ side[:, 0])
+    strength = float(np.linalg.norm(lamp))
+    if strength < _LAMP_SEEN or not _explains(rows, side[:, 0], lamp):
+        return np.zeros(3)
+    return np.asarray(lamp * min(1.0, _LAMP_MOST / strength))
+
+
+def _explains(rows: Array, side: Array, lamp: Array) -> bool:
+    """Whether the lamp takes away a quarter of the usual difference, where normals differ."""
+    turned = np.abs(rows).sum(1) > _LAMP_SEEN
+    if not turned.any():
+        return False
+    before, after = np.median(np.abs(side[turned])), np.median(np.abs((rows @ lamp - side)[turned]))
+    return bool(after < 0.75 * before)
+
+
+def _step(colour: Array, near: Integers, sure: Any) -> float:
+    """Return the median distance between the colours of near neighbours."""
+    gaps = np.linalg.norm(colour[near[:, :4]] - colour[:, None], axis=2)
+    return float(np.median(gaps[sure])) if sure.any() else 0.0
+
+
+def _averaged(colour: Array, near: Integers, noise: float) -> Array:
+    """Return colours averaged over neighbours of like colour, twice: noise goes, borders stay."""
+    width = float(np.clip(_STEPS * noise, FINEST, COARSEST))
+    for _ in range(2):
+        gap = np.linalg.norm(colour[near] - colour[:, None], axis=2)
+        weight = np.exp(-0.5 * (gap / width) ** 2)
+        colour = (colour + (weight[:, :, None] * colour[near]).sum(1)) / (1 + weight.sum(1))[:, None]
+    return colour
+
+
+def _modes(colour: Array, near: Integers, sure: Any, reach: float) -> Array:
+    """Return colours (M, 3) that many points are near to, the most frequent first; at least one."""
+    alike = (np.linalg.norm(colour[near] - colour[:, None], axis=2) < reach).mean(1)
+    cell, member, count = np.unique(
+        np.floor(colour[sure] / (reach / 4)).astype(np.int64), axis=0, return_inverse=True, return_counts=True
+    )
+    member = member.ravel()
+    centre = np.stack([np.bincount(member, colour[sure][:, k], len(cell)) for k in range(3)], axis=1) / count[:, None]
+    company = np.bincount(member, alike[sure], len(cell))
+    close = np.linalg.norm(centre[:, None] - centre, axis=2) < reach
+    left, found = np.ones(len(cell), dtype=bool), []
+    while left.any():
+        crowd = np.where(left, close @ (count * left), -1)
+        best = int(crowd.argmax())
+        if crowd[best] < _RARE * len(colour) and found:
+            break
+        mine = left & close[best]
+        middle = np.average(centre[mine], axis=0, weights=count[mine])
+        mine |= left & (np.linalg.norm(centre - middle, axis=1) < reach)
+        # Colours whose points have no neighbours of their own colour are noise or borders.
+        if company[mine].sum() >= 0.5 * count[mine].sum() or not found:
+            found.append(np.average(centre[mine], axis=0, weights=count[mine]))
+        left &= ~mine
+    return np.array(found)
+
+
+def _assigned(colour: Array, near: Integers, sure: Any, modes: Array, reach: float) -> Integers:
+    """Return the mode (V,) of every point: the nearest within reach, else by colour and neighbours together."""
+    gap = np.linalg.norm(colour[:, None] - modes, axis=2)
+    label = np.where((gap.min(1) < reach) & sure, gap.argmin(1), -1)
+    open_points = label < 0
+    for _ in range(4):
+        # An unsure colour (light at an edge) is worth half a neighbour less per black-to-white step.
+        score = _votes(label, near, len(modes)) / near.shape[1] - np.where(sure, 2.0, 0.5)[:, None] * gap
+        label = np.where(open_points, score.argmax(1), label)
+    votes = _votes(label, near, len(modes))
+    lone = np.take_along_axis(votes, label[:, None], 1)[:, 0] <= 1
+    return np.asarray(np.where(lone, votes.argmax(1), label))
+
+
+def _votes(label: Integers, near: Integers, count: int) -> Array:
+    """Return how many neighbours (V, count) of each point have each label; -1 has no vote."""
+    votes = label[near]
+    voter, _ = np.nonzero(votes >= 0)
+    return np.bincount(voter * count + votes[votes >= 0], minlength=len(near) * count).reshape(-1, count)
+
+
+def _without_blends(label: Integers, modes: Array, near: Integers) -> tuple[Integers, Array]:
+    """Give the points of colours that only are the mixture of two others, at their border, to the nearer of the two."""
+    count = len(modes)
+    votes = _votes(label, near, count)
+    size = np.bincount(label, minlength=count)
+    for m in np.argsort(size, kind="stable"):
+        mine = label == m
+        beside = votes[mine].sum(0).astype(np.float64)
+        beside[m] = 0
+        two = np.argsort(-beside, kind="stable")[:2]
+        if count < 3 or beside[two].sum() < 0.9 * beside.sum() or beside[two].min() < 0.15 * beside.sum():
+            continue
+        a, b = modes[two]
+        along = float((modes[m] - a) @ (b - a) / max((b - a) @ (b - a), 1e-12))
+        off = float(np.linalg.norm(modes[m] - a - along * (b - a)))
+        thin = (votes[mine][:, two].sum(1) > 0).mean() > 0.6
+        if thin and 0.1 < along < 0.9 and off < 0.1 * np.linalg.norm(b - a) and size[m] < size[two].min():
+            label = np.where(mine, two[int(along > 0.5)], label)
+            votes = _votes(label, near, count)
+    used, label = np.unique(label, return_inverse=True)
+    return label, modes[used]

@@ -1,0 +1,105 @@
+"""Small pieces of a solid, each of one colour, that creases do not cross: what the parts are put together from."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.parts.skin import Skin
+from steelyard.shape.mesh import Integers
+from steelyard.shape.tets import FACES, TetMesh
+
+PIECE = 1 / 200  # of the volume: a tenth of the finest part that is looked for
+TINY = 1 / 500  # of the volume: less is no part ...
+TINY_SKIN = 1 / 200  # ... unless it is seen, as foil is: this share of the boundary
+_CREASE = 0.6  # a turn [rad] that is certainly a crease
+_UNCREASED = 0.05  # of a face's area, what is left of its pull where it ends in creases only
+
+
+def cell_colours(mesh: TetMesh, label: Integers) -> Integers:
+    """Return the colour (T,) of every tet: of most of its corners, in a tie that of the corner nearest its centroid."""
+    corners = label[mesh.tets]
+    votes = (corners[:, :, None] == corners[:, None, :]).sum(2).astype(np.float64)
+    gap = np.linalg.norm(mesh.vertices[mesh.tets] - mesh.centroids[:, None], axis=2)
+    best = np.argmax(votes - 0.5 * gap / gap.max(1, keepdims=True), axis=1)
+    return np.asarray(corners[np.arange(len(mesh)), best])
+
+
+def inner_faces(mesh: TetMesh) -> tuple[Integers, Integers]:
+    """Return the faces between tets: the pairs of tets (I, 2), and corners (I, 3), turned out of the first of them."""
+    cell, other = np.repeat(np.arange(len(mesh)), 4), mesh.neighbours.ravel()
+    once = cell < other
+    return np.stack([cell[once], other[once]], axis=1), mesh.tets[:, FACES].reshape(-1, 3)[once]
+
+
+def pieces_of(
+    mesh: TetMesh, skin: Skin, colour: Integers, pairs: Integers, corners: Integers, areas: Array
+) -> tuple[Integers, Integers]:
+    """Return the piece (T,) of every tet, numbered from 0, and the colour (N,) of every piece.
+
+    Small clusters of one colour join the neighbour with which they share the most face, faces between creases counting
+    little; then what is left too small to be seen joins a neighbour of another colour.
+
+    colour         (T,) of every tet
+    pairs, corners as `inner_faces` gives them; areas (I,) of the faces [m^2]
+    """
+    crease = np.zeros(len(mesh.vertices))
+    np.maximum.at(crease, skin.edges.ravel(), np.repeat(skin.turning, 2))
+    pull = areas * (1 + _UNCREASED - np.clip(crease[corners].mean(1) / _CREASE, 0, 1))
+    one_colour = colour[pairs[:, 0]] == colour[pairs[:, 1]]
+    piece = np.arange(len(mesh))
+    piece = _absorbed(piece, mesh.volumes, pairs[one_colour], pull[one_colour], mesh.volume * PIECE)
+    seen = np.bincount(skin.cell, skin.areas, len(mesh)) / skin.areas.sum()
+    size = np.maximum(mesh.volumes / mesh.volume / TINY, seen / TINY_SKIN)
+    piece = _absorbed(piece, size, pairs, areas, 1.0)
+    piece = _specks_to_nearest(mesh, piece, size)
+    # A piece has the colour of most of its volume.
+    count, colours = int(piece.max()) + 1, int(colour.max()) + 1
+    volume = np.bincount(piece * colours + colour, mesh.volumes, count * colours).reshape(count, colours)
+    return piece, volume.argmax(1)
+
+
+def _absorbed(piece: Integers, size: Array, pairs: Integers, pull: Array, least: float) -> Integers:
+    """Return pieces joined, round by round, each below the `least` size to the neighbour that pulls it most.
+
+    size  (T,) summed over the tets of a piece; a piece below the least joins larger ones or others below it
+    """
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+
+    while True:
+        count = int(piece.max()) + 1
+        total = np.bincount(piece, size, count)
+        ends = piece[pairs]
+        apart = ends[:, 0] != ends[:, 1]
+        ends, pairs, pull = ends[apart], pairs[apart], pull[apart]
+        both = np.concatenate([ends, ends[:, ::-1]])
+        small = total[both[:, 0]] < least
+        if not small.any():
+            return np.unique(piece, return_inverse=True)[1]
+        key, place = np.unique((both[:, 0] * count + both[:, 1])[small], return_inverse=True)
+        strength = np.bincount(place, np.concatenate([pull, pull])[small])
+        source, target = np.divmod(key, count)
+        order = np.lexsort((target, -strength, source))
+        source, target = source[order], target[order]
+        first = np.r_[True, source[1:] != source[:-1]]
+        graph = coo_matrix((np.ones(first.sum()), (source[first], target[first])), shape=(count, count))
+        piece = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)[piece]
+
+
+def _specks_to_nearest(mesh: TetMesh, piece: Integers, size: Array) -> Integers:
+    """Return pieces with those that are too small and touch nothing joined to the nearest other piece."""
+    from scipy.spatial import cKDTree
+
+    total = np.bincount(piece, size)
+    lost = np.flatnonzero(total < 1)
+    if not len(lost) or len(lost) == len(total):
+        return piece
+    kept = np.flatnonzero(total[piece] >= 1)
+    loose = np.flatnonzero(total[piece] < 1)
+    gap, row = cKDTree(mesh.centroids[kept]).query(mesh.centroids[loose])
+    order = np.lexsort((gap, piece[loose]))
+    first = np.r_[True, np.diff(piece[loose][order]) > 0]
+    goal = np.arange(len(total))
+    goal[piece[loose][order][first]] = piece[kept[row[order][first]]]
+    return np.unique(goal[piece], return_inverse=True)[1]

@@ -1,0 +1,185 @@
+"""Parts of a solid by colour and shape, how many there are, and how sure that is.
+
+Colour says where materials meet, unless it is a print, a shadow or the same on both sides; shape says where bodies
+meet, unless they meet flush. Each is used for what it can tell: colours are cleaned first, pieces of one colour are
+joined along what is no seam, and the tree is cut where the parts and the seams hidden in them are shortest to describe.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.findings import Finding
+from steelyard.parts.colours import colour_modes
+from steelyard.parts.description import Cuts, cuts_of
+from steelyard.parts.hierarchy import Hierarchy
+from steelyard.parts.parts import Parts
+from steelyard.parts.pieces import cell_colours, inner_faces, pieces_of
+from steelyard.parts.prints import without_prints
+from steelyard.parts.seams import seam_tree
+from steelyard.parts.skin import skin_of
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.mesh import Colours, Integers
+from steelyard.shape.tets import TetMesh
+
+PER_PART = 0.1  # worth of a part: a hollow of a tenth of the volume at a full seam, or a hundredth of the surface
+
+
+@dataclass(frozen=True, eq=False)
+class Segmentation:
+    """A solid in P parts.
+
+    mesh        the solid, T tets [m]
+    labels      (T,) the part 0..P-1 of every tet, by falling volume
+    hierarchy   the tree that the parts are cut from
+    cuts        the best cut into every number of parts, with its description length; None where `labels` were given
+    rgb         (P, 3) mean colour 0..255 of the points of each part, None where the cloud has no colours
+    point_part  (N,) the part of every point of the cloud: that of the nearest tet centroid, as the paper does
+    names       (P,) what each part is called
+    findings    what a reader must know
+    """
+
+    mesh: TetMesh
+    labels: Integers
+    hierarchy: Hierarchy
+    cuts: Cuts | None
+    rgb: Array | None
+    point_part: Integers
+    names: tuple[str, ...]
+    cloud: Cloud
+    nearest: Integers
+    findings: tuple[Finding, ...] = ()
+
+    def __len__(self) -> int:
+        """Number P of parts."""
+        return len(self.names)
+
+    @cached_property
+    def parts(self) -> Parts:
+        """The parts with their exact moments, in the frame of the solid."""
+        return Parts(np.arange(len(self)), self.mesh.moments(self.labels, len(self)), self.rgb)
+
+    @property
+    def sureness(self) -> Array:
+        """Share (K,) of every number of parts 1..K; see `Cuts.sureness`."""
+        if self.cuts is None:
+            raise BadValue("the parts of this solid were given, not chosen; there is no score of their number.")
+        return self.cuts.sureness
+
+    def cut(self, count: int) -> Segmentation:
+        """Return the solid in another number of parts: the best cut of the tree into so many."""
+        nodes = self.hierarchy.nodes(count) if self.cuts is None else self.cuts.nodes(count)
+        return self.cut_at(nodes)
+
+    def cut_at(self, nodes: Sequence[int]) -> Segmentation:
+        """Return the solid in the parts that are these nodes of the hierarchy."""
+        return self.with_labels(self.hierarchy.cut_at(nodes))
+
+    def with_labels(self, labels: Integers) -> Segmentation:
+        """Return the solid in the parts of `labels` (T,), any whole numbers; they are numbered by falling volume."""
+        ordered = by_volume(labels, self.mesh)
+        point_part = ordered[self.nearest]
+        count = int(ordered.max()) + 1
+        rgb = _mean_colours(self.cloud.rgb, point_part, count)
+        names = tuple(f"part {k}" for k in range(count))
+        return replace(self, labels=ordered, rgb=rgb, point_part=point_part, names=names)
+
+    def merged(self, groups: Sequence[Sequence[int]]) -> Segmentation:
+        """Return parts joined: each group lists the parts that are one; it takes the name of its first part."""
+        named = [k for group in groups for k in group]
+        if len(set(named)) < len(named) or not set(named) <= set(range(len(self))):
+            raise BadValue(f"groups must name parts 0..{len(self) - 1}, none twice; got {[list(g) for g in groups]}.")
+        goal = np.arange(len(self))
+        for group in groups:
+            goal[list(group)] = group[0]
+        joined = self.with_labels(goal[self.labels])
+        first = np.zeros(len(joined), dtype=np.int64)
+        first[joined.labels] = goal[self.labels]
+        return replace(joined, names=tuple(self.names[k] for k in first))
+
+    def named(self, names: Sequence[str]) -> Segmentation:
+        """Return the same parts under other names (P,)."""
+        if len(names) != len(self):
+            raise BadValue(f"{len(self)} parts need as many names; got {len(names)}.")
+        return replace(self, names=tuple(names))
+
+
+def segment(cloud: Cloud, solid: Any, *, parts: int | None = None, per_part: float = PER_PART) -> Segmentation:
+    """Return the solid of a cloud in its homogeneous parts.
+
+    cloud     points of the surface, with or without colours, in the frame of the solid
+    solid     a TetMesh, or what has one under `mesh` (the Solid that `enclose` returns)
+    parts     how many, where that is known; chosen by description length where not
+    per_part  worth of a part: larger gives fewer
+    """
+    mesh: TetMesh = solid if isinstance(solid, TetMesh) else solid.mesh
+    nearest = _nearest_cell(cloud, mesh)
+    skin = skin_of(mesh)
+    colour = np.zeros(len(mesh.vertices), dtype=np.int64)
+    if cloud.rgb is not None:
+        modes = colour_modes(_vertex_colours(cloud, mesh), skin)
+        colour = without_prints(modes.label, skin)
+    pairs, corners = inner_faces(mesh)
+    a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
+    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)
+    tree = seam_tree(mesh, skin, piece, of_piece, pairs, corners)
+    cuts = cuts_of(tree.hierarchy, tree.seam, per_part)
+    whole = Segmentation(
+        mesh, np.zeros(len(mesh), np.int64), tree.hierarchy, cuts, None, nearest * 0, ("part 0",), cloud, nearest
+    )
+    return whole.cut(cuts.count if parts is None else parts)
+
+
+def by_volume(labels: Any, mesh: TetMesh) -> Integers:
+    """Return labels (T,) numbered from 0 by falling volume, equal ones by first appearance."""
+    _, first, inverse = np.unique(labels, return_index=True, return_inverse=True)
+    rank = np.empty(len(first), dtype=np.int64)
+    rank[np.lexsort((first, -np.bincount(inverse, mesh.volumes)))] = np.arange(len(first))
+    return np.asarray(rank[inverse])
+
+
+def _nearest_cell(cloud: Cloud, mesh: TetMesh) -> Integers:
+    """Return the tet (N,) whose centroid is nearest to each point; raises BadValue where cloud and solid are apart."""
+    from scipy.spatial import cKDTree
+
+    gap, nearest = cKDTree(mesh.centroids).query(cloud.xyz)
+    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.tets.ravel()], axis=0)))
+    if np.median(gap) > size:
+        raise BadValue(
+            f"half of the points lie more than {np.median(gap):.3g} m from a solid {size:.3g} m large. "
+            "Give the cloud and the solid in one frame and unit."
+        )
+    return np.asarray(nearest, dtype=np.int64)
+
+
+def _vertex_colours(cloud: Cloud, mesh: TetMesh) -> Colours:
+    """Return the colour (V, 3) of every vertex: the mean of the points it is nearest to, else the nearest point's."""
+    from scipy.spatial import cKDTree
+
+    rgb: Any = cloud.rgb
+    if cloud.xyz.shape == mesh.vertices.shape and np.array_equal(cloud.xyz, mesh.vertices):
+        return np.asarray(rgb)
+    owner = cKDTree(mesh.vertices).query(cloud.xyz)[1]
+    count = np.bincount(owner, minlength=len(mesh.vertices))
+    total = np.stack([np.bincount(owner, rgb[:, k], len(mesh.vertices)) for k in range(3)], axis=1)
+    colours = total / np.maximum(count, 1)[:, None]
+    empty = count == 0
+    colours[empty] = rgb[cKDTree(cloud.xyz).query(mesh.vertices[empty])[1]]
+    return np.asarray(colours)
+
+
+def _mean_colours(rgb: Colours | None, part: Integers, count: int) -> Array | None:
+    """Return the mean colour (P, 3) of each part's points; grey where a part has none."""
+    if rgb is None:
+        return None
+    points = np.bincount(part, minlength=count)
+    total = np.stack([np.bincount(part, rgb[:, k], count) for k in range(3)], axis=1)
+    return np.where(points[:, None] > 0, total / np.maximum(points, 1)[:, None], 128.0)

@@ -1,0 +1,114 @@
+"""The boundary of a tetrahedral solid: its triangles, which of them meet, and how the surface turns between them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.mesh import Integers
+from steelyard.shape.tets import FACES, TetMesh
+from steelyard.spatial import cross
+
+
+@dataclass(frozen=True, eq=False)
+class Skin:
+    """F boundary triangles of a solid, and the E edges at which two of them meet.
+
+    vertices   (V, 3) of the solid [m]
+    triangles  (F, 3) counter-clockwise seen from outside
+    cell       (F,) the tet behind each
+    edges      (E, 2) vertices at the ends of each edge
+    beside     (E, 2) the two triangles that meet there
+    apex       (E, 2) the corner of each of them that is off the edge
+    """
+
+    vertices: Array
+    triangles: Integers
+    cell: Integers
+    edges: Integers
+    beside: Integers
+    apex: Integers
+
+    @cached_property
+    def area_vectors(self) -> Array:
+        """Outward normal of each triangle times its area (F, 3) [m^2]."""
+        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
+        return np.asarray(cross(b - a, c - a) / 2)
+
+    @cached_property
+    def areas(self) -> Array:
+        """Area (F,) of each triangle [m^2]."""
+        return np.asarray(np.linalg.norm(self.area_vectors, axis=1))
+
+    @cached_property
+    def lengths(self) -> Array:
+        """Length (E,) of each edge [m]."""
+        return np.asarray(np.linalg.norm(self.vertices[self.edges[:, 1]] - self.vertices[self.edges[:, 0]], axis=1))
+
+    @cached_property
+    def _vertex_sums(self) -> tuple[Array, Array]:
+        corner, count = self.triangles.ravel(), len(self.vertices)
+        area = np.bincount(corner, np.repeat(self.areas, 3), count)
+        total = [np.bincount(corner, np.repeat(self.area_vectors[:, k], 3), count) for k in range(3)]
+        return np.stack(total, axis=1), area
+
+    @cached_property
+    def vertex_areas(self) -> Array:
+        """Share (V,) of the boundary's area at each vertex, a third of its triangles; 0 inside."""
+        return np.asarray(self._vertex_sums[1] / max(float(3 * self.areas.sum()), 1e-300))
+
+    @cached_property
+    def normals(self) -> Array:
+        """Mean outward normal (V, 3) at each vertex, weighted by area; 0 inside."""
+        total = self._vertex_sums[0]
+        return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
+
+    @cached_property
+    def flatness(self) -> Array:
+        """How much the triangles at each vertex (V,) agree: 1 = one plane, small at edges and tips, 0 inside."""
+        total, area = self._vertex_sums
+        return np.asarray(np.linalg.norm(total, axis=1) / np.maximum(area, 1e-300))
+
+    @cached_property
+    def across(self) -> Array:
+        """Unit vectors (E, 3) across each edge, from the apex of the first triangle to that of the second."""
+        step = self.vertices[self.apex[:, 1]] - self.vertices[self.apex[:, 0]]
+        return np.asarray(step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
+
+    @cached_property
+    def turning(self) -> Array:
+        """How far the surface turns up (E,) on the way across each edge [rad]: concave above 0, convex below.
+
+        It is the change of the normals at the two apexes along the way between them, so that it spans three edges:
+        single dihedral angles of a surface through scattered points are mostly noise.
+        """
+        normals = self.normals
+        change = normals[self.apex[:, 1]] - normals[self.apex[:, 0]]
+        return np.asarray(-(change * self.across).sum(1))
+
+
+def skin_of(mesh: TetMesh) -> Skin:
+    """Return the boundary of a solid. Where four triangles share an edge they are taken two by two, in order."""
+    outer = mesh.neighbours.ravel() < 0
+    triangles = mesh.tets[:, FACES].reshape(-1, 3)[outer]
+    cell = np.repeat(np.arange(len(mesh)), 4)[outer]
+    ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
+    low, high = ends.min(1), ends.max(1)
+    key = low * len(mesh.vertices) + high
+    order = np.argsort(key, kind="stable")
+    key = key[order]
+    place = np.arange(len(key)) - np.searchsorted(key, key)
+    first = np.flatnonzero((place[:-1] % 2 == 0) & (key[1:] == key[:-1]))
+    one, two = order[first], order[first + 1]
+    owner, apex = np.repeat(np.arange(len(triangles)), 3), triangles[:, [2, 0, 1]].ravel()
+    return Skin(
+        mesh.vertices,
+        triangles,
+        cell,
+        np.stack([low[one], high[one]], axis=1),
+        np.stack([owner[one], owner[two]], axis=1),
+        np.stack([apex[one], apex[two]], axis=1),
+    )
