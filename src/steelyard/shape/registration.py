@@ -1,0 +1,87 @@
+"""Poses that are slightly off: every view is moved until it agrees with the surface that all views give together."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.depth_images import FACING, pixel_of
+
+_STEPS = 3
+
+
+def moved(
+    depth: Any, unit: float, camera: Array, R: Array, p: Array, xyz: Array, normal: Array, window: float, noise: float,
+    loose: tuple[float, float],
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return poses (V, 3, 3), (V, 3) from which the views measure the surface of patches (N, 3) with normals (N, 3).
+
+    Point-to-plane distances of the pixels that patches fall on, Huber-weighted, three Gauss-Newton steps per view.
+    window  distances beyond it are another surface [m]
+    loose   standard deviations of the reported poses, [m] and [rad]: how freely a view may leave its pose
+    """
+    R, p = R.copy(), p.copy()
+    middle = xyz.mean(0)
+    for k in range(len(R)):
+        for _ in range(_STEPS):
+            H, g = _normal_equations(depth[k], unit, camera, R[k], p[k], xyz, normal, middle, window, noise)
+            H[np.arange(6), np.arange(6)] += 1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2
+            step = np.linalg.solve(H, -g)
+            turn = _rotation(step[:3])
+            R[k] = turn @ R[k]
+            p[k] = middle + turn @ (p[k] - middle) + step[3:]
+    return R, p
+
+
+@numba.njit(cache=True, nogil=True)
+def _rotation(w: Any) -> Any:
+    """Return the rotation (3, 3) by a vector w (3,) [rad]."""
+    angle = np.sqrt((w * w).sum())
+    if angle < 1e-12:
+        return np.eye(3)
+    a = w / angle
+    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+
+
+@numba.njit(cache=True, nogil=True)
+def _normal_equations(
+    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
+    noise: float,
+) -> Any:  # fmt: skip
+    """Return the Hessian (6, 6) and gradient (6,) of half the squared distances, in standard deviations of depth."""
+    H, g, row, q = np.zeros((6, 6)), np.zeros(6), np.empty(6), np.empty(3)
+    for i in range(len(xyz)):
+        n = normal[i]
+        to = xyz[i] - p
+        cosine = -(to * n).sum() / np.sqrt((to * to).sum())
+        if cosine < FACING:
+            continue
+        z, u, v = pixel_of(camera, R, p, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+        if u < 0 or v < 0 or u >= depth.shape[1] or v >= depth.shape[0]:
+            continue
+        measured = depth[v, u] * unit
+        if measured <= 0:
+            continue
+        a, b = measured * (u - camera[2]) / camera[0], measured * (v - camera[3]) / camera[1]
+        height = 0.0
+        for c in range(3):
+            q[c] = R[c, 0] * a + R[c, 1] * b + R[c, 2] * measured + p[c]
+            height += n[c] * (q[c] - xyz[i, c])
+        if abs(height) > window:
+            continue
+        sigma = noise * z * z * cosine + 1e-4
+        weight = 1 / sigma**2 * min(1.0, 2 * sigma / (abs(height) + 1e-12))
+        q -= middle
+        row[0], row[1], row[2] = q[1] * n[2] - q[2] * n[1], q[2] * n[0] - q[0] * n[2], q[0] * n[1] - q[1] * n[0]
+        row[3], row[4], row[5] = n[0], n[1], n[2]
+        for r in range(6):
+            g[r] += weight * row[r] * height
+            for c in range(6):
+                H[r, c] += weight * row[r] * row[c]
+    return H, g
+
+

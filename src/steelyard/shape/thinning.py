@@ -1,0 +1,73 @@
+"""Well-spread points: no two nearer than a radius, except on the two sides of a sheet."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.mesh import Integers
+
+_ROUNDS = 6
+
+
+def spread(xyz: Array, normal: Array, order: Integers, radius: float) -> Integers:
+    """Return the numbers of the points that stay: taken in `order`, each at least `radius` from those before it.
+
+    Points whose normals (N, 3) are more than a right angle apart do not hinder each other.
+    """
+    low = xyz.min(0)
+    key = np.floor((xyz - low) / radius).astype(np.int64)
+    return np.asarray(_taken(xyz, normal, order, radius, key))
+
+
+def spread_to(xyz: Array, normal: Array, order: Integers, count: int, least: float) -> tuple[Integers, float]:
+    """Return about `count` well-spread points or fewer, and the distance they keep, at least `least` [m]."""
+    kept, radius = spread(xyz, normal, order, least), least
+    for _ in range(_ROUNDS):
+        # The number of points that a surface holds falls with the square of their distance.
+        if len(kept) <= 1.04 * count:
+            break
+        radius *= max(float(np.sqrt(len(kept) / count)), 1.01)
+        kept = spread(xyz, normal, order, radius)
+    return kept, radius
+
+
+@numba.njit(cache=True, nogil=True)
+def _taken(xyz: Any, normal: Any, order: Any, radius: float, key: Any) -> Any:
+    bits = 1
+    while bits < 4 * len(xyz):
+        bits *= 2
+    head = np.full(bits, -1, np.int64)  # a cube's place is hashed: strangers in it are told apart by their distance
+    follow = np.full(len(xyz), -1, np.int64)
+    out = np.empty(len(xyz), np.int64)
+    n = 0
+    for i in order:
+        free = True
+        for di in range(-1, 2):
+            for dj in range(-1, 2):
+                for dk in range(-1, 2):
+                    j = head[_place(key[i, 0] + di, key[i, 1] + dj, key[i, 2] + dk, bits)] if free else -1
+                    while j >= 0:
+                        gap, agree = 0.0, 0.0
+                        for c in range(3):
+                            gap += (xyz[i, c] - xyz[j, c]) ** 2
+                            agree += normal[i, c] * normal[j, c]
+                        if gap < radius * radius and agree > 0:
+                            free = False
+                            break
+                        j = follow[j]
+        if free:
+            place = _place(key[i, 0], key[i, 1], key[i, 2], bits)
+            follow[i] = head[place]
+            head[place] = i
+            out[n] = i
+            n += 1
+    return out[:n]
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _place(i: int, j: int, k: int, bits: int) -> int:
+    return int((i * 73856093 ^ j * 19349663 ^ k * 83492791) & (bits - 1))
