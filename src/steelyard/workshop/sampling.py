@@ -31,7 +31,7 @@ def surface_cloud(tool: Tool, seed: int = 0, points: int = POINTS) -> Cloud:
     reach = 2 * float(np.linalg.norm(np.ptp(mesh.bounds, axis=0)))
     xyz, normal, face = np.empty((0, 3)), np.empty((0, 3)), np.empty(0, np.int64)
     for _ in range(100):
-        drawn = _drawn(mesh, rng, points)
+        drawn = spread_evenly(mesh, rng, points)
         seen = _visible(body, drawn[0], drawn[1], reach)
         xyz, normal, face = (np.concatenate([a, b[seen]]) for a, b in zip((xyz, normal, face), drawn, strict=True))
         if len(xyz) >= points:
@@ -43,7 +43,7 @@ def surface_cloud(tool: Tool, seed: int = 0, points: int = POINTS) -> Cloud:
     return Cloud(xyz, finished(tool.finish, xyz, normal, flat), mesh.part[face])
 
 
-def _drawn(mesh: TriangleMesh, rng: np.random.Generator, points: int) -> tuple[Array, Array, Integers]:
+def spread_evenly(mesh: TriangleMesh, rng: np.random.Generator, points: int) -> tuple[Array, Array, Integers]:
     """Return points (N, 3), unit normals (N, 3) and triangles (N,) drawn evenly over all area."""
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
     across = np.cross(b - a, c - a)

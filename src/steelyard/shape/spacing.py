@@ -1,0 +1,46 @@
+"""How densely a cloud samples its surface: neighbours, spacing, and the area that each point stands for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.mesh import Integers
+
+COUNT = 24  # neighbours looked at
+_CLOSE = 12  # neighbours that give the spacing
+_FOLLOWED = 10  # neighbours on the same sheet that give the area
+_ABOUT = -0.3  # cosine between normals below which a neighbour lies on the other side of a wall or gap
+
+
+@dataclass(frozen=True, eq=False)
+class Neighbours:
+    """The nearest other points (N, K) of each point, nearest first, and how far they are (N, K)."""
+
+    index: Integers
+    distance: Array
+
+    @classmethod
+    def of(cls, xyz: Array, count: int = COUNT) -> Neighbours:
+        """Return up to `count` neighbours of each of the points (N, 3)."""
+        from scipy.spatial import cKDTree
+
+        distance, index = cKDTree(xyz).query(xyz, min(count + 1, len(xyz)))
+        return cls(index[:, 1:], distance[:, 1:])
+
+    @property
+    def spacing(self) -> Array:
+        """Side (N,) of the square of surface per point, were all close neighbours on one flat sheet."""
+        k = min(_CLOSE, self.distance.shape[1])
+        return np.asarray(self.distance[:, k - 1] * np.sqrt(np.pi / k))
+
+
+def areas(near: Neighbours, normals: Array) -> Array:
+    """Return the area (N,) of surface that each point stands for; neighbours behind a wall or gap do not share it."""
+    same = np.einsum("nd,nkd->nk", normals, normals[near.index]) > _ABOUT
+    found = np.cumsum(same, axis=1)
+    used = np.clip(found[:, -1], 1, _FOLLOWED)
+    last = (found >= used[:, None]).argmax(1)
+    return np.asarray(np.pi * near.distance[np.arange(len(last)), last] ** 2 / used)
