@@ -65,6 +65,8 @@ def linearise(data: TeamMotion, team: Team, noise: Array) -> Linear:
         data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position, Z.rotation.matrix,
         Z.position, X.rotation.matrix, X.position,
     )  # fmt: skip
+    if data.twist is not None:
+        residual = residual - data.twist * team.delays[:, None] * data.valid[..., None]
     free, rest = pose_rows.followed(residual, data.valid, J, W, inverse, place)
     scores = pose_rows.scores(rest, data.features, WHICH, SIGN)
     information = sum(

@@ -1,0 +1,106 @@
+"""Covariance of the grasps that holds for correlated noise.
+
+Encoders and structures err slowly: neighbouring rows err alike, and information that counts every row as new is several
+times too large. How much is measured on the scores themselves: the variance of their sums over windows much longer than
+the correlation (overlapping batch means), against what white noise would give, pooled over parameters of one kind.
+Source: sandwich H^-1 V H^-1 with V = F^1/2 H F^1/2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.team.adjoint import adjoint
+from steelyard.team.pose_fit import PoseFit
+from steelyard.team.pose_rows import OWN
+
+# Which of rotation and position of grasp and home, and delay, each parameter of a robot is.
+KIND = np.repeat(np.arange(5), [3, 3, 3, 3, 1])
+# Windows are so many times the correlation length, and no longer than this share of the rows.
+WINDOW, LONGEST = 8.0, 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Spread:
+    """Covariance of all grasps and delays in each grasp's own axes.
+
+    full      (6 N, 6 N) [rad, m]; zero for the reference
+    blind     (6 N, L) directions that the motion does not show
+    late      (N,) standard deviations of the delays [s], None where they were not estimated
+    turns     (N, 6, 6) from a grasp's own axes to those of R
+    """
+
+    full: Array
+    blind: Array
+    late: Array | None
+    turns: Array
+
+    def of(self, robot: int) -> Array:
+        """Return the covariance (6, 6) of one grasp, rotation and position in R's axes."""
+        part = slice(6 * robot, 6 * robot + 6)
+        return np.asarray(self.turns[robot] @ self.full[part, part] @ self.turns[robot].T)
+
+    def lost(self, robot: int) -> Array:
+        """Return directions (k, 6) of one grasp, in R's axes, that the motion does not show."""
+        part = self.blind[6 * robot : 6 * robot + 6]
+        if not part.size:
+            return np.zeros((0, 6))
+        u, s, _ = np.linalg.svd(self.turns[robot] @ part)
+        return np.asarray(u[:, : len(s)][:, s > 1e-3 * max(s.max(), 1e-300)].T)
+
+    def delays(self, names: Sequence[str]) -> dict[str, float]:
+        """Return the standard deviation of each robot's delay [s]."""
+        return {} if self.late is None else dict(zip(names, map(float, self.late), strict=True))
+
+
+def grasp_covariance(fit: PoseFit) -> Spread:
+    """Return the covariance of grasps and delays."""
+    count = len(fit.team.delays)
+    factor = np.sqrt(_inflation(fit))[KIND[fit.unknown % OWN]]
+    H = fit.linear.information[np.ix_(fit.unknown, fit.unknown)]
+    V = H * np.outer(factor, factor)
+    covariance = fit.solved.inverse @ V @ fit.solved.inverse
+    full, blind, late = np.zeros((6 * count, 6 * count)), np.zeros((6 * count, fit.solved.lost.shape[1])), None
+    grasp = np.flatnonzero(fit.unknown % OWN < 6)
+    place = 6 * (fit.unknown[grasp] // OWN) + fit.unknown[grasp] % OWN
+    full[np.ix_(place, place)] = covariance[np.ix_(grasp, grasp)]
+    blind[place] = fit.solved.lost[grasp]
+    delay = np.flatnonzero(fit.unknown % OWN == OWN - 1)
+    if len(delay):
+        late = np.zeros(count)
+        late[fit.unknown[delay] // OWN] = np.sqrt(np.maximum(np.diag(covariance)[delay], 0))
+    turn = adjoint(fit.team.grasps)
+    turn[:, 3:, :3] = 0.0
+    return Spread(full, blind, late, turn)
+
+
+def _inflation(fit: PoseFit) -> Array:
+    """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
+    scores = fit.linear.scores[:, fit.unknown]
+    window = _window(fit.linear.residual, len(scores))
+    sums = np.cumsum(np.concatenate([np.zeros((1, scores.shape[1])), scores - scores.mean(0)]), axis=0)
+    batches = sums[window:] - sums[:-window]
+    rows = len(scores)
+    # Batches of a series whose mean was taken away scatter less than the series does.
+    variance = (batches**2).mean(0) * rows / window / (1 - window / rows)
+    ratio = variance / np.maximum(np.diag(fit.linear.information)[fit.unknown], 1e-300)
+    kinds = KIND[fit.unknown % OWN]
+    return np.array([max(float(ratio[kinds == k].mean()), 1.0) if (kinds == k).any() else 1.0 for k in range(5)])
+
+
+def _window(residual: Array, rows: int) -> int:
+    """Return the number of rows of a window, from how long residuals stay correlated."""
+    flat = residual.reshape(rows, -1)
+    flat = flat[:, flat.any(0)]
+    power = np.maximum((flat**2).sum(), 1e-300)
+    length, lag = 1.0, 1
+    while lag < rows // 4:
+        share = float((flat[lag:] * flat[:-lag]).sum() / power)
+        if share < 0.05:
+            break
+        length, lag = length + 2 * share, lag + 1
+    return int(np.clip(WINDOW * length, 10, max(int(LONGEST * rows), 2)))

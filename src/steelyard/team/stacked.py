@@ -1,0 +1,107 @@
+"""The recordings of a team on one clock each, robots side by side, clocks corrected: rows for the joint fit."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_rows import channel_at, common_time, mean_rotation
+from steelyard.spatial import Pose, Rotation
+
+
+@dataclass(frozen=True, eq=False)
+class Stretch:
+    """One recording: T rows of N robots.
+
+    time    (T,) [s] on the reference's clock      kind  of the recording
+    poses   X_HG (T, N), identity where not seen   seen  (T, N)
+    wrench  (T, N, 6) [N m, N] in each grasp       felt  (T, N) where a wrench was measured
+    carries (T, N) False where a robot is known to hold nothing
+    """
+
+    name: str
+    kind: str
+    time: Array
+    poses: Pose
+    seen: Mask
+    wrench: Array
+    felt: Mask
+    carries: Mask
+
+    def __len__(self) -> int:
+        return len(self.time)
+
+    @property
+    def complete(self) -> Mask:
+        """Rows (T,) in which every robot that carries has a wrench, so that the sum is not short."""
+        return np.asarray((self.felt | ~self.carries).all(1) & self.carries.any(1))
+
+    @property
+    def rate(self) -> float:
+        """Rows per second [Hz]."""
+        return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
+
+
+def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
+    """Return every recording with its clocks put right by `late` [s], seconds that each robot's stamps are late.
+
+    Raises BadValue where the corrected clocks no longer overlap.
+    """
+    return tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+
+
+def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
+    if not any(late.get(name) for name in recording.tracks):
+        return recording
+    return replace(recording, tracks={n: t.shifted(-late.get(n, 0.0)) for n, t in recording.tracks.items()})
+
+
+def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
+    time = common_time(recording, log.names)
+    rows, count = len(time), len(log.names)
+    turn, place = np.broadcast_to(np.eye(3), (rows, count, 3, 3)).copy(), np.zeros((rows, count, 3))
+    wrench = np.zeros((rows, count, 6))
+    seen, felt = np.zeros((rows, count), np.bool_), np.zeros((rows, count), np.bool_)
+    carries = np.ones((rows, count), np.bool_)
+    for i, name in enumerate(log.names):
+        carries[:, i] = name not in recording.away
+        track = recording.tracks.get(name)
+        if track is None:
+            continue
+        if track.carrying is not None:
+            nearest = np.clip(np.searchsorted(track.time, time - 0.5 / max(_rate(track.time), 1e-9)), 0, len(track) - 1)
+            carries[:, i] &= track.carrying[nearest]
+        if track.has("rotation", "position"):
+            vectors, turned = channel_at(track, "rotation", time)
+            place[:, i], placed = channel_at(track, "position", time)
+            turn[:, i] = (mean_rotation(track) @ Rotation.exp(vectors)).matrix
+            seen[:, i] = turned & placed
+        if track.has("force"):
+            wrench[:, i, 3:], felt[:, i] = channel_at(track, "force", time)
+            if track.has("torque"):
+                wrench[:, i, :3] = channel_at(track, "torque", time)[0]
+    return Stretch(recording.name, recording.kind, time, Pose(Rotation(turn), place), seen, wrench, felt, carries)
+
+
+def _rate(time: Array) -> float:
+    return 1 / float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+
+
+def all_poses(parts: tuple[Stretch, ...]) -> tuple[Pose, Mask]:
+    """Return the poses (T, N) of all recordings one after the other, and where they were measured.
+
+    Rows that one robot alone saw say nothing of grasps and are kept: the motion is still theirs. Raises CannotAnswer
+    where nobody's poses were measured.
+    """
+    seen = np.concatenate([p.seen for p in parts])
+    if not seen.any():
+        raise CannotAnswer("the joint fit from poses needs the pose of every grasp in its robot's home; there is none.")
+    turn = np.concatenate([p.poses.rotation.matrix for p in parts])
+    place = np.concatenate([p.poses.position for p in parts])
+    return Pose(Rotation(turn), place), seen
