@@ -156,9 +156,14 @@ def information(K: Array, T: Array, scatter: Array, acceleration: Array, wrench:
             WTS = multiply(W, multiply(T[p], S))
             WM = multiply(W, T[p, :, :6])
             WMP = multiply(WM, P)
-            for q in range(size):
+            WMS = WM * Sa
+            for q in range(p + 1):
+                M = T[q, :, :6]
                 raw = inner(WTS, T[q])
                 plain[p, q] += raw
-                expected[p, q] += raw - n * inner(WM * Sa, T[q, :, :6])
-                extra[p, q] += n * inner(WMP, T[q, :, :6])
+                expected[p, q] += raw - n * inner(WMS, M)
+                extra[p, q] += n * inner(WMP, M)
+    for p in range(size):
+        for q in range(p):
+            plain[q, p], expected[q, p], extra[q, p] = plain[p, q], expected[p, q], extra[p, q]
     return expected, extra, plain

@@ -63,8 +63,7 @@ class Problem:
             raise BadValue("The statistic must carry its noise; got none. Declare it, or use identify(log).")
         require_rows(int(moments.samples))
         classes, label = np.unique(moments.noise_class, return_inverse=True)
-        scatter = np.zeros((len(classes), *moments.scatter.shape[1:]))
-        np.add.at(scatter, label, moments.scatter)
+        scatter = np.stack([moments.scatter[label == k].sum(0) for k in range(len(classes))])
         acceleration = np.stack([moments.noise[c].acceleration for c in classes])
         # A reading scatters at least as much as its noise: more noise than that was declared for another motion, and
         # would reward the fit for inertia about axes that nothing turns.
