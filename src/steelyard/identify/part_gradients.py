@@ -24,6 +24,7 @@ from steelyard.parts.parts import Parts
 
 # Standard deviations of the linear tilt; products of positions count half.
 LADDER = (0.1, 0.3, 1.0)
+MIDDLE, CONTENDER = 0.3, 7.0
 QUADRATIC = 0.5
 # How many parts of real tools are not homogeneous.
 COMMON = 0.1
@@ -61,23 +62,27 @@ class Freed:
     tilts: Array
 
 
-def freed(data: Effective, parts: Parts, profiles: list[Profile]) -> list[Freed]:
+def freed(data: Effective, parts: Parts, profiles: list[Profile], enough: float) -> list[Freed]:
     """Return the likely models of which parts are not homogeneous, most likely first.
 
-    Parts are freed one by one, the best first, as long as the evidence rises.
+    Parts are freed one by one, the best first, as long as the evidence rises and the misfit is above `enough`. Sets are
+    compared at the middle of the ladder, and only those that could win are tried on all of it.
     """
     tried: list[Freed] = []
-    base: tuple[int, ...] = ()
-    ladder: tuple[float, ...] = LADDER
     best = -np.inf
+    base: tuple[int, ...] = ()
     while len(base) < len(parts):
         sets = [tuple(sorted((*base, k))) for k in range(len(parts)) if k not in base]
-        now = [_fit(data, parts, profiles, _model(free, width, parts, profiles)) for free in sets for width in ladder]
+        now = [_fit(data, parts, profiles, _model(free, MIDDLE, parts, profiles)) for free in sets]
+        limit = max(found.evidence for found in now) - CONTENDER
+        likely = [found.free for found in now if found.evidence > limit]
+        others = [width for width in LADDER if width != MIDDLE]
+        now += [_fit(data, parts, profiles, _model(free, w, parts, profiles)) for free in likely for w in others]
         tried += now
         top = max(now, key=lambda found: found.evidence)
-        if top.evidence < best:
+        if top.evidence < best or data.misfit(top.vector) < enough:
             break
-        best, base, ladder = top.evidence, top.free, (float(np.sqrt(top.variance[0])),)
+        best, base = top.evidence, top.free
     tried.sort(key=lambda found: -found.evidence)
     return [found for found in tried if found.evidence > tried[0].evidence + UNLIKELY]
 

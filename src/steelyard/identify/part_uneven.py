@@ -40,7 +40,7 @@ def suspicious(data: Effective, vector: Array, parts: Parts) -> bool:
 def uneven(data: Effective, parts: Parts) -> Uneven | None:
     """Return the answer averaged over freed parts, None where homogeneous ones are likely enough or nothing fits."""
     profiles = [Profile.of(parts, k) for k in range(len(parts))]
-    models = freed(data, parts, profiles)
+    models = freed(data, parts, profiles, misfit_limit(data, len(parts), SUSPICIOUS))
     evidence = np.array([model.evidence for model in models])
     weight = np.exp(evidence - evidence.max())
     odds = float(evidence.max() + np.log(weight.sum())) - even(data, parts)
