@@ -6,7 +6,9 @@ torques alike, here run forwards and backwards and on poses, then central differ
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -14,40 +16,36 @@ from steelyard.check import Array
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import TeamRows, channel_at, common_time, mean_rotation
-from steelyard.logs.team_track import Mask, Track
+from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose, Rotation, cross
 from steelyard.spatial.screws import log_pose
 
-_Smoother = Callable[[str], tuple[Array, Mask]]
+_MEASURED = ("pose", "twist", "rate", "gravity", "wrench")
 _BRIDGED = 0.25  # of the cut-off's period: a shorter gap is filled as well as the filter sees
-_SPREAD = 0.5  # of the cut-off's period: how far the filter carries what was filled into a longer gap
+_SPREAD = 0.5  # of the cut-off's period: how far the filter carries what was filled into a longer gap, or past an end
 
 
 def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 3.0) -> TeamRows:
     """Return the recording of all robots on one even clock, low-passed at `cutoff_hz` (None = not), with twists.
 
     Twists and their derivatives come from the poses where the base stands still and poses were measured, else from
-    measured velocities and accelerations. Rows near gaps, which the filter fills, count as not measured; so do the
-    first and last row of every difference. A robot without a track has no measured row.
+    measured velocities and accelerations. Rows near gaps, which the filter fills, count as not measured; so do, of
+    every difference, rows near the ends, where the filter goes on beyond the data. A robot without a track has no
+    measured row.
     Raises BadValue for clocks too short to filter.
     """
     names = log.names
     time = common_time(recording, names)
+    smooth = _smoothed(recording, time, cutoff_hz)
     empty = _Columns(len(time))
-    columns = [
-        _columns(log, name, recording.tracks[name], time, cutoff_hz) if name in recording.tracks else empty
-        for name in names
-    ]
-    return TeamRows(
-        names,
-        time,
-        *(
-            np.stack([getattr(c, part) for c in columns])
-            for part in ("rotation", "position", "twist", "twist_rate", "gravity", "wrench")
-        ),
-        np.stack([_carries(recording, name, time) for name in names]),
-        *(np.stack([c.has[part] for c in columns]) for part in ("pose", "twist", "rate", "gravity", "wrench")),
-    )
+    columns = [_columns(log, name, time, smooth[name]) if name in smooth else empty for name in names]
+    if cutoff_hz is not None:
+        _forget_ends(columns, time, _SPREAD / cutoff_hz)
+    parts = ("rotation", "position", "twist", "twist_rate", "gravity", "wrench")
+    stacked: dict[str, Any] = {part: np.stack([getattr(c, part) for c in columns]) for part in parts}
+    masks = {f"has_{part}": np.stack([c.has[part] for c in columns]) for part in _MEASURED}
+    carries = np.stack([_carries(recording, name, time) for name in names])
+    return TeamRows(names=names, time=time, carries=carries, **stacked, **masks)
 
 
 def all_conditioned(log: TeamLog, recordings: Sequence[TeamRecording], cutoff_hz: float | None) -> tuple[TeamRows, ...]:
@@ -68,6 +66,18 @@ def _carries(recording: TeamRecording, name: str, time: Array) -> Mask:
     return track.carrying[nearest]
 
 
+@dataclass(frozen=True, eq=False)
+class _Smooth:
+    """A channel (T, 3) on the common clock, and where it was measured; rotations are vectors away from `middle`."""
+
+    values: Array
+    good: Mask
+    middle: Rotation
+
+
+_Channels = dict[str, _Smooth]
+
+
 class _Columns:
     """One robot's rows while they are made."""
 
@@ -78,44 +88,38 @@ class _Columns:
         self.twist_rate: Array = np.zeros((rows, 6))
         self.gravity: Array = np.zeros((rows, 3))
         self.wrench: Array = np.zeros((rows, 6))
-        self.has: dict[str, Mask] = {
-            part: np.zeros(rows, np.bool_) for part in ("pose", "twist", "rate", "gravity", "wrench")
-        }
+        self.has: dict[str, Mask] = {part: np.zeros(rows, np.bool_) for part in _MEASURED}
 
 
-def _columns(log: TeamLog, name: str, track: Track, time: Array, cutoff_hz: float | None) -> _Columns:
+def _columns(log: TeamLog, name: str, time: Array, smooth: _Channels) -> _Columns:
     robot, out = log.robot(name), _Columns(len(time))
-
-    def smooth(channel: str) -> tuple[Array, Mask]:
-        return _smooth(track, channel, time, cutoff_hz)
-
-    if track.has("rotation"):
-        vectors, turned = smooth("rotation")
-        rotation = mean_rotation(track) @ Rotation.exp(vectors)
+    if "rotation" in smooth:
+        vectors, turned = smooth["rotation"].values, smooth["rotation"].good
+        rotation = smooth["rotation"].middle @ Rotation.exp(vectors)
         out.rotation = rotation.matrix
         if robot.gravity is not None:
             out.gravity, out.has["gravity"] = rotation.inverse().apply(robot.gravity), turned
-        if track.has("position"):
-            out.position, placed = smooth("position")
-            out.has["pose"] = turned & placed
-    if track.has("gravity"):
-        out.gravity, out.has["gravity"] = smooth("gravity")
+        if "position" in smooth:
+            out.position, out.has["pose"] = smooth["position"].values, turned & smooth["position"].good
+    if "gravity" in smooth:
+        out.gravity, out.has["gravity"] = smooth["gravity"].values, smooth["gravity"].good
     if out.has["pose"].any() and robot.base == "still":
         _difference_poses(out, time)
-    elif track.has("angular_velocity", "linear_velocity"):
-        _measured_motion(out, track, time, smooth)
-    if track.has("force"):
-        force, pushed = smooth("force")
-        moment = smooth("torque")[0] if track.has("torque") else np.zeros_like(force)
-        out.wrench, out.has["wrench"] = np.concatenate([moment, force], 1), pushed
+    elif {"angular_velocity", "linear_velocity"} <= smooth.keys():
+        _measured_motion(out, time, smooth)
+    if "force" in smooth:
+        force = smooth["force"].values
+        moment = smooth["torque"].values if "torque" in smooth else np.zeros_like(force)
+        out.wrench, out.has["wrench"] = np.concatenate([moment, force], 1), smooth["force"].good
     return out
 
 
 def _difference_poses(out: _Columns, time: Array) -> None:
     """Set twist and its derivative: the screw of two steps, T(t-1)^-1 T(t+1), over their time, and its difference."""
-    pose = Pose(Rotation(out.rotation), out.position)
-    step = time[2:] - time[:-2]
-    out.twist[1:-1] = log_pose(pose[:-2].inverse() @ pose[2:]) / step[:, None]
+    back = np.swapaxes(out.rotation[:-2], 1, 2)
+    moved = np.einsum("tij,tj->ti", back, out.position[2:] - out.position[:-2])
+    step = Pose(Rotation(back @ out.rotation[2:]), moved)
+    out.twist[1:-1] = log_pose(step) / (time[2:] - time[:-2])[:, None]
     out.has["twist"] = _inner(out.has["pose"])
     _difference_twists(out, time)
 
@@ -125,26 +129,45 @@ def _difference_twists(out: _Columns, time: Array) -> None:
     out.has["rate"] = _inner(out.has["twist"])
 
 
-def _measured_motion(out: _Columns, track: Track, time: Array, smooth: _Smoother) -> None:
+def _measured_motion(out: _Columns, time: Array, smooth: _Channels) -> None:
     """Set twist and its derivative from measured velocities and, where there are any, accelerations."""
-    (omega, turning), (velocity, moving) = smooth("angular_velocity"), smooth("linear_velocity")
-    out.twist, out.has["twist"] = np.concatenate([omega, velocity], 1), turning & moving
-    if track.has("angular_acceleration", "linear_acceleration"):
-        (alpha, first), (acceleration, second) = smooth("angular_acceleration"), smooth("linear_acceleration")
-        out.twist_rate = np.concatenate([alpha, acceleration - cross(omega, velocity)], 1)
-        out.has["rate"] = out.has["twist"] & first & second
+    turning, moving = smooth["angular_velocity"], smooth["linear_velocity"]
+    out.twist, out.has["twist"] = np.concatenate([turning.values, moving.values], 1), turning.good & moving.good
+    if {"angular_acceleration", "linear_acceleration"} <= smooth.keys():
+        alpha, acceleration = smooth["angular_acceleration"], smooth["linear_acceleration"]
+        sideways = cross(turning.values, moving.values)
+        out.twist_rate = np.concatenate([alpha.values, acceleration.values - sideways], 1)
+        out.has["rate"] = out.has["twist"] & alpha.good & acceleration.good
     else:
         _difference_twists(out, time)
 
 
-def _smooth(track: Track, channel: str, time: Array, cutoff_hz: float | None) -> tuple[Array, Mask]:
-    """Return a channel at `time` through the filter, and where it stands on measured rows."""
-    values, good = channel_at(track, channel, time)
-    if cutoff_hz is None or len(time) < 2:
-        return values, good
-    rate = (len(time) - 1) / (time[-1] - time[0])
-    period = rate / cutoff_hz
-    return lowpass(values, cutoff_hz, rate), good & ~_near_gaps(good, _BRIDGED * period, _SPREAD * period)
+def _smoothed(recording: TeamRecording, time: Array, cutoff_hz: float | None) -> dict[str, _Channels]:
+    """Return every robot's channels at `time` through the filter, all in one pass."""
+    sampled = {
+        (robot, channel): channel_at(track, channel, time)
+        for robot, track in recording.tracks.items()
+        for channel in track.channels
+        if track.has(channel)
+    }
+    stacked = np.concatenate([values for values, _ in sampled.values()], axis=1)
+    rate = (len(time) - 1) / (time[-1] - time[0]) if len(time) > 1 else 0.0
+    if cutoff_hz is not None and rate:
+        stacked = lowpass(stacked, cutoff_hz, rate)
+    out: dict[str, _Channels] = {robot: {} for robot in recording.tracks}
+    for k, ((robot, channel), (_, good)) in enumerate(sampled.items()):
+        if cutoff_hz is not None:
+            good = good & ~_near_gaps(good, _BRIDGED * rate / cutoff_hz, _SPREAD * rate / cutoff_hz)
+        middle = mean_rotation(recording.tracks[robot]) if channel == "rotation" else Rotation.identity()
+        out[robot][channel] = _Smooth(stacked[:, 3 * k : 3 * k + 3], good, middle)
+    return out
+
+
+def _forget_ends(columns: Sequence[_Columns], time: Array, seconds: float) -> None:
+    """Call twists near the ends not measured: there the filter rests on what it made up beyond the data."""
+    inside = (time >= time[0] + seconds) & (time <= time[-1] - seconds)
+    for column in columns:
+        column.has["twist"], column.has["rate"] = column.has["twist"] & inside, column.has["rate"] & inside
 
 
 def _near_gaps(good: Mask, bridged: float, spread: float) -> Mask:

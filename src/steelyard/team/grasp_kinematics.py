@@ -48,7 +48,7 @@ def rotation(omega_i: Array, omega_j: Array) -> tuple[Rotation, Array]:
     if not s[1] > ONE_AXIS**2 * s[0]:
         raise CannotAnswer(
             "the angular velocities must be about two axes or more to tell how one grasp is turned against another; "
-            f"they are about one (second singular value {s[1]:.2g} of {s[0]:.2g}). Tilt the payload about a second axis."
+            f"they are about one (second singular value {s[1]:.2g} of {s[0]:.2g}). Tilt the payload about another axis."
         )
     u[:, 2] *= np.linalg.det(u @ vt)
     return Rotation(u @ vt), s

@@ -47,4 +47,5 @@ class Grasps:
         turn, place = self.poses.rotation.matrix, self.poses.position
         force = np.einsum("nij,ntj->nti", turn, wrench[..., 3:])
         moment = np.einsum("nij,ntj->nti", turn, wrench[..., :3])
-        return np.concatenate([moment + cross(np.broadcast_to(place[:, None], force.shape), force), force], -1).sum(0)
+        levers = cross(np.broadcast_to(place[:, None], force.shape), force)
+        return np.asarray(np.concatenate([moment + levers, force], -1).sum(0))

@@ -20,7 +20,7 @@ LEAST_SPREAD = 1e-6
 
 
 def regressor(omega: Array, alpha: Array) -> Array:
-    """Return A (T, 3, 6): alpha and omega (T, 3) make I alpha + omega x I omega = A (xx, xy, xz, yy, yz, zz) (eq. 20)."""
+    """Return A (T, 3, 6) so that I alpha + omega x I omega = A (xx, xy, xz, yy, yz, zz), from (T, 3) each (eq. 20)."""
     return np.asarray(_times(alpha) + cross_matrix(omega) @ _times(omega))
 
 
@@ -40,8 +40,8 @@ def inertia(omega: Array, alpha: Array, moment: Array) -> tuple[Array, Array]:
     values = np.linalg.svd(stacked / np.where(size == 0, 1.0, size), compute_uv=False)
     if len(stacked) < 6 or not (size > 0).all() or not values[-1] > LEAST_SPREAD * values[0]:
         raise CannotAnswer(
-            "the payload must turn about three axes, faster and slower, to tell its inertia; this motion leaves entries "
-            f"open (least singular value {values[-1]:.1g} of {values[0]:.1g}). Turn it about all three axes."
+            "the payload must turn about three axes, faster and slower, to tell its inertia; this motion leaves "
+            f"entries open (least singular value {values[-1]:.1g} of {values[0]:.1g}). Turn it about all three axes."
         )
     entries, *_ = np.linalg.lstsq(stacked, moment.ravel(), rcond=None)
     left = moment.ravel() - stacked @ entries
@@ -55,8 +55,8 @@ def inertia(omega: Array, alpha: Array, moment: Array) -> tuple[Array, Array]:
 def made_positive(matrix: Array, negative: Negative = "clamp") -> tuple[Array, int]:
     """Return the inertia with its negative eigenvalues set to zero, and how many there were.
 
-    Raises CannotAnswer instead where `negative` is "discard" (the other choice of the paper's footnote). A moment of zero
-    is no rigid body's either: the triangle inequality is not mended here.
+    Raises CannotAnswer instead where `negative` is "discard", the footnote's other choice. A moment of zero is no
+    rigid body's either: the triangle inequality is not mended here.
     """
     values, axes = np.linalg.eigh(matrix)
     below = int((values < 0).sum())

@@ -1,10 +1,10 @@
 """Loop closure: all grasps refined together from the twists of every pair of robots.
 
 The unknowns are the N - 1 poses in the reference grasp, so that every closed loop T_ij T_jk T_ki = 1 holds exactly,
-whatever weight it would have been given; the cost is the weighted sum of squares of all N (N - 1) / 2 pairs. It depends on
-the twists through their second moments only.
-Source: "Cooperative Payload Estimation by a Team of Mocobots", III-B2, which minimises pairs and loops by BFGS and gives
-no weights; here every residual is weighed by the inverse variance that the star of pairs leaves.
+whatever weight it would have been given; the cost is the weighted sum of squares of all N (N - 1) / 2 pairs. It depends
+on the twists through their second moments only.
+Source: "Cooperative Payload Estimation by a Team of Mocobots", III-B2, which minimises pairs and loops by BFGS and
+gives no weights; here every residual is weighed by the inverse variance that the star of pairs leaves.
 """
 
 from __future__ import annotations

@@ -58,8 +58,8 @@ def com(gravity: Array, moment: Array, mass_kg: float) -> tuple[Array, Array]:
     if not values[0] > (LEAST_TILT**2) * values[2]:
         along = ", ".join(f"{x:.2f}" for x in axes[:, 0])
         raise CannotAnswer(
-            f"the still poses must tilt the payload to tell how high its centre of mass is; gravity keeps the direction "
-            f"({along}) of the reference grasp to within {np.sqrt(max(values[0], 0) / values[2]):.1g} rad. Add still "
+            "the still poses must tilt the payload to tell how high its centre of mass is; gravity keeps the "
+            f"direction ({along}) of the reference grasp to within {np.sqrt(max(values[0], 0) / values[2]):.1g} rad. Add still "
             "poses that are tilted by several degrees."
         )
     found = np.linalg.solve(normal, np.einsum("kij,ki->j", stacked, moment))
@@ -78,8 +78,8 @@ def mass_and_com(gravity: Array, wrench: Array) -> MassAndCom:
     found, mass_std = mass(gravity, wrench[:, 3:])
     if not found > 0:
         raise CannotAnswer(
-            f"the still forces must hold the payload up; they add up to a mass of {found:.3g} kg. Check the sign of the "
-            "forces (what the robot applies to the payload) and gravity in the home frames."
+            f"the still forces must hold the payload up; they add up to a mass of {found:.3g} kg. Check the sign of "
+            "the forces (what the robot applies to the payload) and gravity in the home frames."
         )
     place, covariance = com(gravity, wrench[:, :3], found)
     unit = gravity / np.linalg.norm(gravity, axis=1, keepdims=True)

@@ -1,7 +1,7 @@
 """The paper's estimator, step by step: grasp kinematics, loop closure, mass and centre of mass, inertia matrix.
 
 Source: "Cooperative Payload Estimation by a Team of Mocobots", III and IV-B. It gives no cut-off, no weights and no
-covariance; ours are the default of `cutoff_hz`, the residuals of the star of pairs, and formal least-squares covariances.
+covariance; ours are the default of `cutoff_hz`, weights by the residuals of the star of pairs, formal covariances.
 """
 
 from __future__ import annotations
@@ -78,12 +78,13 @@ class PublishedTeam:
         """Return mass and centre of mass in the reference grasp from still rows (eq. 9-16)."""
         if len(log.names) == 2 and all(log.force_only(name) for name in log.names):
             raise CannotAnswer(
-                "two robots with passive gimbals cannot hold a payload still: nothing resists the moment about the line "
-                "that joins their grasps, so still poses tell nothing sound. Add a third robot or a six-axis wrist, or "
-                "use the joint method, which works from motion."
+                "two robots with passive gimbals cannot hold a payload still: nothing resists the moment about the "
+                "line that joins their grasps, so still poses tell nothing sound. Add a third robot or a six-axis "
+                "wrist, or use the joint method, which works from motion."
             )
         still = tuple(r for r in log.recordings if r.kind == "still")
-        resting = all_conditioned(log, still or log.of_kind("motion"), self.cutoff_hz)
+        # Rows of still recordings are averaged, which no filter improves on; its ends would weigh single samples heavily.
+        resting = all_conditioned(log, still or log.of_kind("motion"), None if still else self.cutoff_hz)
         chosen = [_full_rows(log, rows, _at_rest(rows, bool(still))) for rows in resting]
         gravity = np.concatenate(
             [_gravity(log, grasps, rows)[keep] for rows, keep in zip(resting, chosen, strict=True)]
@@ -97,9 +98,9 @@ class PublishedTeam:
         return mass_and_com(gravity, np.concatenate(wrench))
 
     def inertia(self, log: TeamLog, grasps: Grasps, com: Array) -> tuple[Array, Array, int]:
-        """Return the inertia (3, 3) [kg m^2] about `com` (3,) [m] in R's axes, covariance (6, 6) and rows used (eq. 17-32).
+        """Return the inertia (3, 3) [kg m^2] about `com` (3,) [m], covariance (6, 6) and rows used (eq. 17-32).
 
-        Rates and angular accelerations are the reference robot's alone. Negative eigenvalues are still there.
+        All in R's axes. Rates and angular accelerations are the reference robot's alone. Negative eigenvalues are still there.
         """
         omega, alpha, moment = [], [], []
         for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):
@@ -116,7 +117,7 @@ class PublishedTeam:
     def _inertia_or_not(
         self, log: TeamLog, grasps: Grasps, rest: MassAndCom
     ) -> tuple[Array | None, Array, int, tuple[str, ...], tuple[Finding, ...]]:
-        """Return inertia, covariance, rows, notes and findings; None and a finding where the motion does not tell it."""
+        """Return inertia, covariance, rows, notes and findings; None and a finding where motion does not tell it."""
         try:
             raw, covariance, rows = self.inertia(log, grasps, rest.com)
         except CannotAnswer as error:
