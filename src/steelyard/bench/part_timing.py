@@ -14,8 +14,7 @@ from steelyard.bench.timing import thread_ms
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses
-from steelyard.io.object_folders import _track as read_track
-from steelyard.io.object_folders import read_object
+from steelyard.io.object_folders import read_object, read_track
 from steelyard.parts.known import KnownObject
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import with_noise
@@ -23,9 +22,10 @@ from steelyard.simulate.handling import with_noise
 NOISE = "high"
 TIMING = (
     "CPU time of the calling thread [ms], warm, median of the repeats, one log at noise 'high': free_ms, averaged_ms = "
-    "log in memory to Estimate with parts; log_file_ms = motion.npz to Estimate, parts in memory; read_ms = the whole "
-    "folder read and checked (mesh, cloud, truth, motion); folder_ms = folder to Estimate; both densities averaged, "
-    "the noise drawn in between."
+    "log in memory to Estimate with parts; log_file_ms = from the file: motion.npz read and checked, then Estimate, "
+    "densities averaged, the parts in memory as a robot has them; read_ms = the whole folder read and checked (mesh "
+    "closed, parts not overlapping, cloud, truth, motion), once per object; folder_ms = folder to Estimate. The files "
+    "hold exact rows: their noise is drawn in between."
 )
 
 

@@ -21,7 +21,7 @@ from steelyard.parts.known import MOTION, KnownObject, Track, unseen_finding
 from steelyard.parts.parts import Parts
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh
-from steelyard.shape.nesting import overlap_finding
+from steelyard.shape.nesting import Solids, overlap_finding, solids_of
 from steelyard.spatial import Pose
 
 FILES = ("mesh.ply", "points.npz", "motion.npz", "truth.json")
@@ -55,8 +55,9 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
             raise BadFile(f"{folder}: {name} is missing. An object folder has the files {', '.join(FILES)}.")
     mesh = read_mesh(folder / "mesh.ply")
     facts = read_truth(folder / "truth.json")
-    parts: Parts = _value(folder / "mesh.ply", lambda: parts_of_mesh(mesh))
-    overlapping: Finding | None = _value(folder / "mesh.ply", lambda: overlap_finding(mesh))
+    solids: Solids = _value(folder / "mesh.ply", lambda: solids_of(mesh))
+    parts: Parts = _value(folder / "mesh.ply", lambda: parts_of_mesh(mesh, solids))
+    overlapping: Finding | None = _value(folder / "mesh.ply", lambda: overlap_finding(mesh, solids))
     cloud = _cloud(folder / "points.npz", mesh)
     X_OS = _value(folder / "truth.json", lambda: Pose.from_matrix(facts["T_mesh_from_grasp"]))
     unseen = unseen_finding(parts, cloud)
@@ -70,7 +71,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
         X_SO=X_OS.inverse(),
         cloud=cloud,
         box=np.asarray(facts["reference_extents_sensor_m"], float),
-        track=_track(folder / "motion.npz") if motion else None,
+        track=read_track(folder / "motion.npz") if motion else None,
         part_names=_names(facts, parts),
         gradings=_gradings(facts, parts),
         facts=facts,
@@ -159,17 +160,23 @@ def _cloud(path: Path, mesh: TriangleMesh) -> Cloud:
     return cloud
 
 
-def _track(path: Path) -> Track:
-    """Return the exact motion with the physical wrench."""
+def read_track(path: Path | str) -> Track:
+    """Read motion.npz: the exact motion with the physical wrench, where a published file holds two; raises BadFile."""
+    path = Path(path)
     down = set(_DOWN.values()) <= set(ArrayTable.open(path).header.groups)
     names = {**MOTION, **(_DOWN if down else {})}
-    arrays = _arrays(path, tuple(names.values()))
+    arrays = _loaded(path, tuple(names.values()))
     return _value(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))  # type: ignore[no-any-return]
 
 
 def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
     """Return named arrays of an NPZ file; raises BadFile where one is missing or no array of numbers."""
     ArrayTable.open(path)  # refuses pickles by their header
+    return _loaded(path, names)
+
+
+def _loaded(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
+    """Return named arrays of an NPZ file whose headers are known to be good."""
     with np.load(path, allow_pickle=False) as archive:
         missing = [name for name in names if name not in archive]
         if missing:

@@ -8,16 +8,18 @@ from steelyard.check import Array
 from steelyard.parts.interior import Interior
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers, TriangleMesh
-from steelyard.shape.nesting import solids_of
+from steelyard.shape.nesting import Solids, solids_of
 
 
-def parts_of_mesh(mesh: TriangleMesh) -> Parts:
+def parts_of_mesh(mesh: TriangleMesh, solids: Solids | None = None) -> Parts:
     """Return the homogeneous parts that the surfaces of a mesh enclose, in the mesh's frame.
+
+    solids  those of the mesh, where they are known already
 
     A surface turned inside out is a void of the part around it and no part of its own. Colours are means over the
     area. Raises BadValue where a part is open, flat, or inside out on its own.
     """
-    solids = solids_of(mesh)
+    solids = solids_of(mesh) if solids is None else solids
     surfaces = tuple((int(k), *solids.void[solids.parent == k].tolist()) for k in solids.label)
     return Parts(solids.label, solids.moments, _mean_colours(mesh, solids.label), Interior(mesh, surfaces))
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import combinations
 
 import manifold3d
 import numpy as np
@@ -95,42 +96,47 @@ class Overlap:
         )
 
 
-def overlaps(mesh: TriangleMesh) -> tuple[Overlap, ...]:
+def overlaps(mesh: TriangleMesh, solids: Solids | None = None) -> tuple[Overlap, ...]:
     """Return the pairs of solids that share more volume than rounded, faceted surfaces that touch.
+
+    solids  those of the mesh, where they are known already
 
     Pairs whose surfaces cannot be joined (an edge with four triangles) are not judged. Raises as `solids_of`.
     """
-    solids = solids_of(mesh)
+    solids = solids_of(mesh) if solids is None else solids
     whole = float(solids.moments[:, 0].sum())
-    bodies = [body_of(mesh, [k, *solids.void[solids.parent == k].tolist()]) for k in solids.label.tolist()]
+    boxes = np.stack([_box(mesh, int(k)) for k in solids.label])
+    bodies: dict[int, manifold3d.Manifold] = {}
     found = []
-    for i, j in zip(*np.triu_indices(len(bodies), 1), strict=True):
-        if _apart(bodies[i], bodies[j]):
+    for i, j in combinations(range(len(boxes)), 2):
+        if (boxes[i, 0] > boxes[j, 1]).any() or (boxes[j, 0] > boxes[i, 1]).any():
             continue
+        for k in (i, j):
+            if k not in bodies:
+                voids = solids.void[solids.parent == solids.label[k]].tolist()
+                bodies[k] = body_of(mesh, [int(solids.label[k]), *voids])
         volume, smaller = (bodies[i] ^ bodies[j]).volume(), float(solids.moments[[i, j], 0].min())
         if volume > TOUCHING * smaller:
             found.append(Overlap(int(solids.label[i]), int(solids.label[j]), volume, volume / smaller, volume / whole))
     return tuple(found)
 
 
-def overlap_finding(mesh: TriangleMesh) -> Finding | None:
-    """Return the finding `parts-overlap` where solids share a little volume, else None.
+def overlap_finding(mesh: TriangleMesh, solids: Solids | None = None) -> Finding | None:
+    """Return the finding `parts-overlap` where solids share a little volume, else None; `solids` as in `overlaps`.
 
     Raises BadValue that names the two solids where they share over 10 % of the object's volume.
     """
-    found = overlaps(mesh)
+    found = overlaps(mesh, solids)
     for overlap in found:
         if overlap.of_whole > TOO_MUCH:
             raise BadValue(f"{overlap}. Cut one out of the other, so that they only touch.")
     return Finding.of("parts-overlap", f"{'; '.join(map(str, found))}.".capitalize()) if found else None
 
 
-def _apart(a: manifold3d.Manifold, b: manifold3d.Manifold) -> bool:
-    """Whether the boxes of two bodies are apart; a body that could not be joined has none."""
-    if a.is_empty() or b.is_empty():
-        return True
-    box_a, box_b = np.reshape(a.bounding_box(), (2, 3)), np.reshape(b.bounding_box(), (2, 3))
-    return bool((box_a[0] > box_b[1]).any() or (box_b[0] > box_a[1]).any())
+def _box(mesh: TriangleMesh, label: int) -> Array:
+    """Return the lower and upper corner (2, 3) of a part's box [m]."""
+    used = mesh.vertices[mesh.triangles[mesh.part == label].ravel()]
+    return np.stack([used.min(0), used.max(0)])
 
 
 def body_of(mesh: TriangleMesh, labels: list[int]) -> manifold3d.Manifold:
