@@ -16,7 +16,7 @@ import pytest
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
-from steelyard.io.object_folders import object_folders, read_object
+from steelyard.io.object_folders import object_folders, read_object, read_track
 from steelyard.io.object_writing import write_object
 from steelyard.io.ply_files import read_mesh, write_mesh
 from steelyard.logs.log import MotionLog
@@ -268,3 +268,10 @@ def test_the_published_clamp_has_a_void(data_dir: Path) -> None:
     read = read_object(data_dir / "workshop-tools" / "clamp")
     assert 1 not in read.parts.label
     assert [finding.code for finding in read.findings] == ["parts-overlap"]
+
+
+def test_the_motion_is_read_alone_as_with_the_folder(good: Path) -> None:
+    whole, alone = read_object(good).track, read_track(good / "motion.npz")
+    assert whole is not None
+    for name, column in alone.columns().items():
+        np.testing.assert_array_equal(column, whole.columns()[name])
