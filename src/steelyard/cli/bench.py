@@ -1,4 +1,4 @@
-"""`steelyard bench identify|coverage|held-object|part-coverage|materials`."""
+"""`steelyard bench identify|coverage|held-object|part-coverage|materials|team`."""
 
 from __future__ import annotations
 
@@ -125,3 +125,18 @@ def materials(data: Path, seeds: int, as_json: bool) -> None:
 
     result = job.run(data, seeds, progress_bar("bench materials"))
     print_json(result) if as_json else click.echo(materials_table(result))
+
+
+@bench.command()
+@click.option("--trials", type=click.IntRange(min=1), default=24, show_default=True, help="Seeds 100, 101, ...")
+@click.option("--cases", multiple=True, help="Only these cases: A, B, C, D (repeat the option).")
+@click.option("--methods", multiple=True, help="Only these methods.")
+@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@_JSON
+def team(trials: int, as_json: bool, **choices: Any) -> None:
+    """One payload, three robots, noise from clean to that of the paper; and cost against the number of robots."""
+    from steelyard.bench import team as job
+    from steelyard.bench.team_table import team_table
+
+    result = job.run(trials, progress_bar("bench team"), **choices)
+    print_json(result) if as_json else click.echo(team_table(result))

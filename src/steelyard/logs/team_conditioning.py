@@ -43,7 +43,7 @@ def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 
         _forget_ends(columns, time, _SPREAD / cutoff_hz)
     parts = ("rotation", "position", "twist", "twist_rate", "gravity", "wrench")
     stacked: dict[str, Any] = {part: np.stack([getattr(c, part) for c in columns]) for part in parts}
-    masks = {f"has_{part}": np.stack([c.has[part] for c in columns]) for part in _MEASURED}
+    masks: dict[str, Any] = {f"has_{part}": np.stack([c.has[part] for c in columns]) for part in _MEASURED}
     carries = np.stack([_carries(recording, name, time) for name in names])
     return TeamRows(names=names, time=time, carries=carries, **stacked, **masks)
 

@@ -8,7 +8,7 @@ from steelyard.check import Array
 from steelyard.inertia import InertialParameters
 from steelyard.simulate.motions import Kinematics
 from steelyard.simulate.team_cases import Hinge
-from steelyard.simulate.team_payload import Load, TeamPayload, grasp_map, load, needed
+from steelyard.simulate.team_payload import Load, TeamPayload, grasp_load, grasp_map, needed
 from steelyard.spatial import Pose, Rotation, cross
 
 
@@ -17,7 +17,7 @@ def hinged_load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], h
 
     swing  (3, T) angle of the hinge [rad] and its two derivatives
     """
-    single = load(payload, motion, six_axis)
+    single = grasp_load(payload, motion, six_axis)
     rotation, position, omega, demand = single.rotation, single.position, single.twist[..., :3].copy(), single.demand
     angle, rate, change = swing
     axis, point = hinge.axis / np.linalg.norm(hinge.axis), hinge.point

@@ -91,7 +91,7 @@ class Load:
     demand: Array
 
 
-def load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], slip: Slip | None = None) -> Load:
+def grasp_load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], slip: Slip | None = None) -> Load:
     """Return what the grasps must do and bear along `motion` (T,) of C in W."""
     position, drift = _places(payload, motion.time, slip)
     omega = np.repeat(motion.angular_velocity[:, None], position.shape[1], 1)

@@ -13,7 +13,7 @@ from steelyard.simulate.motions import Kinematics, Motion
 from steelyard.simulate.team_cases import Slip, TeamScene
 from steelyard.simulate.team_hinge import hinged_load
 from steelyard.simulate.team_motions import sines
-from steelyard.simulate.team_payload import Carried, Load, Squeeze, TeamPayload, carry, load
+from steelyard.simulate.team_payload import Carried, Load, Squeeze, TeamPayload, carry, grasp_load
 from steelyard.simulate.team_sensing import read_joints, read_pose, read_twist, read_wrench
 from steelyard.spatial import Pose, Rotation
 
@@ -99,7 +99,7 @@ def _seen(scene: TeamScene, plan: Plan, payload: TeamPayload, squeeze: Squeeze, 
 def load_of(scene: TeamScene, payload: TeamPayload, motion: Kinematics, swing: Array | None, slip: Slip | None) -> Load:
     """Return what the grasps do and bear along `motion`; `swing` are the hinge's sines, where there is a hinge."""
     if scene.hinge is None:
-        return load(payload, motion, sorted(scene.six_axis), slip)
+        return grasp_load(payload, motion, sorted(scene.six_axis), slip)
     turned = _swing_at(swing, motion.time)
     return hinged_load(payload, motion, sorted(scene.six_axis), scene.hinge, turned)
 

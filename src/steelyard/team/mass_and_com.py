@@ -57,10 +57,11 @@ def com(gravity: Array, moment: Array, mass_kg: float) -> tuple[Array, Array]:
     values, axes = np.linalg.eigh(normal)
     if not values[0] > (LEAST_TILT**2) * values[2]:
         along = ", ".join(f"{x:.2f}" for x in axes[:, 0])
+        spread = np.sqrt(max(values[0], 0) / values[2])
         raise CannotAnswer(
-            "the still poses must tilt the payload to tell how high its centre of mass is; gravity keeps the "
-            f"direction ({along}) of the reference grasp to within {np.sqrt(max(values[0], 0) / values[2]):.1g} rad. Add still "
-            "poses that are tilted by several degrees."
+            "the still poses must tilt the payload to tell how high its centre of mass is; gravity keeps the direction "
+            f"({along}) of the reference grasp to within {spread:.1g} rad. Add still poses that are tilted by several "
+            "degrees."
         )
     found = np.linalg.solve(normal, np.einsum("kij,ki->j", stacked, moment))
     left = moment - np.einsum("kij,j->ki", stacked, found)

@@ -83,7 +83,7 @@ class PublishedTeam:
                 "wrist, or use the joint method, which works from motion."
             )
         still = tuple(r for r in log.recordings if r.kind == "still")
-        # Rows of still recordings are averaged, which no filter improves on; its ends would weigh single samples heavily.
+        # Still rows are averaged, which no filter improves on: near its ends it would weigh single samples heavily.
         resting = all_conditioned(log, still or log.of_kind("motion"), None if still else self.cutoff_hz)
         chosen = [_full_rows(log, rows, _at_rest(rows, bool(still))) for rows in resting]
         gravity = np.concatenate(
@@ -100,7 +100,7 @@ class PublishedTeam:
     def inertia(self, log: TeamLog, grasps: Grasps, com: Array) -> tuple[Array, Array, int]:
         """Return the inertia (3, 3) [kg m^2] about `com` (3,) [m], covariance (6, 6) and rows used (eq. 17-32).
 
-        All in R's axes. Rates and angular accelerations are the reference robot's alone. Negative eigenvalues are still there.
+        All in R's axes. Rates and angular accelerations are the reference robot's alone; negative eigenvalues stay.
         """
         omega, alpha, moment = [], [], []
         for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):

@@ -1,0 +1,185 @@
+"""`steelyard bench team`: cases A to D with known answers, the paper's estimator beside ours, cost against N."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from concurrent.futures import ProcessPoolExecutor
+from contextlib import ExitStack
+from dataclasses import dataclass
+from multiprocessing import get_context
+from types import MappingProxyType
+from typing import Any
+
+import numpy as np
+
+from steelyard.bench.timing import thread_ms
+from steelyard.check import Array
+from steelyard.errors import BadValue, SteelyardError
+from steelyard.logs.team_log import TeamLog
+from steelyard.simulate.team import TeamTrial, TeamTruth, simulate_team
+from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
+from steelyard.spatial import Pose
+from steelyard.team import PublishedTeam, TeamEstimate
+
+FIRST_SEED = 100
+SIZES = (2, 4, 8, 16, 32, 64)
+SCALE_SEEDS = 3
+SCALE_NOISE = TeamNoise(rate_rad_s=0.008, velocity_m_s=0.002)
+METRICS = ("rotation_deg", "position_mm", "position_pct", "mass_pct", "com_mm", "inertia_pct", "time_s")
+TABLE_V = {
+    "what": "Table V of the paper: three robots on hardware, four trials, mean absolute error of the principal moments",
+    "inertia_pct": [6.824, 3.999, 0.973],
+}
+RULES = (
+    "Three Omnids, force-only, one rigid payload; trial k has seed 100 + k and the same payload, grasps and motion in "
+    "every case. A trial is one grasp recording of 10 s, four still poses of 1 s and one motion of 52 s at 100 Hz. "
+    "cases.<case>.<method> = means over trials: rotation and position of the grasps other than the reference (position "
+    "also in % of the true distance), absolute mass error, distance of the centre of mass, absolute errors of the "
+    "principal moments in rising order, thread CPU of one identification (median). scale: grasps alone, from 998 rows "
+    "of twists with white noise of 8 mrad/s and 2 mm/s, mean over three seeds, time = median of the calls."
+)
+Progress = Callable[[int, int], None]
+
+
+@dataclass(frozen=True)
+class Method:
+    """One estimator in the bench: the whole answer, and the grasps X_RG (N,) alone from unfiltered twists."""
+
+    identify: Callable[[TeamLog], TeamEstimate]
+    grasps: Callable[[TeamLog], Pose]
+
+
+def _published_grasps(log: TeamLog) -> Pose:
+    return PublishedTeam(cutoff_hz=None, close_loops=False).grasps(log)[0].poses
+
+
+METHODS: Mapping[str, Method] = MappingProxyType({"paper": Method(PublishedTeam().identify, _published_grasps)})
+
+
+def run(
+    trials: int = 24,
+    progress: Progress | None = None,
+    *,
+    cases: Sequence[str] = (),
+    methods: Sequence[str] = (),
+    sizes: Sequence[int] = SIZES,
+    workers: int = 1,
+) -> dict[str, Any]:
+    """Return the errors of every method in every case over `trials` seeds, and the cost of grasps against N.
+
+    An empty choice means all. `progress(done, all)` is called after every trial. Raises BadValue for unknown names.
+    """
+    if trials < 1:
+        raise BadValue(f"There must be at least one trial; got {trials}.")
+    chosen, wanted = _chosen("case", cases, CASES), _chosen("method", methods, METHODS)
+    jobs = [(name, FIRST_SEED + k, wanted) for name in chosen for k in range(trials)]
+    rows: list[dict[str, Any]] = []
+    for done, found in enumerate(_done(jobs, workers), start=1):
+        rows += found
+        if progress is not None:
+            progress(done, len(jobs))
+    return {
+        "bench": "team",
+        "rules": RULES,
+        "trials": trials,
+        "seeds": [FIRST_SEED + k for k in range(trials)],
+        "cases": {name: {m: summary(rows, name, m) for m in wanted} for name in chosen},
+        "scale": [scale(n, m) for n in sizes for m in wanted],
+        "published": TABLE_V,
+        "rows": rows,
+    }
+
+
+def _chosen(kind: str, asked: Sequence[str], known: Mapping[str, Any]) -> tuple[str, ...]:
+    for name in asked:
+        if name not in known:
+            raise BadValue(f"There is no {kind} '{name}'; there are: {', '.join(known)}.")
+    return tuple(asked) or tuple(known)
+
+
+def _done(jobs: Sequence[tuple[str, int, Sequence[str]]], workers: int) -> Iterator[list[dict[str, Any]]]:
+    with ExitStack() as stack:
+        if workers == 1:
+            yield from map(trial, jobs)
+        else:
+            # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
+            pool = stack.enter_context(ProcessPoolExecutor(workers, mp_context=get_context("spawn")))
+            yield from pool.map(trial, jobs)
+
+
+def trial(job: tuple[str, int, Sequence[str]]) -> list[dict[str, Any]]:
+    """Return one row per method: case, seed, method and the errors, or the text of its error."""
+    name, seed, methods = job
+    made = simulate_team(case(name), seed)
+    rows = []
+    for method in methods:
+        row: dict[str, Any] = {"case": name, "seed": seed, "method": method}
+        start = time.thread_time()
+        try:
+            found = METHODS[method].identify(made.log)
+        except SteelyardError as error:
+            rows.append(row | {"error": str(error)})
+            continue
+        rows.append(row | score(made, found) | {"time_s": time.thread_time() - start})
+    return rows
+
+
+def score(made: TeamTrial, found: TeamEstimate) -> dict[str, Any]:
+    """Return the errors of one answer; inertia is None where it was not identified."""
+    turned, moved, share = grasp_errors(made.truth, _poses(made.log, found))
+    body, moments = made.truth.body, found.principal_moments
+    return {
+        "rotation_deg": turned,
+        "position_mm": moved,
+        "position_pct": share,
+        "mass_pct": 100 * abs(found.mass / float(body.mass) - 1),
+        "com_mm": 1000 * float(np.linalg.norm(found.com - body.com)),
+        "inertia_pct": None if moments is None else (100 * np.abs(moments / made.truth.moments - 1)).tolist(),
+    }
+
+
+def grasp_errors(truth: TeamTruth, found: Pose) -> tuple[float, float, float]:
+    """Return mean angle [deg], distance [mm] and distance [% of the true one] over the grasps that are not at R."""
+    far = np.linalg.norm(truth.grasps.position, axis=1)
+    others = far > 0
+    angle = np.rad2deg((truth.grasps.rotation.inverse() @ found.rotation).angle())[others]
+    gap = np.linalg.norm(found.position - truth.grasps.position, axis=1)[others]
+    return float(angle.mean()), float(1000 * gap.mean()), float(100 * (gap / far[others]).mean())
+
+
+def _poses(log: TeamLog, found: TeamEstimate) -> Pose:
+    matrices: Array = np.array([found.grasps[name].pose.matrix() for name in log.names])
+    return Pose.from_matrix(matrices)
+
+
+def summary(rows: Sequence[Mapping[str, Any]], name: str, method: str) -> dict[str, Any]:
+    """Return the means over trials of one method in one case, the median time, and how many trials it answered."""
+    mine = [row for row in rows if row["case"] == name and row["method"] == method]
+    answered = [row for row in mine if "error" not in row]
+    out: dict[str, Any] = {"trials": len(mine), "answered": len(answered)}
+    for metric in METRICS:
+        values = [row[metric] for row in answered if row[metric] is not None]
+        middle = np.median if metric == "time_s" else np.mean
+        out[metric] = np.asarray(middle(values, axis=0)).tolist() if values else None
+    return out
+
+
+def scale(robots: int, method: str) -> dict[str, Any]:
+    """Return error and cost of the grasps of one team size from white twists."""
+    scene = TeamScene(
+        SCALE_NOISE, robots, "twists", bases_move=True, kinds=("grasp",), grasp_samples=998, six_axis=_bearing(robots)
+    )
+    estimate = METHODS[method].grasps
+    errors = []
+    for seed in range(FIRST_SEED, FIRST_SEED + SCALE_SEEDS):
+        made = simulate_team(scene, seed)
+        errors.append(grasp_errors(made.truth, estimate(made.log))[:2])
+    turned, moved = np.mean(errors, axis=0)
+    cpu = thread_ms(lambda: estimate(made.log), repeats=5, warm=1) / 1000
+    return {"n": robots, "method": method, "time_s": cpu, "rotation_deg": float(turned), "position_mm": float(moved)}
+
+
+def _bearing(robots: int) -> frozenset[int]:
+    """Return who needs a six-axis wrist, so that the payload can be carried at all."""
+    return frozenset({0}) if robots == 2 else frozenset()

@@ -1,0 +1,39 @@
+"""The result of `bench team` as text for people."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from steelyard.bench.tables import block
+
+_COLUMNS = (
+    ("grasp deg", "rotation_deg", 4),
+    ("grasp mm", "position_mm", 3),
+    ("% of p", "position_pct", 3),
+    ("mass %", "mass_pct", 3),
+    ("CoM mm", "com_mm", 2),
+    ("   I1 %", "I1", 2),
+    ("   I2 %", "I2", 2),
+    ("   I3 %", "I3", 2),
+    ("s CPU", "time_s", 3),
+)
+_SCALE = (("grasp deg", "rotation_deg", 4), ("grasp mm", "position_mm", 3), ("s CPU", "time_s", 4))
+
+
+def team_table(result: dict[str, Any]) -> str:
+    """Return one block per case, the published errors beside case D, and the cost against the number of robots."""
+    lines = [f"{result['trials']} trials a case, seeds from {result['seeds'][0]}; means of absolute errors"]
+    for name, methods in result["cases"].items():
+        rows = {method: _with_moments(values) for method, values in methods.items()}
+        lines += ["", *block(f"case {name}", rows, _COLUMNS)]
+    moments = " / ".join(f"{x:.1f}" for x in result["published"]["inertia_pct"])
+    lines += ["", f"published on hardware (Table V): principal moments {moments} %"]
+    sizes = {f"{row['method']}, N = {row['n']}": row for row in result["scale"]}
+    if sizes:
+        lines += ["", *block("grasps from white twists, 998 rows", sizes, _SCALE)]
+    return "\n".join(lines)
+
+
+def _with_moments(values: dict[str, Any]) -> dict[str, Any]:
+    moments = values["inertia_pct"] or [None] * 3
+    return values | {f"I{k + 1}": moment for k, moment in enumerate(moments)}
