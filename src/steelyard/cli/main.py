@@ -17,6 +17,7 @@ VERBS: dict[str, tuple[str, str]] = {
         "Log -> mass, centre of mass, inertia, error bars, findings.",
     ),
     "compare": ("steelyard.cli.compare:compare", "Two results: the same object or not, with a p-value."),
+    "report": ("steelyard.cli.report:report", "Result -> one page: numbers, the parts in 3D, residuals, findings."),
     "demo": ("steelyard.cli.demo:demo", "A made hammer, its log and its answer against the truth."),
     "doctor": (
         "steelyard.cli.doctor:doctor",

@@ -11,8 +11,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadInput
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
+from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
 
 _LARGEST = 64_000_000
 _WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
@@ -32,12 +33,15 @@ def read_result(path: Path | str) -> Estimate:
         _body(path, values),
         _matrix(path, values, "covariance", (10, 10)),
         str(values.get("method", "given")),
-        Evidence(0, float("nan"), 0, 0, float("nan"), float("nan")),
+        evidence_of(path, values),
         _identified(path, values),
         np.concatenate([_matrix(path, values, "torque_bias_Nm", (3,)), _matrix(path, values, "force_bias_N", (3,))]),
         _matrix(path, values, "bias_covariance", (6, 6)),
         _matrix(path, values, "cross_covariance", (10, 6)),
+        delays_s=delays_of(path, values),
         findings=_findings(path, values),
+        parts=parts_of(path, values),
+        notes=notes_of(path, values),
     )
 
 

@@ -9,12 +9,16 @@ from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import general, mass_unit, measured
-from steelyard.report.palette import hexadecimal
+from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar
 from steelyard.report.projection import picture
 from steelyard.report.scene import Scene
 
 MOST_PARTS = 200
+_HOW = (
+    "Drag to turn, shift-drag or two fingers to move, wheel or pinch to zoom. "
+    "Keys: arrows turn, shift-arrows move, + and − zoom, 0 resets."
+)
 
 
 def viewer(report: Report) -> Html:
@@ -41,31 +45,40 @@ def viewer(report: Report) -> Html:
 
 def _controls(report: Report, scene: Scene, known: bool) -> Html:
     """Return the buttons and sliders; the script shows them when it draws."""
-    coloured = any(len(np.unique(b.rgb, axis=0)) > 1 for b in scene.bodies) or len(
-        {tuple(b.rgb[0].tolist()) for b in scene.bodies}
-    ) > 1  # fmt: skip
-    modes = [
-        ("parts", "Parts", True),
-        ("true", "Own colours", coloured),
-        ("dense", "Density", bool(report.estimate.parts)),
-    ]
-    marks = [
-        ("com", "Centre of mass", known), ("ellipsoid", "Inertia ellipsoid", known and report.estimate.inertia_com is not None),
-        ("sensor", "Sensor frame", known), ("chips", "Labels", True), ("points", "Points", scene.points is not None),
-    ]  # fmt: skip
-    several = len(scene.bodies) > 1
+    painted = np.concatenate([body.rgb for body in scene.bodies])
+    seen = report.estimate
+    modes = {"parts": "Parts"}
+    if (painted != painted[0]).any():
+        modes["true"] = "Own colours"
+    if seen.parts:
+        modes["dense"] = "Density"
+    shows = {"chips": "Labels"}
+    if known:
+        shows = {"com": "Centre of mass", "sensor": "Sensor frame", **shows}
+        if seen.inertia_com is not None:
+            shows["ellipsoid"] = "Inertia ellipsoid"
+    if scene.points is not None:
+        shows["points"] = "Points"
+    pull = _slider("explode", "Pull apart") if len(scene.bodies) > 1 else ""
+    reset = tag("button", "Reset", type="button", data_do="reset")
     return tag(
         "div",
-        tag("div", *(tag("button", said, type="button", data_mode=key, aria_pressed="true" if key == "parts" else "false")
-                     for key, said, there in modes if there), class_="group", role="group", aria_label="Colour by"),
-        tag("div", *(tag("button", said, type="button", data_show=key, aria_pressed="false")
-                     for key, said, there in marks if there), class_="group", role="group", aria_label="Show"),
-        tag("div", _slider("explode", "Pull apart") if several else "", _slider("cut", "Cut open"),
-            tag("button", "Reset", type="button", data_do="reset"), class_="group sliders"),
-        tag("p", "Drag to turn, shift-drag or two fingers to move, wheel or pinch to zoom. Keys: arrows turn, shift-arrows "
-                 "move, + and − zoom, 0 resets.", id="how", class_="how"),
-        class_="controls", hidden=True,
-    )  # fmt: skip
+        _buttons("Colour by", "data_mode", modes),
+        _buttons("Show", "data_show", shows),
+        tag("div", pull, _slider("cut", "Cut open"), reset, class_="group sliders"),
+        tag("p", _HOW, id="how", class_="how"),
+        class_="controls",
+        hidden=True,
+    )
+
+
+def _buttons(name: str, kind: str, said: dict[str, str]) -> Html:
+    """Return a row of buttons that stay down; the script knows them by `kind`."""
+    row = [
+        tag("button", words, type="button", aria_pressed="true" if key == "parts" else "false", **{kind: key})
+        for key, words in said.items()
+    ]
+    return tag("div", *row, class_="group", role="group", aria_label=name)
 
 
 def _slider(name: str, said: str) -> Html:
@@ -83,7 +96,8 @@ def _legend(report: Report) -> Html:
     rows += [_bare(report, label, colours[label]) for label in drawn if label not in weighed][:MOST_PARTS]
     more = len(parts) - MOST_PARTS
     rest = tag("p", f"and {more} lighter parts", class_="aside") if more > 0 else ""
-    return tag("aside", tag("ul", *rows, class_="legend"), rest, _density_note(parts), aria_label="Parts")
+    heading = tag("h2", f"{len(rows)} part{'s' if len(rows) > 1 else ''}") if report.scene is not None else ""
+    return tag("aside", heading, tag("ul", *rows, class_="legend"), rest, _density_note(parts), aria_label="Parts")
 
 
 def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: float, drawn: bool) -> Html:
@@ -91,13 +105,14 @@ def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: f
     name = report.name_of(part.label)
     true = report.truth.masses.get(part.label) if report.truth is not None else None
     said = [f"{general(1e6 * part.volume)} cm³", f"{general(part.density, 2 if part.density < 1e3 else 3)} kg/m³"]
+    if true is not None:
+        said.append(f"truth {general(factor * true, 4)} {unit}")
     return tag(
         "li",
         tag("label", _switch(part.label, name, drawn), _swatch(colour), tag("span", name, class_="name"),
             tag("span", measured(factor * part.mass, factor * part.std, unit), class_="mass")),
         share_bar(share),
         tag("p", " · ".join(said), tag("b", f" {part.material}") if part.material else "", class_="aside"),
-        tag("p", f"truth {general(factor * true, 4)} {unit}", class_="aside") if true is not None else "",
         data_label=part.label,
     )  # fmt: skip
 
@@ -114,7 +129,7 @@ def _bare(report: Report, label: int, colour: tuple[int, int, int]) -> Html:
 def _switch(label: int, name: str, drawn: bool) -> Html:
     if not drawn:
         return joined()
-    return tag("input", type="checkbox", checked=True, data_part=label, aria_label=f"Show {name}")
+    return tag("input", type="checkbox", checked=True, hidden=True, data_part=label, aria_label=f"Show {name}")
 
 
 def _swatch(colour: tuple[int, int, int]) -> Html:
@@ -129,6 +144,14 @@ def _density_note(parts: list[PartMass]) -> Html:
     if not parts:
         return joined()
     low, high = min(p.density for p in parts), max(p.density for p in parts)
-    return tag(
-        "p", f"Density: light {general(low, 2)}, dark {general(high, 2)} kg/m³", class_="aside dense", hidden=True
+    stops = [tag("stop", offset=f"{place:.2f}", stop_color=colour) for place, colour in scale_stops()]
+    bar = tag(
+        "svg",
+        tag("defs", tag("linearGradient", *stops, id="dense")),
+        tag("rect", width="100%", height=8, rx=4, fill="url(#dense)"),
+        width="100%",
+        height=8,
+        aria_hidden="true",
     )
+    ends = (f"{general(low, 2)}", f"{general(high, 2)} kg/m³")
+    return tag("div", bar, tag("p", *(tag("span", end) for end in ends), class_="aside"), class_="dense", hidden=True)

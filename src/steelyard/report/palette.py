@@ -34,6 +34,12 @@ def density_colours(density: Array) -> list[tuple[int, int, int]]:
     return [(round(r), round(g), round(b)) for r, g, b in np.stack(values, axis=1).tolist()]
 
 
+def scale_stops() -> list[tuple[float, str]]:
+    """Return place (0..1) and colour of the stops of the density scale."""
+    stops = [hexadecimal((int(r), int(g), int(b))) for r, g, b in _SCALE.tolist()]
+    return [(k / (len(stops) - 1), colour) for k, colour in enumerate(stops)]
+
+
 def hexadecimal(colour: tuple[int, int, int]) -> str:
     """Return #rrggbb."""
     return "#{:02x}{:02x}{:02x}".format(*colour)

@@ -12,22 +12,22 @@ from steelyard.check import Array
 from steelyard.report.contents import Residuals
 from steelyard.report.markup import Html, tag
 from steelyard.report.numbers import general
+from steelyard.shape.mesh import Integers
 
 COLUMNS = 420
+RUN = 6
 _HEIGHT, _TOP, _BOTTOM = 190, 12, 24
 
 
 def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) -> Html:
-    """Return the three axes of values (N, 3) over time: lowest and highest of each column, and its mean as a line."""
+    """Return the three axes of values (N, 3) over time: lowest and highest of each column, and means as a line."""
     time = residuals.time
     start, length = float(time[0]), max(float(time[-1] - time[0]), 1e-9)
     column = np.clip(((time - start) / length * COLUMNS).astype(np.int64), 0, COLUMNS - 1)
     used, place = np.unique(column, return_inverse=True)
-    low, high, mean = (np.full((len(used), 3), fill) for fill in (np.inf, -np.inf, 0.0))
+    low, high = np.full((len(used), 3), np.inf), np.full((len(used), 3), -np.inf)
     np.minimum.at(low, place, values)
     np.maximum.at(high, place, values)
-    np.add.at(mean, place, values)
-    mean /= np.bincount(place)[:, None]
     top = max(float(np.abs([low, high]).max()), 1e-12)
     step = _round_step(top)
     reach = max(top, step) * 1.06
@@ -41,7 +41,8 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) ->
         edge = np.concatenate([np.stack([x, y(high[:, k])], 1), np.stack([x, y(low[:, k])], 1)[::-1]])
         layers.append(tag("polygon", points=_points(edge), class_=f"band {axis}"))
     for k, axis in enumerate("xyz"):
-        layers.append(tag("polyline", points=_points(np.stack([x, y(mean[:, k])], 1)), class_=f"curve {axis}"))
+        middle, mean = _means(column, values[:, k])
+        layers.append(tag("polyline", points=_points(np.stack([middle, y(mean)], 1)), class_=f"curve {axis}"))
     inner = tag(
         "svg", *layers, x=0, y=_TOP, width="100%", height=_HEIGHT - _TOP - _BOTTOM,
         viewBox=f"0 0 {COLUMNS} 100", preserveAspectRatio="none",
@@ -59,6 +60,14 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) ->
             aria_label=f"{title}: residuals over time, at most {general(top)} {unit}",
         ),
     )  # fmt: skip
+
+
+def _means(column: Integers, values: Array) -> tuple[Array, Array]:
+    """Return place and mean of runs of RUN columns: what noise hides and a wrong model leaves."""
+    run = column // RUN
+    count = np.bincount(run)
+    used = np.flatnonzero(count)
+    return np.asarray(RUN * (used + 0.5)), np.asarray(np.bincount(run, values)[used] / count[used])
 
 
 def _still_bands(residuals: Residuals, start: float, length: float) -> list[Html]:
@@ -86,7 +95,7 @@ def _grid(step: float, reach: float, unit: str) -> list[Html]:
         y = _TOP + inner * (0.5 - 0.5 * k * step / reach)
         rows.append(tag("line", x1=0, x2="100%", y1=f"{y:.1f}", y2=f"{y:.1f}", class_="grid" if k else "grid zero"))
         if k:
-            said = f"{'+' if k > 0 else '−'}{general(step, 2)} {unit}"
+            said = f"{'+' if k > 0 else '−'}{step:g} {unit}"
             rows.append(tag("text", said, x=0, y=f"{y - 4:.1f}", class_="tick"))
     return rows
 
@@ -99,7 +108,7 @@ def _time_axis(start: float, length: float) -> list[Html]:
     for t in marks.tolist():
         share = 100 * (t - start) / length
         anchor = "start" if share < 4 else "end" if share > 96 else "middle"
-        said = f"{general(t)} s" if t == marks[-1] else general(t)
+        said = f"{t:g} s" if t == marks[-1] else f"{t:g}"
         out.append(tag("text", said, x=f"{share:.2f}%", y=_HEIGHT - 6, text_anchor=anchor, class_="tick"))
     return out
 
@@ -110,15 +119,15 @@ def _round_step(top: float) -> float:
     return float(power * max(s for s in (1, 2, 5) if s * power <= top * (1 + 1e-9)))
 
 
-def _points(places: Array) -> str:
-    return " ".join(f"{x:.1f},{y:.2f}" for x, y in places.tolist())
+def _points(places: Array) -> Html:
+    return Html(" ".join(f"{x:.4g},{y:.3g}" for x, y in places.tolist()))
 
 
 def interval(value: float, std: float, truth: float | None) -> Html:
-    """Return a bar of two standard deviations about the value, and the truth as a mark on it."""
-    if not std > 0:
+    """Return a bar of two standard deviations about the value and the truth as a mark on it, nothing without truth."""
+    if not std > 0 or truth is None:
         return Html("")
-    away = 0.0 if truth is None else abs(truth - value)
+    away = abs(truth - value)
     reach = max(3.2 * std, 1.15 * away)
 
     def x(v: float) -> str:
@@ -128,13 +137,11 @@ def interval(value: float, std: float, truth: float | None) -> Html:
         tag("line", x1="2%", x2="98%", y1=9, y2=9, class_="rail"),
         tag("line", x1=x(value - 2 * std), x2=x(value + 2 * std), y1=9, y2=9, class_="bar"),
         tag("circle", cx="50%", cy=9, r=4, class_="dot"),
+        tag("line", x1=x(truth), x2=x(truth), y1=1, y2=17, class_="truth"),
     ]
-    if truth is not None:
-        parts.append(tag("line", x1=x(truth), x2=x(truth), y1=1, y2=17, class_="truth"))
-    said = "" if truth is None else f"; the truth lies {general(away / std, 2)} standard deviations away"
     return tag(
         "svg", *parts, width="100%", height=18, class_="interval", role="img",
-        aria_label=f"two standard deviations either side{said}",
+        aria_label=f"two standard deviations either side; the truth lies {general(away / std, 2)} of them away",
     )  # fmt: skip
 
 

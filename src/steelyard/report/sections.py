@@ -148,8 +148,8 @@ def residuals(report: Report) -> Html:
     if seen is None:
         return Html("")
     lead = (
-        "Measured less predicted. The band holds every sample, the line is its mean; shaded stretches are at rest. "
-        "A good answer leaves only noise about zero."
+        "Measured less predicted. The band holds every sample, the line is a running mean; shaded stretches are at "
+        "rest. A good answer leaves only noise about zero."
     )
     plots = (residual_plot(seen, seen.force, "N", "Force"), residual_plot(seen, seen.torque, "N m", "Torque"))
     return section("What is left over", *plots, name="residuals", lead=lead)
@@ -188,7 +188,7 @@ def numbers(report: Report) -> Html:
             places = 4 if k == 0 and factor == 1 else 2
             away = abs(values[k] - true[k]) / std[k] if std[k] > 0 and known else None
             cells.append(tag("td", fixed(factor * true[k], places)))
-            cells.append(tag("td", "" if away is None else f"{general(away, 2)} σ", class_="bad" if away and away > 3 else None))  # fmt: skip  # noqa: E501
+            cells.append(tag("td", "" if away is None else f"{fixed(away, 1)} σ", class_="bad" if away and away > 3 else None))  # fmt: skip  # noqa: E501
         lines.append(tag("tr", *cells))
     heads = ("parameter", "found", *(("truth", "away") if true is not None else ()))
     lead = f"In the axes of {seen.frame}; inertia about the centre of mass."

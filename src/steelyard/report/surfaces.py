@@ -29,10 +29,12 @@ def compact(vertices: Array, triangles: Integers) -> tuple[Array, Integers]:
 def thinned(vertices: Array, triangles: Integers, most: int) -> tuple[Array, Integers]:
     """Return a surface of at most `most` triangles: vertices in one cell of a grid become their mean.
 
-    The grid is as fine as it can be to a tenth; a surface that is small enough is returned as it is.
+    The grid is as fine as it can be to a fifth; a surface that is small enough is returned as it is.
     """
     vertices, triangles = compact(vertices, triangles)
-    cell = float(np.ptp(vertices, axis=0).max(initial=0.0)) / 512
+    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    # A sheet of cells has about two triangles per cell.
+    cell = 0.5 * float(np.sqrt(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / max(most, 1)))
     while len(triangles) > most and cell > 0:
         place = np.floor((vertices - vertices.min(0)) / cell).astype(np.int64)
         group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
@@ -43,7 +45,7 @@ def thinned(vertices: Array, triangles: Integers, most: int) -> tuple[Array, Int
         first = np.unique(np.sort(merged[whole], axis=1), axis=0, return_index=True)[1]
         if len(first) <= most:
             return compact(means, merged[whole][np.sort(first)])
-        cell *= 1.1
+        cell *= 1.2
     return vertices, triangles
 
 

@@ -179,11 +179,17 @@
     const { right, up, toward } = axes(), aspect = canvas.clientWidth / Math.max(canvas.clientHeight, 1), tangent = 0.24;
     // As near as the parts, pulled apart or not, allow.
     let distance = 0;
-    for (const [c, centre] of some) {
+    const held = [...some];
+    if (show.ellipsoid && marks.ellipsoid) for (const a of marks.ellipsoid)
+      for (const b of marks.ellipsoid) for (const s of [1, -1])
+        held.push([add(marks.com, add(add([0, 0, 0], a, 0.71), b, 0.71 * (a === b ? 0.41 : 1)), s), middle]);
+    if (show.sensor && marks.sensor && Math.hypot(...add(marks.sensor.at, middle, -1)) < 4 * reach)
+      for (const a of marks.sensor.axes) held.push([add(marks.sensor.at, a, 0.22 * size), middle]);
+    for (const [c, centre] of held) {
       const p = add(add(c, middle, -1), add(centre, middle, -1), 1.3 * explode), z = dot(p, toward);
       distance = Math.max(distance, Math.abs(dot(p, right)) / (tangent * aspect) + z, Math.abs(dot(p, up)) / tangent + z);
     }
-    distance = (1.2 * distance) / eye.zoom;
+    distance = (1.1 * distance) / eye.zoom;
     const target = add(middle, eye.pan), from = add(target, toward, distance);
     const rows = [right[0], up[0], toward[0], 0, right[1], up[1], toward[1], 0, right[2], up[2], toward[2], 0,
       -dot(right, from), -dot(up, from), -dot(toward, from), 1];
@@ -238,6 +244,11 @@
     gl.uniform1f(at.ownColour, 0);
     // What lies inside is seen through the walls, faintly.
     gl.enable(gl.BLEND);
+    if (show.com && marks.com) {
+      gl.disable(gl.DEPTH_TEST);
+      drawn(sphere, framed(...marks.spread.axes, marks.com), [0.9, 0.66, 0.22], 0.32, 1);
+      gl.enable(gl.DEPTH_TEST);
+    }
     for (const [test, strength, write] of [[gl.GREATER, 0.5, false], [gl.LEQUAL, 1, true]]) {
       gl.depthFunc(test); gl.depthMask(write);
       drawMarks(seen, strength);
@@ -260,10 +271,8 @@
       drawn(thing, framed([1, 0, 0], [0, 1, 0], [0, 0, 1], marks.com), [0.86, 0.62, 0.2], 0.9 * strength, 1);
     if (show.com) {
       const depth = dot(add(seen.from, marks.com, -1), seen.toward);
-      const r = (9 * 2 * seen.tangent * depth) / canvas.clientHeight;
+      const r = (10 * 2 * seen.tangent * depth) / canvas.clientHeight;
       drawn(sphere, framed([r, 0, 0], [0, r, 0], [0, 0, r], marks.com), [1, 1, 1], Math.min(1, 1.7 * strength), 2);
-      const [u, v, w] = marks.spread.axes;
-      if (strength < 1) drawn(sphere, framed(u, v, w, marks.com), [0.9, 0.66, 0.22], 0.3, 1);
     }
   };
 
@@ -412,10 +421,13 @@
     redraw();
   });
   for (const button of root.querySelectorAll("[data-do=reset]")) button.addEventListener("click", reset);
-  for (const box of root.querySelectorAll("[data-part]")) box.addEventListener("change", () => {
-    for (const body of bodies) if (String(body.label) === box.dataset.part) body.shown = box.checked;
-    redraw();
-  });
+  for (const box of root.querySelectorAll("[data-part]")) {
+    box.hidden = false;
+    box.addEventListener("change", () => {
+      for (const body of bodies) if (String(body.label) === box.dataset.part) body.shown = box.checked;
+      redraw();
+    });
+  }
   for (const row of root.querySelectorAll(".legend li")) {
     row.addEventListener("pointerenter", () => light(Number(row.dataset.label)));
     row.addEventListener("pointerleave", () => light(null));

@@ -1,0 +1,172 @@
+"""`steelyard report RESULT`."""
+
+from __future__ import annotations
+
+import sys
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import click
+
+from steelyard.cli.console import print_json, say
+from steelyard.errors import BadValue
+
+if TYPE_CHECKING:
+    from steelyard.identify.estimate import Estimate
+    from steelyard.parts.parts import Parts
+    from steelyard.report import Residuals, Scene, Truth
+    from steelyard.shape.cloud import Cloud
+    from steelyard.spatial import Pose
+
+_FILE = click.Path(path_type=Path)
+_SAME_VOLUME = 0.02
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("result", type=_FILE)
+@click.option("--parts", type=_FILE, help="Parts to draw: parts.npz, or a mesh (.ply) with a part per face.")
+@click.option("--scan", type=_FILE, help="Cloud of the object (PLY, PCD or NPZ): points, and colours of the surface.")
+@click.option("--log", type=_FILE, help="The log of the result: residuals over time, and where the object sits.")
+@click.option("--data", type=_FILE, help="Folder that relative paths in the log's description start from.")
+@click.option("--pose-in-sensor", metavar="POSE", help="Where the object sits in the sensor, as for identify.")
+@click.option("--truth", type=_FILE, help="truth.json of an object folder: the true object beside the answer.")
+@click.option("--rival", "rivals", multiple=True, metavar="NAME=FILE", help="Another method's result; may be repeated.")
+@click.option("--title", help="Heading of the page.")
+@click.option("-o", "--output", type=_FILE, default=Path("report.html"), show_default=True, help="The page to write.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None, data: Path | None,
+           pose_in_sensor: str | None, truth: Path | None, rivals: tuple[str, ...], title: str | None, output: Path,
+           as_json: bool) -> None:  # fmt: skip
+    """Write one self-contained page about RESULT (.json): numbers, parts in 3D, residuals, findings."""
+    from steelyard.io import read_result
+    from steelyard.report import Report, write_report
+
+    if scan is not None and parts is None:
+        raise BadValue("--scan colours the parts that --parts gives: give both, or leave --scan out.")
+    estimate = read_result(result)
+    facts = None if truth is None else _Facts.read(truth, estimate)
+    of_log, residuals = (None, None) if log is None else _from_log(log, data, estimate)
+    placed = _given_pose(pose_in_sensor) or of_log or (None if facts is None else facts.X_SO)
+    scene, names = (None, {}) if parts is None else _scene(parts, scan, placed, estimate)
+    page = Report(
+        title or f"{result.stem}: what the robot holds",
+        estimate,
+        scene,
+        residuals,
+        {name: read_result(path) for name, path in map(_rival, rivals)},
+        None if facts is None else facts.truth,
+        names if facts is None else {**names, **facts.names},
+        {"command": "steelyard " + " ".join(sys.argv[1:])},
+    )
+    write_report(page, output)
+    drawn = 0 if scene is None else len(scene.bodies)
+    size = output.stat().st_size
+    if as_json:
+        print_json({"report": str(output), "bytes": size, "parts_drawn": drawn,
+                    "placed": scene is not None and scene.X_SO is not None})  # fmt: skip
+        return
+    if scene is not None and scene.X_SO is None:
+        say(
+            "Where the object sits in the sensor is not known: only its shape is drawn. Give --pose-in-sensor or --log."
+        )
+    say(f"{output} ({size / 1024:.0f} KiB): open it in a browser.")
+
+
+@dataclass(frozen=True, eq=False)
+class _Facts:
+    """What truth.json says of the object, and of those of its parts that are the result's."""
+
+    truth: Truth
+    names: Mapping[int, str]
+    X_SO: Pose
+
+    @classmethod
+    def read(cls, path: Path, estimate: Estimate) -> _Facts:
+        """A part of the result is one of the truth's when label and volume are the same."""
+        from steelyard.inertia import InertialParameters
+        from steelyard.io.object_folders import read_truth
+        from steelyard.report import Truth
+        from steelyard.spatial import Pose
+
+        facts = read_truth(path)
+        X_SO = Pose.from_matrix(facts["T_mesh_from_grasp"]).inverse()
+        body = InertialParameters.from_com(facts["mass_kg"], facts["com_mesh_m"], facts["inertia_com_mesh_kgm2"])
+        volumes = {part.label: part.volume for part in estimate.parts}
+        masses, names = {}, {}
+        for row in facts.get("parts", []):
+            label, volume = row.get("label"), row.get("solid_volume_m3") or 0.0
+            if abs(volumes.get(label, 0.0) - volume) > _SAME_VOLUME * volume or not volume:
+                continue
+            names[label] = str(row.get("name") or "")
+            mass = row.get("mass_kg", row.get("mass_fitted_kg"))
+            if isinstance(mass, float | int):
+                masses[label] = float(mass)
+        return cls(Truth(body.in_frame(X_SO), masses), names, X_SO)
+
+
+def _given_pose(pose_in_sensor: str | None) -> Pose | None:
+    from steelyard.io.object_pose import read_object_pose
+
+    return None if pose_in_sensor is None else read_object_pose(pose_in_sensor).pose
+
+
+def _rival(said: str) -> tuple[str, str]:
+    """Return name and file of NAME=FILE."""
+    name, sign, path = said.partition("=")
+    if not (name and sign and path):
+        raise BadValue(f"--rival needs NAME=FILE, as in --rival OLS=ols.json; got {said!r}.")
+    return name, path
+
+
+def _from_log(log: Path, data: Path | None, estimate: Estimate) -> tuple[Pose | None, Residuals | None]:
+    """Return where the log says the object sits, and what the answer leaves over of its rows, where they have times."""
+    from steelyard.io import read_recording
+    from steelyard.logs.alignment import align
+    from steelyard.report import Residuals
+
+    recording = read_recording(log, data)
+    rows = align(recording).log
+    left = rows.wrench - rows.predicted(estimate.parameters.vector) - recording.wrench_sign * estimate.wrench_bias
+    residuals = None if rows.time is None else Residuals(rows.time, left[:, 3:], left[:, :3], rows.still)
+    return recording.object_pose, residuals
+
+
+def _scene(parts: Path, scan: Path | None, placed: Pose | None, estimate: Estimate) -> tuple[Scene, Mapping[int, str]]:
+    """Return what is drawn, and the names of its parts; their centroids say where it sits if nothing else does."""
+    from steelyard.io.parts_files import read_parts
+    from steelyard.io.ply_files import read_mesh
+    from steelyard.parts.from_mesh import parts_of_mesh
+    from steelyard.report import scene_of_mesh, scene_of_solid
+
+    cloud = None if scan is None else _cloud(scan)
+    if parts.suffix.lower() == ".ply":
+        mesh = read_mesh(parts)
+        return scene_of_mesh(mesh, cloud, placed or _matched(lambda: parts_of_mesh(mesh), estimate)), {}
+    saved = read_parts(parts)
+    placed = placed or _matched(lambda: saved.parts, estimate)
+    return scene_of_solid(saved.solid, saved.labels, cloud, saved.rgb, placed), dict(enumerate(saved.names))
+
+
+def _cloud(scan: Path) -> Cloud:
+    from steelyard.io.cloud_files import read_cloud
+
+    return read_cloud(scan)
+
+
+def _matched(drawn: Callable[[], Parts], estimate: Estimate) -> Pose | None:
+    """Return where the parts sit in the sensor by their centroids there, None where those do not say."""
+    import numpy as np
+
+    from steelyard.report.scene import pose_from_centroids
+
+    told = {part.label: part.centroid for part in estimate.parts}
+    try:
+        parts = drawn()
+    except BadValue:  # a surface that encloses nothing can still be drawn
+        return None
+    labels = parts.label.tolist()
+    if not told or set(labels) != set(told):
+        return None
+    return pose_from_centroids(np.stack([told[label] for label in labels]), parts.centroid)

@@ -1,0 +1,182 @@
+"""parts.npz: a solid of tetrahedra with the part of each cell and the tree its parts were cut from.
+
+A file may come from a stranger: nothing is unpickled, sizes are bounded before anything is read, and what is written
+twice (volumes, centroids) must agree.
+"""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadValue
+from steelyard.io.array_table import ArrayTable
+from steelyard.io.ply_files import write_bytes
+from steelyard.parts.hierarchy import Hierarchy
+from steelyard.parts.parts import Parts
+from steelyard.shape.mesh import Integers
+from steelyard.shape.tets import TetMesh
+
+MOST_BYTES = 512 * 1024**2
+MOST_CELLS = 4_000_000
+_LONGEST_M = 100.0
+_LONGEST_NAME = 80
+_AGREE = 1e-6
+_TREE = ("merges", "cost", "piece")
+_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zipfile.BadZipFile)
+
+
+@dataclass(frozen=True, eq=False)
+class SavedParts:
+    """A solid in P parts, in the object's frame O.
+
+    solid   its T cells
+    labels  (T,) part of each cell, 0..P-1, each used
+    rgb     (P, 3) mean colours 0..255, None where they are not known
+    tree    the tree that the parts were cut from, None where there is none
+    names   (P,) what each part is called, empty where nothing says
+    """
+
+    solid: TetMesh
+    labels: Integers
+    rgb: Array | None = None
+    tree: Hierarchy | None = None
+    names: tuple[str, ...] = ()
+
+    def __post_init__(self) -> None:
+        labels = np.array(self.labels, np.int64)
+        if labels.shape != (len(self.solid),):
+            raise BadValue(f"each of the {len(self.solid)} cells needs one label; got {labels.shape}.")
+        if not np.array_equal(np.unique(labels), np.arange(labels.max() + 1)):
+            raise BadValue("labels must be 0, 1, 2 ... with at least one cell each; these leave numbers out.")
+        labels.flags.writeable = False
+        object.__setattr__(self, "labels", labels)
+        if self.rgb is not None:
+            rgb = check.vectors("part colours", self.rgb)
+            if rgb.shape != (self.count, 3) or rgb.min() < 0 or rgb.max() > 255:
+                raise BadValue(f"{self.count} parts need one colour 0..255 each (P, 3); got shape {rgb.shape}.")
+            object.__setattr__(self, "rgb", rgb)
+        if self.names and len(self.names) != self.count:
+            raise BadValue(f"{self.count} parts need one name each; got {len(self.names)}.")
+        if self.tree is not None and len(self.tree.piece) != len(self.solid):
+            raise BadValue(f"the tree is of {len(self.tree.piece)} cells, the solid has {len(self.solid)}.")
+
+    @property
+    def count(self) -> int:
+        """Number P of parts."""
+        return int(self.labels.max()) + 1
+
+    @cached_property
+    def parts(self) -> Parts:
+        """The parts with their exact moments; raises BadValue where one has no volume."""
+        return Parts(np.arange(self.count), self.solid.moments(self.labels, self.count), self.rgb)
+
+
+def write_parts(saved: SavedParts, path: Path | str) -> None:
+    """Write parts.npz; the file appears complete or not at all. Raises BadFile."""
+    parts = saved.parts
+    arrays: dict[str, Any] = {
+        "vertices": saved.solid.vertices,
+        "tets": saved.solid.tets.astype(np.int32),
+        "labels": saved.labels.astype(np.int32),
+        "volume_m3": parts.volume,
+        "centroid_m": parts.centroid,
+    }
+    if saved.rgb is not None:
+        arrays["rgb"] = saved.rgb
+    if saved.names:
+        arrays["names"] = np.array(saved.names)
+    if saved.tree is not None:
+        arrays |= {name: getattr(saved.tree, name) for name in _TREE}
+    buffer = io.BytesIO()
+    np.savez_compressed(buffer, allow_pickle=False, **arrays)
+    write_bytes(Path(path), buffer.getvalue())
+
+
+def read_parts(path: Path | str) -> SavedParts:
+    """Return the parts of a parts.npz; raises BadFile.
+
+    `vertices`, `tets` and `labels` are needed; colours and tree may be missing. Volumes and centroids are computed
+    anew, and those in the file must agree with them.
+    """
+    path = Path(path)
+    arrays = _arrays(path)
+    for name in ("vertices", "tets", "labels"):
+        if name not in arrays:
+            raise BadFile(
+                f'{path}: array "{name}" is missing. Write the file with: steelyard segment CLOUD -o {path.name}.'
+            )
+    if len(arrays["tets"]) > MOST_CELLS:
+        raise BadFile(f"{path}: {len(arrays['tets'])} cells are more than the {MOST_CELLS} that can be handled.")
+    try:
+        solid = TetMesh(arrays["vertices"], _whole(path, arrays, "tets"))
+        if float(np.ptp(solid.vertices, axis=0).max()) > _LONGEST_M:
+            raise BadValue(f"the solid is over {_LONGEST_M:g} m long. Vertices are in metres; are these millimetres?")
+        tree = None
+        if all(name in arrays for name in _TREE):
+            tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
+        names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"]) if "names" in arrays else ()
+        saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names)
+        _agree(saved, arrays)
+    except BadValue as error:
+        raise BadFile(f"{path}: {error}") from None
+    return saved
+
+
+def _arrays(path: Path) -> dict[str, Array]:
+    """Return the arrays of numbers in the file, sizes bounded first."""
+    try:
+        with zipfile.ZipFile(path) as archive:
+            size = sum(member.file_size for member in archive.infolist())
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
+    except zipfile.BadZipFile:
+        size = 0  # the next line says what the file should be
+    if size > MOST_BYTES:
+        raise BadFile(
+            f"{path}: holds {size / 1024**2:.0f} MiB, more than the {MOST_BYTES // 1024**2} MiB that are read."
+        )
+    ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
+    found = {}
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            for name in archive.files:
+                found[name] = archive[name]
+    except _DAMAGED as error:
+        raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+    for name, array in found.items():
+        kinds, wanted = ("U", "text") if name == "names" else ("fiub", "real numbers")
+        if array.dtype.kind not in kinds:
+            raise BadFile(f'{path}: array "{name}" must hold {wanted}; it holds {array.dtype}.')
+    return found
+
+
+def _whole(path: Path, arrays: dict[str, Array], name: str) -> Integers:
+    """Return an array of whole numbers."""
+    array = arrays[name]
+    if array.dtype.kind == "f" and not (np.isfinite(array).all() and (array == np.rint(array)).all()):
+        raise BadFile(f'{path}: array "{name}" must hold whole numbers.')
+    return np.asarray(array, np.int64)
+
+
+def _agree(saved: SavedParts, arrays: dict[str, Array]) -> None:
+    """Raise BadValue where volumes or centroids in the file are not those of the cells."""
+    parts = saved.parts
+    scale = float(np.ptp(saved.solid.vertices, axis=0).max())
+    for name, own, size in (
+        ("volume_m3", parts.volume, float(parts.volume.sum())),
+        ("centroid_m", parts.centroid, scale),
+    ):
+        if name not in arrays:
+            continue
+        given = check.finite(name, arrays[name])
+        if given.shape != own.shape or np.abs(given - own).max() > _AGREE * size:
+            raise BadValue(f'"{name}" is not that of the cells and labels in the file. Save the file again.')
