@@ -1,4 +1,4 @@
-"""Outward normals of a cloud that has none, without a mesh: winding-number normal consistency."""
+"""Outward normals of a cloud that has none, without a mesh: winding-number normal consistency, and flat sheets."""
 
 from __future__ import annotations
 
@@ -9,12 +9,24 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.discs import Discs
+from steelyard.shape.sheets import sheet_planes, spread
 from steelyard.shape.spacing import Neighbours, areas
 from steelyard.shape.winding import Sight, Tree
 
+DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15
 _WIDEST, _NARROWEST = 2.0, 0.25  # width of the softened dipoles, first and last, in spacings
 _SAMPLED = 4  # one leaf in so many gives the length of a step
+_SLOPE = 0.15
+_SIGN_STEPS = 12
+_FREE = 4  # steps before signs are driven to plus or minus one
+_SWEEPS, _KEPT = 8, 0.3
+_LINKED = 3.0  # links of a point that lies on a sheet
+_CERTAIN = 0.3  # of a sign
+_EDGE = 0.5  # width, in spacings, of the field that gives the normals off the sheets
+_SPREAD_AREA = 1.5  # area per point in squared spacings where two sheets lie close
+_JUMP = 0.1  # of a spacing: height over which the jump through a disc is spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -26,6 +38,7 @@ class Oriented:
     area     (N,) of surface that each point stands for
     near     its neighbours
     tree     of the points
+    spacing  median of the points
     """
 
     xyz: Array
@@ -33,6 +46,7 @@ class Oriented:
     area: Array
     near: Neighbours
     tree: Tree
+    spacing: float
 
 
 def orient(cloud: Cloud) -> Array:
@@ -44,27 +58,57 @@ def oriented(cloud: Cloud) -> Oriented:
     """Return the surface elements of a cloud; normals that it carries are kept."""
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
     near, tree = Neighbours.of(xyz), Tree.of(xyz)
-    normals = cloud.normals if cloud.normals is not None else consistent(tree, float(np.median(near.spacing)))
-    return Oriented(xyz, normals, areas(near, normals), near, tree)
+    spacing = float(np.median(near.spacing))
+    normals = cloud.normals
+    if normals is None:
+        sight = Sight.of(tree, tree)
+        normals = on_sheets(xyz, consistent(sight, spacing), near, sight, spacing)
+    return Oriented(xyz, normals, areas(near, normals), near, tree, spacing)
 
 
-def consistent(tree: Tree, spacing: float) -> Array:
-    """Return unit normals (N, 3) that agree with the winding number they make.
+def consistent(sight: Sight, spacing: float) -> Array:
+    """Return unit normals (N, 3) that agree with the winding number they make, for a cloud that sees itself.
 
     Each step moves the dipoles toward a winding number of 1/2 at every point, then turns them against the gradient of
     that number, lengths kept; the softening narrows from step to step. Source: Lin, Shi, Liu 2024, algorithm 1.
     """
-    sight = Sight.of(tree, tree)
+    tree = sight.sources
     dipoles: Any = np.zeros((3, len(tree.order)), np.float32)
     found: Any = np.zeros(len(tree.order), np.float32)
     for width in spacing * np.linspace(_WIDEST, _NARROWEST, _STEPS):
         push = sight.adjoint(np.float32(0.5) - found, width)
-        moved = sight.winding(push, width, _SAMPLED)
-        step = float((push**2).mean() * 3 / np.maximum((moved**2).mean(), 1e-30))
-        dipoles = dipoles + np.float32(step) * push
+        dipoles = dipoles + _length(push, sight.winding(push, width, _SAMPLED)) * push
         found, gradient = sight.winding_and_gradient(dipoles, width)
         dipoles = -np.linalg.norm(dipoles, axis=0) * _units(gradient)
     return np.asarray(tree.back(_units(dipoles)).T, np.float64)
+
+
+def on_sheets(xyz: Array, first: Array, near: Neighbours, sight: Sight, spacing: float) -> Array:
+    """Return unit normals (N, 3), those of points on flat pieces of surface decided piece by piece.
+
+    In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
+    toward a winding number of 1/2 at every point and spread along each sheet, in turn. Points on edges take their
+    normal from the field of all.
+    """
+    tree, order = sight.sources, sight.sources.order
+    plane, link = sheet_planes(xyz, near.index, _SLOPE)
+    sign = spread(np.sign((plane * first).sum(1)), near.index, link, _SWEEPS, _KEPT)
+    discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing)
+    for step in range(_SIGN_STEPS):
+        push = discs.adjoint(sight, np.float32(0.5) - discs.winding(sight, sign[order]))
+        sign[order] += _length(push, discs.winding(sight, push, _SAMPLED)) * push
+        sign = spread(np.clip(sign, -1, 1), near.index, link, _SWEEPS, _KEPT)
+        if step >= _FREE:
+            sign = np.clip(2 * sign, -1, 1)
+    flat = (np.abs(link).sum(1) > _LINKED) & (np.abs(sign) > _CERTAIN)
+    normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
+    gradient = sight.winding_and_gradient(np.ascontiguousarray(normals[order].T, np.float32), _EDGE * spacing)[1]
+    return np.where(flat[:, None], normals, -tree.back(_units(gradient)).T)
+
+
+def _length(push: Any, moved: Any) -> np.float32:
+    """Return the step along `push` that brings the winding number nearest to 1/2; it moves it by `moved`."""
+    return np.float32((push**2).sum() / push.shape[-1] / max(float((moved**2).mean()), 1e-30))
 
 
 def _units(vectors: Any) -> Any:

@@ -10,12 +10,13 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.orient import Oriented, oriented
+from steelyard.shape.discs import Discs
+from steelyard.shape.orient import DEPTH, Oriented, oriented
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.winding import Sight, Tree
 
 _REACH = 8.0  # a cell whose circumscribed ball is wider than so many spacings is outside
-_DEPTH = 0.4  # of a disc, in sides of its square
+_JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,7 +43,7 @@ def enclose(cloud: Cloud) -> Solid:
     """Return the closed volume behind the points of a surface, with or without normals."""
     surface = oriented(cloud)
     tets, centres, reach = _complex(surface.xyz)
-    spacing = float(np.median(surface.near.spacing))
+    spacing = surface.spacing
     score = np.full(len(tets), -1.0)
     close = reach < _REACH * spacing
     score[close] = _score(surface, tets[close], centres[close])
@@ -60,10 +61,9 @@ def enclose(cloud: Cloud) -> Solid:
 
 def _score(surface: Oriented, tets: Any, centres: Array) -> Array:
     """Return how far cells (T,) are inside: winding number less a half, and the mean vote of the corners' normals."""
-    order = surface.tree.order
-    area = surface.area[order]
     targets = Tree.of(centres)
-    found = targets.back(Sight.of(targets, surface.tree).discs(surface.normals[order].T, area, _DEPTH * np.sqrt(area)))
+    discs = Discs.on(surface.tree, surface.normals, surface.area, DEPTH, _JUMP * surface.spacing)
+    found = targets.back(discs.winding(Sight.of(targets, surface.tree)))
     return np.asarray(np.clip(found, -0.5, 1.5) - 0.5 + _votes(surface, tets, centres))
 
 

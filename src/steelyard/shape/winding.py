@@ -1,8 +1,8 @@
 """Winding numbers of clouds: sums over oriented elements, those far away taken leaf by leaf of a kd tree.
 
 An element of area a and outward normal n turns the winding number of a point by its solid angle over 4 pi: 1 inside
-the solid in all, 0 outside. Near elements are summed one by one, in one of two softened forms; a leaf of the tree
-seen from afar counts as one dipole at its centre. All sums are in single precision; lengths are in units of the
+the solid in all, 0 outside. Near elements are summed one by one; a leaf of the tree seen from
+afar counts as one dipole at its centre. All sums are in single precision; lengths are in units of the
 cloud's size.
 """
 
@@ -21,8 +21,8 @@ Array = Any  # single precision here, double at the border
 
 _LEAF = 16  # most points of a leaf
 _FAR = 2.5  # a leaf is far beyond this many of its radii: its points then err by about (1 / 2.5)^2 / 6 of a small sum
-_FOUR_PI = np.float32(1 / (4 * math.pi))
-_ONE, _THREE = np.float32(1), np.float32(3)
+FOUR_PI = np.float32(1 / (4 * math.pi))
+ONE, THREE = np.float32(1), np.float32(3)
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,9 +71,9 @@ class Sight:
 
     def winding(self, dipoles: Array, width: float, every: int = 1) -> Array:
         """Return the winding number (M,) at every `every`-th leaf of targets of ordered dipoles (3, N), softened."""
-        leaves, start, points = self._chosen(every)
+        leaves, start, points = self.chosen(every)
         out = np.empty(points.shape[1], np.float32)
-        own, leaf = _with_leaves(self.sources, dipoles)
+        own, leaf = with_leaves(self.sources, dipoles)
         _winding(own, leaf, self.sources.start, self.near[leaves], points, start, np.float32(width**2), out)
         return out
 
@@ -81,7 +81,7 @@ class Sight:
         """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened."""
         points = self.targets.points
         out, gradient = np.empty(points.shape[1], np.float32), np.empty(points.shape, np.float32)
-        own, leaf = _with_leaves(self.sources, dipoles)
+        own, leaf = with_leaves(self.sources, dipoles)
         _gradient(
             own, leaf, self.sources.start, self.near, points, self.targets.start, np.float32(width**2), out, gradient
         )
@@ -91,25 +91,12 @@ class Sight:
         """Return the sum (3, M) over sources of weight times how a dipole at the target turns the source's number."""
         points = self.targets.points
         out = np.empty(points.shape, np.float32)
-        own, leaf = _with_leaves(self.sources, weights[None])
+        own, leaf = with_leaves(self.sources, weights[None])
         _adjoint(own, leaf, self.sources.start, self.near, points, self.targets.start, np.float32(width**2), out)
         return out
 
-    def discs(self, normals: Array, area: Array, depth: Array) -> Array:
-        """Return the winding number (M,) at the targets of ordered discs: unit normals (3, N), areas and depths (N,).
-
-        A Kuzmin disc: its density in the plane is a d / (2 pi (r^2 + d^2)^1.5) and its field that of a dipole set
-        back by its depth d, whichever side one looks from. It does not thin out within a wall, however thin.
-        Source: Kuzmin 1956, the potential of a flat disc.
-        """
-        points = self.targets.points
-        out = np.empty(points.shape[1], np.float32)
-        own = np.concatenate([self.sources.points, _single(normals), _single(area)[None], _single(depth)[None]])
-        leaf = _with_leaves(self.sources, _single(normals * area))[1]
-        _discs(own, leaf, self.sources.start, self.near, points, self.targets.start, out)
-        return out
-
-    def _chosen(self, every: int) -> tuple[Integers, Integers, Array]:
+    def chosen(self, every: int) -> tuple[Integers, Integers, Array]:
+        """Return numbers, starts and points of every `every`-th leaf of targets."""
         tree = self.targets
         if every == 1:
             return np.arange(len(tree.centre)), tree.start, tree.points
@@ -123,7 +110,7 @@ def _single(values: Array) -> Array:
     return np.ascontiguousarray(values, np.float32)
 
 
-def _with_leaves(tree: Tree, values: Array) -> tuple[Array, Array]:
+def with_leaves(tree: Tree, values: Array) -> tuple[Array, Array]:
     """Return positions and values of the points (3 + K, N), and of the leaves, whose values are sums."""
     sums = np.add.reduceat(values, tree.start[:-1], axis=1, dtype=np.float32)
     return np.concatenate([tree.points, _single(values)]), np.concatenate([_single(tree.centre.T), sums])
@@ -173,7 +160,7 @@ def _near(centre: Array, radius: Array, source: Array, size: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def _seen(near: Array, start: Integers, own: Array, leaf: Array, out: Array) -> tuple[int, int]:
+def seen(near: Array, start: Integers, own: Array, leaf: Array, out: Array) -> tuple[int, int]:
     """Write what one leaf of targets sees into out, near points first; return their number and that of all."""
     count = 0
     for k in range(len(near)):
@@ -193,25 +180,25 @@ def _seen(near: Array, start: Integers, own: Array, leaf: Array, out: Array) -> 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _winding(
-    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: float, out: Array
+    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: Any, out: Array
 ) -> None:
-    seen, inverse = (
+    all_seen, inverse = (
         np.empty((6, own.shape[1] + leaf.shape[1]), np.float32),
         np.empty(len(own.T) + len(leaf.T), np.float32),
     )
     for t in range(len(near)):
-        count = _seen(near[t], start, own, leaf, seen)[1]
-        sx, sy, sz, mx, my, mz = seen[0], seen[1], seen[2], seen[3], seen[4], seen[5]
+        count = seen(near[t], start, own, leaf, all_seen)[1]
+        sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
         for i in range(first[t], first[t + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
-                inverse[j] = _ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
+                inverse[j] = ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
             total = np.float32(0)
             for j in range(count):
                 along = (x - sx[j]) * mx[j] + (y - sy[j]) * my[j] + (z - sz[j]) * mz[j]
                 total += along * (inverse[j] * inverse[j] * inverse[j])
-            out[i] = -total * _FOUR_PI
+            out[i] = -total * FOUR_PI
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
@@ -222,22 +209,22 @@ def _gradient(
     near: Array,
     points: Array,
     first: Integers,
-    soft: float,
+    soft: Any,
     out: Array,
     gradient: Array,
 ) -> None:
-    seen, inverse = (
+    all_seen, inverse = (
         np.empty((6, own.shape[1] + leaf.shape[1]), np.float32),
         np.empty(len(own.T) + len(leaf.T), np.float32),
     )
     for t in range(len(near)):
-        count = _seen(near[t], start, own, leaf, seen)[1]
-        sx, sy, sz, mx, my, mz = seen[0], seen[1], seen[2], seen[3], seen[4], seen[5]
+        count = seen(near[t], start, own, leaf, all_seen)[1]
+        sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
         for i in range(first[t], first[t + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
-                inverse[j] = _ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
+                inverse[j] = ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
             total, gx, gy, gz = np.float32(0), np.float32(0), np.float32(0), np.float32(0)
             for j in range(count):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
@@ -245,59 +232,34 @@ def _gradient(
                 cube = square * inverse[j]
                 along = (dx * mx[j] + dy * my[j] + dz * mz[j]) * cube
                 total += along
-                along *= _THREE * square
+                along *= THREE * square
                 gx += mx[j] * cube - along * dx
                 gy += my[j] * cube - along * dy
                 gz += mz[j] * cube - along * dz
-            out[i] = -total * _FOUR_PI
-            gradient[0, i], gradient[1, i], gradient[2, i] = -gx * _FOUR_PI, -gy * _FOUR_PI, -gz * _FOUR_PI
+            out[i] = -total * FOUR_PI
+            gradient[0, i], gradient[1, i], gradient[2, i] = -gx * FOUR_PI, -gy * FOUR_PI, -gz * FOUR_PI
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _adjoint(
-    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: float, out: Array
+    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: Any, out: Array
 ) -> None:
-    seen, inverse = (
+    all_seen, inverse = (
         np.empty((4, own.shape[1] + leaf.shape[1]), np.float32),
         np.empty(len(own.T) + len(leaf.T), np.float32),
     )
     for t in range(len(near)):
-        count = _seen(near[t], start, own, leaf, seen)[1]
-        sx, sy, sz, weight = seen[0], seen[1], seen[2], seen[3]
+        count = seen(near[t], start, own, leaf, all_seen)[1]
+        sx, sy, sz, weight = all_seen[0], all_seen[1], all_seen[2], all_seen[3]
         for i in range(first[t], first[t + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
-                inverse[j] = _ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
+                inverse[j] = ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
             gx, gy, gz = np.float32(0), np.float32(0), np.float32(0)
             for j in range(count):
                 cube = inverse[j] * inverse[j] * inverse[j] * weight[j]
                 gx += (x - sx[j]) * cube
                 gy += (y - sy[j]) * cube
                 gz += (z - sz[j]) * cube
-            out[0, i], out[1, i], out[2, i] = gx * _FOUR_PI, gy * _FOUR_PI, gz * _FOUR_PI
-
-
-@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _discs(own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, out: Array) -> None:
-    size = own.shape[1] + leaf.shape[1]
-    seen, inverse, turn = np.empty((8, size), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
-    for t in range(len(near)):
-        close, count = _seen(near[t], start, own, leaf, seen)
-        sx, sy, sz, mx, my, mz, area, depth = seen[0], seen[1], seen[2], seen[3], seen[4], seen[5], seen[6], seen[7]
-        for i in range(first[t], first[t + 1]):
-            x, y, z = points[0, i], points[1, i], points[2, i]
-            for j in range(close):
-                dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
-                height = dx * mx[j] + dy * my[j] + dz * mz[j]
-                back = abs(height) + depth[j]
-                inverse[j] = _ONE / math.sqrt(dx * dx + dy * dy + dz * dz - height * height + back * back)
-                turn[j] = math.copysign(area[j] * back, height)
-            for j in range(close, count):
-                dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
-                inverse[j] = _ONE / math.sqrt(dx * dx + dy * dy + dz * dz)
-                turn[j] = dx * mx[j] + dy * my[j] + dz * mz[j]
-            total = np.float32(0)
-            for j in range(count):
-                total += turn[j] * (inverse[j] * inverse[j] * inverse[j])
-            out[i] = -total * _FOUR_PI
+            out[0, i], out[1, i], out[2, i] = gx * FOUR_PI, gy * FOUR_PI, gz * FOUR_PI
