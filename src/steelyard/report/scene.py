@@ -97,6 +97,8 @@ def _bodies(skins: Sequence[tuple[int, Array, Integers]], cloud: Cloud | None, r
         if number not in kept:
             continue
         v, t = thinned(*compact(vertices, triangles), max(int(share * len(triangles)), 12))
+        if not len(t):
+            continue
         colour = _GREY if rgb is None else np.clip(np.rint(rgb[number]), 0, 255).astype(np.uint8)
         bodies.append(Body(label, v, t, _colours(v, cloud, colour)))
     return tuple(bodies)

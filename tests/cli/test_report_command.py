@@ -1,0 +1,115 @@
+"""`steelyard report`: a page from files, with what they give and no more."""
+
+# ruff: noqa: E501  (the full text of an error stands on one line)
+
+from __future__ import annotations
+
+import json
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from steelyard.cli.main import main
+from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.io import write_result
+from steelyard.io.object_writing import write_object
+from steelyard.io.parts_files import SavedParts, write_parts
+from steelyard.io.ply_files import write_mesh
+from steelyard.io.recording_files import write_recording
+from steelyard.shape.published_surface import published_surface
+from steelyard.simulate import hammer
+from steelyard.simulate.workshop import known_object
+
+
+@pytest.fixture(scope="module")
+def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A result that knows the truth exactly, its log, its mesh, an object folder, and parts.npz of the true object."""
+    made, where = hammer.recording(0), tmp_path_factory.mktemp("report")
+    parts = made.tool.parts.in_frame(made.tool.X_OS.inverse())
+    rows = zip(parts.label, made.tool.masses, parts.volume, parts.centroid, strict=True)
+    weighed = tuple(PartMass(int(k), float(m), 1e-3 * float(m), float(v), c, "steel?") for k, m, v, c in rows)
+    estimate = Estimate(
+        made.truth, 1e-9 * np.eye(10), "part-masses", Evidence(10, 3.0, 100, 50, 0.1, 0.01), np.ones(10, np.bool_),
+        wrench_bias=hammer.BIAS, parts=weighed,
+    )  # fmt: skip
+    write_result(estimate, where / "result.json")
+    write_result(replace(estimate, parts=(), method="OLS"), where / "ols.json")
+    write_recording(made.recording, where)
+    write_mesh(made.tool.mesh, where / "hammer.ply")
+    known = known_object(made.tool)
+    write_object(known, where / "hammer")
+    solid = published_surface(known.cloud)
+    labels = np.digitize(solid.centroids[:, 2], np.quantile(solid.centroids[:, 2], [0.3, 0.7]))
+    write_parts(SavedParts(solid, labels, names=("<b>one</b>", "two", "three")), where / "parts.npz")
+    return where
+
+
+def run(capsys: pytest.CaptureFixture[str], folder: Path, *arguments: str) -> tuple[int, str, str]:
+    """Exit status, standard output, standard error; `@` stands for the folder."""
+    with pytest.raises(SystemExit) as end:
+        main(["report", *(argument.replace("@", f"{folder}/") for argument in arguments)])
+    seen = capsys.readouterr()
+    return int(end.value.code or 0), seen.out, seen.err
+
+
+def test_everything_at_once(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    status, out, err = run(
+        capsys, folder, "@result.json", "--parts", "@hammer.ply", "--log", "@log.toml", "--truth", "@hammer/truth.json",
+        "--rival", "OLS=@ols.json", "--title", "My hammer", "-o", "@out.html", "--json",
+    )  # fmt: skip
+    assert (status, err) == (0, "")
+    page = (folder / "out.html").read_text(encoding="utf-8")
+    assert json.loads(out) == {
+        "report": f"{folder}/out.html", "bytes": len(page.encode()), "parts_drawn": 3, "placed": True,
+    }  # fmt: skip
+    for said in ("My hammer", "What is left over", "Against the truth", "OLS", "head", "grip", "truth 3", "<canvas"):
+        assert said in page, said
+    # The result is exact, so what is left over is the made noise and no more.
+    rms = [float(page.split(f'<b class="{axis}">{axis}</b>')[1].split()[0]) for axis in "xyz"]
+    assert 0 < max(rms) < 1.2 * hammer.FORCE_STD
+
+
+def test_parts_of_a_segmentation_with_a_pose(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    pose = '{ position = [0, 0, 0.12], unit = "m", rotation = [1,0,0, 0,1,0, 0,0,1], form = "matrix" }'
+    status, out, err = run(
+        capsys, folder, "@ols.json", "--parts", "@parts.npz", "--pose-in-sensor", pose, "-o", "@out.html"
+    )
+    assert (status, out) == (0, "")
+    assert err.startswith(f"{folder}/out.html (")
+    page = (folder / "out.html").read_text(encoding="utf-8")
+    assert "&lt;b&gt;one&lt;/b&gt;" in page
+    assert "<b>one" not in page
+
+
+def test_only_the_shape_where_nothing_says_where_it_sits(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    status, _, err = run(capsys, folder, "@ols.json", "--parts", "@parts.npz", "-o", "@out.html")
+    assert status == 0
+    assert err.startswith("Where the object sits in the sensor is not known: only its shape is drawn.")
+
+
+def test_truth_names_only_parts_that_are_the_same(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    changed = json.loads((folder / "result.json").read_text())
+    changed["parts"][0]["volume_m3"] *= 1.5
+    (folder / "other.json").write_text(json.dumps(changed))
+    run(capsys, folder, "@other.json", "--truth", "@hammer/truth.json", "-o", "@out.html")
+    page = (folder / "out.html").read_text(encoding="utf-8")
+    assert "part 0" in page
+    assert "part 1" not in page
+
+
+@pytest.mark.parametrize(
+    ("arguments", "error"),
+    [
+        (("@none.json",), "@none.json: cannot be read (No such file or directory)."),
+        (("@result.json", "--rival", "ols.json"), "--rival needs NAME=FILE, as in --rival OLS=ols.json; got 'ols.json'."),
+        (("@result.json", "--scan", "@c.ply"), "--scan colours the parts that --parts gives: give both, or leave --scan out."),
+        (("@result.json", "--parts", "@result.json"), "@result.json: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."),
+        (("@result.json", "-o", "@no/r.html"), "@no/r.html: cannot be written (No such file or directory)."),
+    ],
+)  # fmt: skip
+def test_wrong_calls(capsys: pytest.CaptureFixture[str], folder: Path, arguments: tuple[str, ...], error: str) -> None:
+    status, out, err = run(capsys, folder, *arguments)
+    assert (status, out) == (2, "")
+    assert err == f"steelyard: {error.replace('@', f'{folder}/')}\n"
