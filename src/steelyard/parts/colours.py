@@ -21,6 +21,7 @@ NEIGHBOURS = 8
 # finest, and a tint apart from another of the same object is above the coarsest.
 FINEST, COARSEST = 0.03, 0.2
 _STEPS = 3.0  # one colour reaches this many median steps between neighbours
+_LEFT = 0.75  # of the noise: what averaging leaves of it is alike in neighbours, and so not seen between them
 _RARE = 0.01  # a colour has at least this share of the points
 _LAMP_SEEN = 0.05  # weaker shading is below the difference of two colours
 _LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
@@ -54,14 +55,14 @@ def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
     if lamp.any():
         colour = colour / (1 + skin.normals @ lamp)[:, None]
         sure = skin.flatness > min(0.95, float(np.median(skin.flatness)))
-    near = near[:, :NEIGHBOURS]
+    raw, near = colour, near[:, :NEIGHBOURS]
     noise = _step(colour, near, sure)
     if noise > FINEST / _STEPS:
         colour = _averaged(colour, near, noise)
-    reach = float(np.clip(_STEPS * _step(colour, near, sure), FINEST, COARSEST))
+    reach = float(np.clip(max(_STEPS * _step(colour, near, sure), _LEFT * noise), FINEST, COARSEST))
     modes = _modes(colour, near, sure, reach)
     label = _assigned(colour, near, sure, modes, reach)
-    label, modes = _without_blends(label, modes, near)
+    label, modes = _without_blends(label, modes, near, raw, max(FINEST, 2 * noise))
     return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise)
 
 
@@ -161,24 +162,32 @@ def _votes(label: Integers, near: Integers, count: int) -> Array:
     return np.bincount(voter * count + votes[votes >= 0], minlength=len(near) * count).reshape(-1, count)
 
 
-def _without_blends(label: Integers, modes: Array, near: Integers) -> tuple[Integers, Array]:
-    """Give the points of colours that only are the mixture of two others, at their border, to the nearer of the two."""
+def _without_blends(
+    label: Integers, modes: Array, near: Integers, colour: Array, plain: float
+) -> tuple[Integers, Array]:
+    """Give the points of colours that are but the mixture of two others beside them to the nearer of the two.
+
+    A mixture is one point wide (a pixel on a border), or runs from the one to the other: a part of its own between the
+    two has colours that scatter less than `plain` along that way.
+    """
     count = len(modes)
-    votes = _votes(label, near, count)
     size = np.bincount(label, minlength=count)
-    for m in np.argsort(size, kind="stable"):
+    for m in np.argsort(size, kind="stable") if count > 2 else ():
         mine = label == m
-        beside = votes[mine].sum(0).astype(np.float64)
-        beside[m] = 0
+        votes = _votes(label, near, count)[mine].astype(np.float64)
+        beside = np.where(np.arange(count) == m, 0, votes.sum(0))
         two = np.argsort(-beside, kind="stable")[:2]
-        if count < 3 or beside[two].sum() < 0.9 * beside.sum() or beside[two].min() < 0.15 * beside.sum():
+        if beside[two].min() < 0.1 * beside.sum() or beside[two].sum() < 0.8 * beside.sum():
             continue
-        a, b = modes[two]
-        along = float((modes[m] - a) @ (b - a) / max((b - a) @ (b - a), 1e-12))
-        off = float(np.linalg.norm(modes[m] - a - along * (b - a)))
-        thin = (votes[mine][:, two].sum(1) > 0).mean() > 0.6
-        if thin and 0.1 < along < 0.9 and off < 0.1 * np.linalg.norm(b - a) and size[m] < size[two].min():
-            label = np.where(mine, two[int(along > 0.5)], label)
-            votes = _votes(label, near, count)
+        a, way = modes[two[0]], modes[two[1]] - modes[two[0]]
+        length = max(float(np.linalg.norm(way)), 1e-12)
+        along = (colour[mine] - a) @ way / length**2
+        off = np.linalg.norm(colour[mine] - a - along[:, None] * way, axis=1)
+        thin = (votes[:, two].sum(1) > 0).mean() > 0.6
+        runs = np.std(along) * length > plain
+        between = 0.1 < np.median(along) < 0.9 and np.median(off) < 0.1 * length
+        if between and (thin or runs) and size[m] < size[two].max():
+            label = label.copy()
+            label[mine] = two[(along > 0.5).astype(np.int64)]
     used, label = np.unique(label, return_inverse=True)
     return label, modes[used]

@@ -13,6 +13,7 @@ from steelyard.shape.mesh import Integers
 
 FLUSH = 0.75  # vector area over area; plates, whose rims count, are flush as well
 SMALL = 0.05  # of the boundary's area: a larger patch is rather a plate, and a part more does less harm than one less
+PART = 0.01  # of the boundary's area: what sticks out and is as large as this is a part
 SPECK = 0.003  # of the boundary's area: three points in a thousand tell nothing
 
 
@@ -27,14 +28,17 @@ def without_prints(label: Integers, skin: Skin) -> Integers:
         area = np.bincount(owner, skin.areas, count)
         vector = np.stack([np.bincount(owner, skin.area_vectors[:, k], count) for k in range(3)], axis=1)
         flush = np.linalg.norm(vector, axis=1) > FLUSH * area
-        print_ = (area < SPECK * total) | (flush & (area < SMALL * total))
+        colour = np.zeros(count, dtype=np.int64)
+        colour[patch] = label
+        speck, print_ = area < SPECK * total, flush & (area < SMALL * total)
+        # A colour that some part has is believed where it lies flush as well.
+        print_ &= ~np.isin(colour, colour[~print_ & (area > PART * total)])
+        print_ |= speck
         print_[area.argmax()] = False
         ends = patch[np.concatenate([skin.edges, skin.edges[:, ::-1]])]
         ends = ends[print_[ends[:, 0]] & ~print_[ends[:, 1]]]
         if not len(ends):
             break
-        colour = np.zeros(count, dtype=np.int64)
-        colour[patch] = label
         votes = np.zeros((count, int(label.max()) + 1))
         np.add.at(votes, (ends[:, 0], colour[ends[:, 1]]), 1)
         asked = votes.any(1)

@@ -24,12 +24,12 @@ from steelyard.shape.hull import TOLERANCE, hull_volume, hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
-STRAIGHT, CREASED = 0.1, 0.4  # mean turn [rad] across a border that is no seam, and that is one
+STRAIGHT, CREASED = 0.04, 0.25  # mean turn [rad] across a border that is no seam, and that is one
 NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cube cut in half has 1.6
 PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part
+FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surface are worth a part of their own
 _SIZE = 0.02  # small clusters first (as in clustering.Hollow)
-_ACROSS = 100.0  # colours are joined after everything else
-_TOUCHING, _APART = 1, 0
+_STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
 # Columns of the table of contacts between two clusters.
 _AREA, _VECTOR, _LENGTH, _TURN = 0, 1, 4, 10  # scalar, 3, 6 and 6 numbers
 _WIDTH = 16
@@ -64,7 +64,16 @@ def seam_tree(
     share = np.bincount(piece[skin.cell], skin.areas, count) / max(float(skin.areas.sum()), 1e-300)
     volume = np.bincount(piece, mesh.volumes, count) / mesh.volume
     merges, cost, seam, node_volume, hull, faults = _merge(
-        xyz, start, member.astype(np.int64), volume, share, colour.astype(np.int64), contact, touch, TOLERANCE * 10
+        xyz,
+        start,
+        member.astype(np.int64),
+        volume,
+        share,
+        colour.astype(np.int64),
+        contact,
+        touch,
+        TOLERANCE * 10,
+        (STRAIGHT, CREASED, NECK, FLANK),
     )
     if faults:
         raise BadValue(f"{faults} convex hulls of this solid came out open; report it with the mesh.")
@@ -120,12 +129,13 @@ def _join_by_corners(mesh: TetMesh, piece: Integers, touch: Any) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _support(row: Any, smaller: float) -> float:
+def _support(row: Any, smaller: float, limits: tuple[float, float, float, float]) -> float:
     """Return how much of a seam, 0..1, the contact `row` (16,) is: creased around, a neck of the smaller cluster."""
+    straight_most, creased, neck_most, flank = limits
     area, length = row[_AREA], row[_LENGTH] + row[_LENGTH + 1] + row[_LENGTH + 2]
     if area <= 0 or length <= 0:
         return 0.0
-    neck = (FLANK - area / smaller ** (2 / 3)) / (FLANK - NECK)
+    neck = (flank - area / smaller ** (2 / 3)) / (flank - neck_most)
     if neck <= 0:
         return 0.0
     x, y, z = row[_VECTOR] / area, row[_VECTOR + 1] / area, row[_VECTOR + 2] / area
@@ -145,16 +155,57 @@ def _support(row: Any, smaller: float) -> float:
             turn = mixed
         else:
             over = mixed
-    crease = (turn / max(over, 1e-3 * length) - STRAIGHT) / (CREASED - STRAIGHT)
+    crease = (turn / max(over, 1e-3 * length) - straight_most) / (creased - straight_most)
     return min(max(crease, 0.0), 1.0) * min(neck, 1.0)
+
+
+@numba.njit(cache=True, nogil=True)
+def _joined(clusters: tuple[int, int], pool: Any, offset: Any, length: Any, mark: Any, stamp: int, rows: Any) -> int:
+    """Write the hull vertices of two clusters into `rows`, each once; return how many."""
+    count = 0
+    for c in clusters:
+        for k in range(offset[c], offset[c] + length[c]):
+            v = pool[k]
+            if mark[v] != stamp:
+                mark[v] = stamp
+                rows[count] = v
+                count += 1
+    return count
+
+
+@numba.njit(cache=True, nogil=True)
+def _price(hull: float, support: float, va: float, vb: float, paint: float, stage: int) -> tuple[float, float]:
+    """Return what orders a merge, and its seam: what a part that holds both sides costs.
+
+    stage  0 one colour and touching, 1 one colour and apart, 2 two colours
+    """
+    if stage == 1:
+        return _STAGE + paint / FAR, paint / FAR
+    hollow = max(0.0, hull - va - vb)
+    seam = hollow * support
+    price = hollow * (0.1 + support) + _SIZE * (va + vb)
+    return (price, seam) if stage == 0 else (2 * _STAGE + price + paint, seam + paint)
+
+
+@numba.njit(cache=True, nogil=True)
+def _best_partner(a: int, price: Array, alive: Any) -> int:
+    """Return the row above `a` of the least price, -1 where there is none."""
+    best = -1
+    for b in range(a + 1, len(alive)):
+        if alive[b] and price[a, b] < np.inf and (best < 0 or price[a, b] < price[a, best]):
+            best = b
+    return best
 
 
 @numba.njit(cache=True, nogil=True)
 def _merge(
     xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_share: Array, leaf_colour: Any, contact: Any,
-    touch: Any, tolerance: float,
+    touch: Any, tolerance: float, limits: tuple[float, float, float, float],
 ) -> tuple[Any, Array, Array, Array, Array, int]:  # fmt: skip
-    """Return merges, cost, seam, volume and hull of every node, and faults. Clusters live in the rows of `contact`."""
+    """Return merges, cost, seam, volume and hull of every node, and faults. Clusters live in the rows of `contact`.
+
+    Hulls only grow: a pair is priced by the larger of the hulls known to lie in its union until it is the cheapest.
+    """
     n = len(leaf_volume)
     merges = np.empty((n - 1, 2), np.int64)
     cost, seam = np.empty(n - 1), np.empty(n - 1)
@@ -162,15 +213,13 @@ def _merge(
     volume, share, colour = leaf_volume.copy(), leaf_share.copy(), leaf_colour.copy()
     node, alive = np.arange(n), np.ones(n, np.bool_)
     hull = np.empty(n)
-    pool = np.empty(len(member) + 4 * n * 64, np.int64)
+    pool = np.empty(len(member) + 64 * n, np.int64)
     offset, length = np.empty(n, np.int64), np.empty(n, np.int64)
-    filled, faults = 0, 0
-    rows = np.empty(len(xyz), np.int64)
-    mark, stamp = np.full(len(xyz), -1, np.int64), 0
+    filled, faults, stamp = 0, 0, 0
+    rows, mark = np.empty(len(xyz), np.int64), np.full(len(xyz), -1, np.int64)
     work = hull_work(len(xyz))
     for k in range(n):
-        count = start[k + 1] - start[k]
-        hull[k], kept = hull_volume(xyz, member[start[k] :], count, tolerance, work)
+        hull[k], kept = hull_volume(xyz, member[start[k] :], start[k + 1] - start[k], tolerance, work)
         if kept < 0:
             faults, kept, hull[k] = faults + 1, 0, volume[k]
         offset[k], length[k] = filled, kept
@@ -178,58 +227,61 @@ def _merge(
             pool[filled + i] = work.point[i, 2]
         filled += kept
         node_volume[k], node_hull[k] = volume[k], hull[k]
-    price, worth, union = np.full((n, n), np.inf), np.zeros((n, n)), np.zeros((n, n))
-    best = np.full(n, -1, np.int64)  # cheapest partner with a higher row
-    fresh = np.ones(n, np.bool_)
+    known, exact = np.zeros((n, n)), np.zeros((n, n), np.bool_)
+    price, best = np.full((n, n), np.inf), np.full(n, -1, np.int64)
+    changed = np.ones(n, np.bool_)
     made = 0
     while made < n - 1:
-        # Price every touching pair with a new cluster in it.
         for a in range(n):
             if not alive[a]:
                 continue
             for b in range(a + 1, n):
-                if alive[b] and touch[a, b] and (fresh[a] or fresh[b]):
-                    stamp += 1
-                    count = 0
-                    for c in (a, b):
-                        for k in range(offset[c], offset[c] + length[c]):
-                            v = pool[k]
-                            if mark[v] != stamp:
-                                mark[v] = stamp
-                                rows[count] = v
-                                count += 1
-                    h, kept = hull_volume(xyz, rows, count, tolerance, work)
-                    if kept < 0:
-                        faults, h = faults + 1, max(hull[a], hull[b])
-                    union[a, b] = h
-                    hollow = max(0.0, h - volume[a] - volume[b])
-                    support = _support(contact[a, b], min(volume[a], volume[b]))
-                    worth[a, b] = hollow * support
-                    price[a, b] = hollow * (0.1 + support) + _SIZE * (volume[a] + volume[b])
-                    if colour[a] != colour[b] or colour[a] < 0:
-                        paint = PAINT * min(share[a], share[b])
-                        worth[a, b] += paint
-                        price[a, b] += _ACROSS + paint
+                if not alive[b] or not (changed[a] or changed[b]):
+                    continue
+                stage = 2 if colour[a] != colour[b] or colour[a] < 0 else (0 if touch[a, b] else 1)
+                if stage == 2 and not touch[a, b]:
+                    price[a, b] = np.inf
+                    continue
+                exact[a, b] = stage == 1
+                known[a, b] = max(known[a, b], hull[a], hull[b])
+                support = _support(contact[a, b], min(volume[a], volume[b]), limits)
+                paint = PAINT * min(share[a], share[b])
+                price[a, b] = _price(known[a, b], support, volume[a], volume[b], paint, stage)[0]
         for a in range(n):
-            if alive[a] and (fresh[a] or best[a] < 0 or not alive[best[a]] or fresh[best[a]]):
-                best[a] = -1
-                for b in range(a + 1, n):
-                    if alive[b] and price[a, b] < np.inf and (best[a] < 0 or price[a, b] < price[a, best[a]]):
-                        best[a] = b
-            elif alive[a]:
-                for b in range(a + 1, n):
-                    if alive[b] and fresh[b] and price[a, b] < price[a, best[a]]:
-                        best[a] = b
-        p = -1
-        for a in range(n):
-            if alive[a] and best[a] >= 0 and (p < 0 or price[a, best[a]] < price[p, best[p]]):
-                p = a
-        fresh[:] = False
-        if p >= 0:
+            if alive[a]:
+                if changed[a] or best[a] < 0 or not alive[best[a]] or changed[best[a]]:
+                    best[a] = _best_partner(a, price, alive)
+                else:
+                    for b in range(a + 1, n):
+                        if alive[b] and changed[b] and price[a, b] < price[a, best[a]]:
+                            best[a] = b
+        changed[:] = False
+        p, q, kept = -1, -1, -1
+        while True:
+            p = -1
+            for a in range(n):
+                if alive[a] and best[a] >= 0 and (p < 0 or price[a, best[a]] < price[p, best[p]]):
+                    p = a
+            if p < 0:
+                break
             q = best[p]
-            cost[made], seam[made] = price[p, q], worth[p, q]
-        else:  # separate bodies: the two smallest
-            p, q = -1, -1
+            if exact[p, q]:
+                break
+            stamp += 1
+            count = _joined((p, q), pool, offset, length, mark, stamp, rows)
+            h, kept = hull_volume(xyz, rows, count, tolerance, work)
+            if kept >= 0:
+                known[p, q] = h
+            else:
+                faults += 1
+            exact[p, q] = True
+            stage = 0 if colour[p] == colour[q] and colour[p] >= 0 else 2
+            support = _support(contact[p, q], min(volume[p], volume[q]), limits)
+            paint = PAINT * min(share[p], share[q])
+            price[p, q] = _price(known[p, q], support, volume[p], volume[q], paint, stage)[0]
+            best[p] = _best_partner(p, price, alive)
+        apart = p < 0
+        if apart:  # bodies of different colours that do not touch: the two smallest
             for a in range(n):
                 if alive[a]:
                     if p < 0 or volume[a] < volume[p]:
@@ -237,24 +289,20 @@ def _merge(
                     elif q < 0 or volume[a] < volume[q]:
                         q = a
             p, q = min(p, q), max(p, q)
-            cost[made] = np.inf
         stamp += 1
-        count = 0
-        for c in (p, q):
-            for k in range(offset[c], offset[c] + length[c]):
-                v = pool[k]
-                if mark[v] != stamp:
-                    mark[v] = stamp
-                    rows[count] = v
-                    count += 1
+        count = _joined((p, q), pool, offset, length, mark, stamp, rows)
         h, kept = hull_volume(xyz, rows, count, tolerance, work)
         if kept < 0:
             faults, kept, h = faults + 1, count, max(hull[p], hull[q])
             for i in range(count):
                 work.point[i, 2] = rows[i]
-        if cost[made] == np.inf:
-            # Nothing is better evidence of two parts than a gap.
-            seam[made] = max(0.0, h - volume[p] - volume[q]) + PAINT * min(share[p], share[q])
+        paint = PAINT * min(share[p], share[q])
+        if apart:
+            cost[made], seam[made] = np.inf, paint + max(0.0, h - volume[p] - volume[q])
+        else:
+            stage = 2 if colour[p] != colour[q] or colour[p] < 0 else (0 if touch[p, q] else 1)
+            support = _support(contact[p, q], min(volume[p], volume[q]), limits)
+            cost[made], seam[made] = _price(h, support, volume[p], volume[q], paint, stage)
         if filled + kept > len(pool):
             larger = np.empty(2 * (filled + kept), np.int64)
             larger[:filled] = pool[:filled]
@@ -277,7 +325,9 @@ def _merge(
                     contact[p, c, k] += contact[q, c, k]
                     contact[c, p, k] += contact[c, q, k]
                 touch[p, c] = touch[c, p] = touch[p, c] or touch[q, c]
-                price[min(p, c), max(p, c)] = np.inf
-        fresh[p] = True
+                low, high = min(p, c), max(p, c)
+                known[low, high] = max(known[low, high], known[min(q, c), max(q, c)])
+                price[low, high] = np.inf
+        changed[p] = True
         made += 1
     return merges, cost, seam, node_volume, node_hull, faults

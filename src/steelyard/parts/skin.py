@@ -12,6 +12,8 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross
 
+SMOOTH = 0.5  # weight of a neighbour's normal beside the vertex's own
+
 
 @dataclass(frozen=True, eq=False)
 class Skin:
@@ -67,6 +69,17 @@ class Skin:
         return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
 
     @cached_property
+    def smooth_normals(self) -> Array:
+        """Normals (V, 3) averaged over each vertex and its neighbours on the boundary."""
+        total = self._vertex_sums[0]
+        i, j = self.edges.T
+        around = [
+            np.bincount(i, total[j, k], len(total)) + np.bincount(j, total[i, k], len(total)) for k in range(3)
+        ]
+        total = total + SMOOTH * np.stack(around, axis=1)
+        return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
+
+    @cached_property
     def flatness(self) -> Array:
         """How much the triangles at each vertex (V,) agree: 1 = one plane, small at edges and tips, 0 inside."""
         total, area = self._vertex_sums
@@ -85,7 +98,7 @@ class Skin:
         It is the change of the normals at the two apexes along the way between them, so that it spans three edges:
         single dihedral angles of a surface through scattered points are mostly noise.
         """
-        normals = self.normals
+        normals = self.smooth_normals
         change = normals[self.apex[:, 1]] - normals[self.apex[:, 0]]
         return np.asarray(-(change * self.across).sum(1))
 
