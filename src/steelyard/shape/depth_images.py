@@ -297,3 +297,42 @@ def seen_past(
                 if out[i] >= enough:
                     break
     return out
+
+
+@numba.njit(cache=True, nogil=True)
+def feet(
+    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, step: float, levels: int, noise: float
+) -> Any:
+    """Return how high above the table (z = 0) walls end (N,) [m]: 0 where they reach it.
+
+    xyz     (N, 3) points of walls; normal (N, 3) level unit vectors out of them
+
+    Down the wall, sight lines that still end on it are told from those that pass under it and end on the table, by
+    least squares over all views that face it.
+    """
+    rows = np.empty((MOST_VIEWS, 6))
+    out = np.zeros(len(xyz))
+    x = np.empty(3)
+    for i in range(len(xyz)):
+        for level in range(1, levels + 1):
+            x[0], x[1], x[2] = xyz[i, 0], xyz[i, 1], level * step
+            found = looked(depth, unit, camera, R, p, x, normal[i], 2 * step, noise, rows)
+            product, square, error = 0.0, 0.0, 0.0
+            for r in range(found):
+                k = int(rows[r, 0])
+                away = x - p[k]
+                # where the sight line meets the table, behind the wall
+                behind = (away * normal[i]).sum() * x[2] / (p[k, 2] - x[2])
+                sigma = noise * (away * away).sum() * rows[r, 4]
+                if behind > 0 or rows[r, 3] < 1.5 * behind - 4 * sigma:
+                    continue
+                product += rows[r, 3] * behind / sigma**2
+                square += behind * behind / sigma**2
+                error += 1
+            if error < 3 or square < 25.0:  # the two cannot be told apart yet: five standard deviations
+                continue
+            if product > 0.5 * square:
+                out[i] = x[2]
+            else:
+                break
+    return out

@@ -33,7 +33,8 @@ _LEAST_VIEWS = 3
 _POSE_STD = (0.005, np.radians(1.0))  # how far reported poses may be off
 _WINDOW = 0.002
 _DISAGREE = 1.3
-_SLOPE = 0.5  # of the lowest sight lines
+_WALL = 0.5  # a normal less upright than this belongs to a wall
+_FOOT, _HIGHEST_FOOT = 0.0005, 0.008
 _CELLS = 8000  # of the grid under the object, about
 
 
@@ -281,9 +282,35 @@ def _underside(scene: _Scene, xyz: Array, normal: Array, pitch: float) -> Unders
     table = np.zeros(size, bool)
     table[i, j] = (support[:, 0] + support[:, 1] >= _LEAST_VIEWS) & (settled[:, 2] < 0.3 * scene.sigma)
     empty_to = np.full(size, np.inf)
-    away = _SLOPE * pitch * ndimage.distance_transform_edt(table | ~np.isfinite(top))
+    sight = _lowest_sight(scene)
+    away = sight * pitch * ndimage.distance_transform_edt(table | ~np.isfinite(top))
     empty_to[i, j] = _empty_to(scene, foot, table[i, j], top[i, j], pitch, away[i, j])
-    return underside(xyz, normal, low, pitch, empty_to, table, top)
+    _raise_to_feet(scene, xyz, normal, low, pitch, empty_to, top)
+    return underside(xyz, normal, low, pitch, empty_to, top, sight)
+
+
+def _raise_to_feet(scene: _Scene, xyz: Array, normal: Array, low: Array, pitch: float, empty_to: Array, top: Array) -> None:
+    """Raise the empty height of the outermost columns under the object to where the walls over them end."""
+    under = np.isfinite(empty_to) & (empty_to < top)
+    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    wall = np.abs(normal[:, 2]) < _WALL
+    i, j = np.nonzero(rim)
+    at = low + pitch * (np.stack([i, j], axis=1) + 0.5)
+    if not len(i) or not wall.any():
+        return
+    away, nearest = cKDTree(xyz[wall, :2]).query(at, distance_upper_bound=2 * pitch)
+    has = np.isfinite(away)
+    i, j, nearest = i[has], j[has], nearest[has]
+    level = normal[wall][nearest].copy()
+    level[:, 2] = 0
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    foot = images.feet(*scene.images(), xyz[wall][nearest].copy(), level, _FOOT, int(_HIGHEST_FOOT / _FOOT), scene.noise)
+    empty_to[i, j] = np.maximum(empty_to[i, j], np.minimum(foot, top[i, j] - 1e-6))
+
+
+def _lowest_sight(scene: _Scene) -> float:
+    """Return the slope of the lowest sight lines to the object, a tenth of the views being lower."""
+    return float(np.percentile(scene.p[:, 2] / np.linalg.norm(scene.p[:, :2], axis=1), 10))
 
 
 def _empty_to(scene: _Scene, foot: Array, table_seen: Any, top: Array, step: float, near: Array) -> Array:

@@ -1,8 +1,8 @@
-"""The side that lies on the table: closed where the object comes down to it, spanned flat where it does not.
+"""The side that lies on the table: closed at the table where the object comes down to it, and flat where it does not.
 
-The paper projects the whole cloud on the table. Here a column of space under the object is closed at the table only
-where nothing shows that there is a gap; a part that stands off the table is closed at the height where its seen sides
-end, and never below space that some view saw to be empty.
+The paper projects the whole cloud on the table. Here the space over each spot of the table counts as the object's only
+as far down as no view saw it to be empty. Under a part that stands off the table that leaves a wedge which no sight
+line reached, as steep as the lowest sight line: there the underside goes on flat from where it was last seen.
 Source: "The Sum of Its Parts", section V-A; we differ as said.
 """
 
@@ -19,7 +19,7 @@ from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 
 _DOWNWARD = -0.35  # a normal that points down by more than this belongs to an underside that was seen
-_CONTACT = 3.0  # a side that ends within this many grid widths of the table, no gap seen, stands on it
+_STEEPER = 1.3  # than the lowest sight line: a slope that is the object's own, not the edge of what was seen
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,9 +39,10 @@ class Underside:
 
     def points(self) -> tuple[Array, Array]:
         """Return points (N, 3) that close the underside, in the table's frame, and their normals (N, 3)."""
-        i, j = np.nonzero(np.isfinite(self.height) & ~self.seen)
-        filled = np.where(np.isfinite(self.height), self.height, np.nan)
-        slope = np.stack([_slope(filled, 0), _slope(filled, 1)])[:, i, j] / self.pitch
+        under = np.isfinite(self.height)
+        i, j = np.nonzero(under & ~self.seen)
+        filled = np.where(under, self.height, np.nan)
+        slope = np.stack([_slope(filled, 0)[i, j], _slope(filled, 1)[i, j]]) / self.pitch
         normal = np.stack([slope[0], slope[1], -np.ones(len(i))], axis=1)
         normal /= np.linalg.norm(normal, axis=1, keepdims=True)
         xy = self.low + self.pitch * (np.stack([i, j], axis=1) + 0.5)
@@ -58,85 +59,83 @@ class Underside:
 
 def _slope(height: Array, axis: int) -> Array:
     """Return half the difference of the neighbours along an axis, 0 where one has no height."""
-    after, before = np.roll(height, -1, axis), np.roll(height, 1, axis)
-    return np.nan_to_num((after - before) / 2)
+    return np.asarray(np.nan_to_num((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / 2))
 
 
 def underside(
-    xyz: Array, normal: Array, low: Array, pitch: float, empty_to: Array, table_seen: Any, top: Array
+    xyz: Array, normal: Array, low: Array, pitch: float, empty_to: Array, top: Array, sight: float
 ) -> Underside:
     """Return where the object begins above the table.
 
     xyz, normal  (N, 3) the seen surface, in the table's frame
     low, pitch   the grid
     empty_to     (I, J) height up to which each column was seen to be empty [m], inf if up to the top
-    table_seen   (I, J) whether the table itself was seen there
     top          (I, J) highest seen surface in the column, -inf without
+    sight        slope of the lowest sight lines
     """
     under = np.isfinite(empty_to) & (empty_to < top)
     cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
-    down = normal[:, 2] < _DOWNWARD
-    seen = np.isfinite(_mean(cell[down], xyz[down, 2], under.shape)) & under
-    out = ndimage.median_filter(np.where(under, empty_to, top), 3, mode='nearest')
-    return Underside(low, pitch, np.where(under, out, np.inf), seen)
+    down = cell[normal[:, 2] < _DOWNWARD]
+    seen = np.zeros(under.shape, np.bool_)
+    down = down[((down >= 0) & (down < under.shape)).all(1)]
+    seen[down[:, 0], down[:, 1]] = True
+    height = np.where(under, empty_to, 0.0)
+    smooth = _smooth(ndimage.median_filter(height, 3), under)
+    steep = under & (_steepness(smooth, under) / pitch > _STEEPER * sight)
+    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    bare = rim & ~steep
+    height = np.where(bare, _median_along(height, rim), height)
+    span = _spanned(height, rim | steep, under)
+    return Underside(low, pitch, np.where(under, np.clip(span, 0.0, np.where(under, top, 0.0)), np.inf), seen & under)
 
 
-def _lowest(cell: Integers, height: Array, shape: tuple[int, ...]) -> Array:
-    """Return the lowest height in each cell of a grid, inf where there is none."""
-    out = np.full(shape, np.inf)
-    inside = ((cell >= 0) & (cell < shape)).all(1)
-    np.minimum.at(out, (cell[inside, 0], cell[inside, 1]), height[inside])
-    return out
+def _median_along(height: Array, rim: Any) -> Array:
+    """Return for each cell the median height of the cells of the rim within two cells of it, 0 without any."""
+    padded = np.pad(np.where(rim, height, np.nan), 2, constant_values=np.nan)
+    i, j = height.shape
+    near = np.sort(np.stack([padded[a : a + i, b : b + j] for a in range(5) for b in range(5)]), axis=0)
+    middle = np.maximum(np.isfinite(near).sum(0) - 1, 0) // 2
+    return np.nan_to_num(np.take_along_axis(near, middle[None], axis=0)[0])
 
 
-def _mean(cell: Integers, height: Array, shape: tuple[int, ...]) -> Array:
-    """Return the mean height in each cell of a grid, inf where there is none."""
-    inside = ((cell >= 0) & (cell < shape)).all(1)
-    place = np.ravel_multi_index(tuple(cell[inside].T), shape)
-    count = np.bincount(place, minlength=shape[0] * shape[1])
-    total = np.bincount(place, height[inside], shape[0] * shape[1])
-    return np.where(count > 0, total / np.maximum(count, 1), np.inf).reshape(shape)
+def _smooth(height: Array, under: Any) -> Array:
+    """Return heights averaged with their neighbours under the object."""
+    weight = ndimage.gaussian_filter(under.astype(float), 1.0)
+    return np.asarray(ndimage.gaussian_filter(np.where(under, height, 0.0), 1.0) / np.maximum(weight, 1e-9))
 
 
-def _shifted(values: Array, fill: float) -> Array:
-    """Return the nine neighbours (9, I, J) of each cell, itself among them."""
-    padded = np.pad(values, 1, constant_values=fill)
-    i, j = values.shape
-    return np.stack([padded[a : a + i, b : b + j] for a in range(3) for b in range(3)])
-
-
-def _spread_minimum(values: Array) -> Array:
-    return np.asarray(_shifted(values, np.inf).min(0))
-
-
-def _eroded(mask: Any) -> Any:
-    return _shifted(mask, False).all(0)
-
-
-def _grown(mask: Any) -> Any:
-    return _shifted(mask, False).any(0)
+def _steepness(height: Array, under: Any) -> Array:
+    """Return the largest rise from a cell to those of its neighbours that lie under the object too, per cell width."""
+    out = np.zeros(height.shape)
+    for axis in (0, 1):
+        total, count = np.zeros(height.shape), np.zeros(height.shape)
+        for step in (-1, 1):
+            there = np.roll(under, step, axis) & under
+            total += np.where(there, step * (height - np.roll(height, step, axis)), 0.0)
+            count += there
+        out += (total / np.maximum(count, 1)) ** 2
+    return np.sqrt(out)
 
 
 def _spanned(height: Array, fixed: Any, under: Any) -> Array:
-    """Return heights under the object that bend as little as can be, `fixed` cells kept (a thin plate).
-
-    Where a band of the underside was seen its slope goes on smoothly; from a bare rim the plate hangs flat.
-    """
+    """Return heights under the object that are the mean of their neighbours', `fixed` cells kept (Laplace)."""
     free = under & ~fixed
-    out = np.where(under, height, np.nan)
+    out = np.where(under, height, 0.0)
     if not free.any():
         return out
     number = np.full(under.shape, -1)
-    number[under] = np.arange(under.sum())
-    inner = under & np.stack([np.roll(under, step, axis) for axis in (0, 1) for step in (-1, 1)]).all(0)
-    inner[[0, -1]] = inner[:, [0, -1]] = False
-    i, j = np.nonzero(inner & (free | _grown(free)))
-    near = [number[i, j], number[i - 1, j], number[i + 1, j], number[i, j - 1], number[i, j + 1]]
-    row = np.tile(np.arange(len(i)), 5)
-    weight = np.repeat([4.0, -1.0, -1.0, -1.0, -1.0], len(i))
-    bend = sparse.csc_matrix((weight, (row, np.concatenate(near))), (len(i), int(under.sum())))
-    known, unknown = number[fixed & under], number[free]
-    A = bend[:, unknown]
-    load = A.T @ (bend[:, known] @ height[fixed & under])
-    out[free] = spsolve((A.T @ A + 1e-9 * sparse.identity(len(unknown))).tocsc(), -load)
+    number[free] = np.arange(free.sum())
+    i, j = np.nonzero(free)
+    rows, columns, load, degree = [], [], np.zeros(len(i)), np.zeros(len(i))
+    for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
+        inside = under[a, b]
+        degree += inside
+        near: Integers = number[a, b]
+        rows.append(np.flatnonzero(near >= 0))
+        columns.append(near[near >= 0])
+        load += np.where(inside & (near < 0), out[a, b], 0.0)
+    row, column = np.concatenate(rows), np.concatenate(columns)
+    size = (len(i), len(i))
+    matrix = sparse.diags(degree) - sparse.csc_matrix((np.ones(len(row)), (row, column)), size)
+    out[free] = spsolve(matrix.tocsc(), load)
     return out

@@ -19,7 +19,7 @@ from steelyard.spatial import Pose, Rotation
 _TABLE = (171, 152, 124)
 _TABLE_REACH = 0.6  # half the edge of the square table [m]
 _CLOSEST = 0.28  # the camera measures no depth nearer than this [m]
-_FILL = 1.15  # distance of the camera in diagonals of the object, so that all of it fits
+_FILL = 0.85  # distance of the camera in diagonals of the object, so that all of it fits
 _LAMP = np.array([0.25, -0.35, 0.9])
 _AMBIENT = 0.75
 _JUMP = 0.01  # depth step, as a part of the depth, that stereo matching stumbles over
