@@ -34,12 +34,16 @@ class TeamTruth:
     grasps   X_RG (N,) of every grasp in the reference grasp R, by the order of the log's robots, before any slip
     body     ten parameters in R (of all bodies, where a hinge stands at zero)
     late_s   (N,) by how much each robot's stamps are late
+    homes    X_WH (N,) of the robots' home frames; robots do not know them
+    payload  X_RC of the frame that the simulated motion is given in, at rest W
     holds    (T, N) which robots hold the payload in the rows of the motion recording
     shrunk   by how much the motions were made smaller to fit the workspaces
     """
 
     grasps: Pose
     body: InertialParameters
+    homes: Pose
+    payload: Pose
     late_s: Array
     holds: Mask
     shrunk: Mapping[str, float]
@@ -80,13 +84,19 @@ def simulate_team(scene: TeamScene, seed: int, reference: int = 0) -> TeamTrial:
         if scene.bias_per == "recording" and number:
             session = [draw_calibration(noisy, scene.noise) for _ in range(scene.robots)]
         view = View(scene, plan, payload, squeeze, {})
-        made = [record(noisy, view, homes[i], i, session[i], start) for i in range(scene.robots)]
-        tracks = {f"robot{i}": track for i, (track, _) in enumerate(made)}
-        recordings.append(TeamRecording(cast(Kind, plan.kind), tracks, f"{plan.kind}-{number}"))
-        joints.append({f"robot{i}": record for i, (_, record) in enumerate(made) if record is not None})
+        away = [e.robot for e in scene.presence if e.new and plan.kind != "motion"]
+        made = {
+            f"robot{i}": record(noisy, view, homes[i], i, session[i], start)
+            for i in range(scene.robots)
+            if i not in away
+        }
+        tracks = {name: track for name, (track, _) in made.items()}
+        absent = frozenset(f"robot{i}" for i in away)
+        recordings.append(TeamRecording(cast(Kind, plan.kind), tracks, f"{plan.kind}-{number}", absent))
+        joints.append({name: logged for name, (_, logged) in made.items() if logged is not None})
         start += float(plan.time[-1] - plan.time[0]) + _PAUSE_S
     log = TeamLog(_robots(scene), tuple(recordings), f"robot{reference}")
-    return TeamTrial(log, _truth(scene, payload, reference, holds, shrunk), tuple(joints))
+    return TeamTrial(log, _truth(scene, payload, homes, reference, holds, shrunk), tuple(joints))
 
 
 def _robots(scene: TeamScene) -> tuple[TeamRobot, ...]:
@@ -96,7 +106,7 @@ def _robots(scene: TeamScene) -> tuple[TeamRobot, ...]:
 
 
 def _truth(
-    scene: TeamScene, payload: TeamPayload, reference: int, holds: Mask, shrunk: Mapping[str, float]
+    scene: TeamScene, payload: TeamPayload, homes: Pose, reference: int, holds: Mask, shrunk: Mapping[str, float]
 ) -> TeamTruth:
     back = payload.grasps[reference].inverse()
     body = payload.body
@@ -104,7 +114,7 @@ def _truth(
         hinge = scene.hinge
         body = body + InertialParameters.from_com(hinge.mass, hinge.centre, np.diag(hinge.moments))
     late = np.array([scene.late_s.get(i, 0.0) for i in range(scene.robots)])
-    return TeamTruth(back @ payload.grasps, body.in_frame(back), late, holds, shrunk)
+    return TeamTruth(back @ payload.grasps, body.in_frame(back), homes, back, late, holds, shrunk)
 
 
 def _homes(rng: np.random.Generator, payload: TeamPayload) -> Pose:

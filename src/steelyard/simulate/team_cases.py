@@ -88,13 +88,15 @@ class Slip:
 class Presence:
     """A robot that carries only between `joins` and `leaves` [s] after the first sample of the motion recording.
 
-    Before it joins and after it leaves it stands still, beginning and ending within `pause` [s].
+    Before it joins and after it leaves it stands still, beginning and ending within `pause` [s]. In other recordings
+    it carries like the others, unless it is `new`: then it has no data there and is said to be away.
     """
 
     robot: int
     joins: float = -np.inf
     leaves: float = np.inf
     pause: float = 0.5
+    new: bool = False
 
 
 @dataclass(frozen=True, eq=False)

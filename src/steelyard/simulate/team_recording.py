@@ -43,9 +43,8 @@ def presence(scene: TeamScene, plan: Plan) -> Mask:
     for event in scene.presence:
         if plan.kind == "motion":
             holds[:, event.robot] = (plan.time >= event.joins) & (plan.time < event.leaves)
-        elif plan.kind == "still" or np.isfinite(event.joins):
-            # Still poses come before the motion: a robot that joins later is not there yet.
-            holds[:, event.robot] = not np.isfinite(event.joins)
+        elif event.new:
+            holds[:, event.robot] = False
     return holds
 
 

@@ -4,14 +4,15 @@ The unknowns are the N - 1 poses in the reference grasp, so that every closed lo
 whatever weight it would have been given; the cost is the weighted sum of squares of all N (N - 1) / 2 pairs. It depends
 on the twists through their second moments only.
 Source: "Cooperative Payload Estimation by a Team of Mocobots", III-B2, which minimises pairs and loops by BFGS and
-gives no weights; here every residual is weighed by the inverse variance that the star of pairs leaves.
+gives no weights; here every residual is weighed by the inverse variance that the star of pairs leaves, and each pair counts
+as seen from both of its grasps, so that the answer does not depend on the order of the robots.
 """
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
 
@@ -40,7 +41,7 @@ _BRACKETS = _brackets()
 
 @dataclass(frozen=True, eq=False)
 class _Moments:
-    """Second moments (P, 6, 6) of the twists of each pair (i, j), over the rows that both measured."""
+    """Second moments (P, 6, 6) of the twists of each ordered pair (i, j), over the rows that both measured."""
 
     first: np.ndarray[tuple[int], np.dtype[np.int64]]
     second: np.ndarray[tuple[int], np.dtype[np.int64]]
@@ -50,7 +51,7 @@ class _Moments:
 
     @classmethod
     def of(cls, twists: Array, measured: Mask) -> _Moments:
-        pairs = np.array(list(combinations(range(len(twists)), 2)), np.int64)
+        pairs = np.array(list(permutations(range(len(twists)), 2)), np.int64)
         seen = [measured[i] & measured[j] for i, j in pairs]
         rows = [(twists[i, m], twists[j, m]) for (i, j), m in zip(pairs, seen, strict=True)]
         return cls(
