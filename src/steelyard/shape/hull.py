@@ -1,9 +1,10 @@
 """Volume of the convex hull of points: a compiled quickhull for inner loops, SciPy's Qhull where it gives up.
 
 A point is added where it lies more than a tolerance above a face; which faces it sees is then decided by the exact sign
-of a determinant: double precision with an error bound, and double-double arithmetic where that cannot tell. So the
-surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points within the
-tolerance of the hull are left out. The topology is checked all the same: a fault is reported, never a wrong volume.
+of a determinant: in double precision with an error bound, in double-double where that cannot tell, and last without any
+rounding. So the surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points
+within the tolerance of the hull are left out. Its topology is checked all the same: a fault is reported, never a wrong
+volume.
 
 Source: Barber, Dobkin, Huhdanpaa 1996, "The Quickhull algorithm for convex hulls" (outside sets, farthest point first);
 Shewchuk 1997, "Adaptive precision floating-point arithmetic" (error bounds, exact differences and products).
@@ -22,13 +23,12 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import Integers
 
-# Of the extent: nearer to the hull, a point is on it. Rounding of turned, coplanar points is a thousandth of this.
+# Of the extent: nearer to the hull, a point is on it. Rounding of turned, coplanar points is a thousandth.
 TOLERANCE = 1e-13
-# Of the product of the box's edges: rounding of the determinant below is at most 43 units of 1.1e-16 (derived in the
-# decision note "hull"), and of its double-double form at most 1e-29.
+# Rounding of a plane's determinant, of the product of the box's edges: at most 43 units of 1.1e-16. And of the
+# double-double one, of the sum of its terms: 2^-98 holds its dozen roundings of 2^-102.
 _ROUNDING = 6e-15
-_ROUNDING_TWICE = 1e-29
-_FREE, _HULL, _SEEN, _BEHIND = 0, 1, 2, 3  # states of a face
+_ROUNDING_TWICE = 2.0**-98
 _SPLIT = 134217729.0  # 2^27 + 1, halves the digits of a double
 
 
@@ -124,14 +124,14 @@ def _minus(a: float, a2: float, b: float, b2: float) -> tuple[float, float]:
 
 @numba.njit(cache=True, nogil=True)
 def _determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
-    """Return (b - a) x (c - a) . (p - a) of four rows, in double-double arithmetic."""
+    """Return (b - a) x (c - a) . (p - a) of four rows, with its true sign."""
     bx, bx2 = _difference(xyz[b, 0], xyz[a, 0])
     by, by2 = _difference(xyz[b, 1], xyz[a, 1])
     bz, bz2 = _difference(xyz[b, 2], xyz[a, 2])
     cx, cx2 = _difference(xyz[c, 0], xyz[a, 0])
     cy, cy2 = _difference(xyz[c, 1], xyz[a, 1])
     cz, cz2 = _difference(xyz[c, 2], xyz[a, 2])
-    total, rest = 0.0, 0.0
+    total, rest, terms = 0.0, 0.0, 0.0
     for k in range(3):
         if k == 0:
             u, u2, v, v2, w, w2, z, z2 = by, by2, cz, cz2, bz, bz2, cy, cy2
@@ -141,15 +141,57 @@ def _determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
             u, u2, v, v2, w, w2, z, z2 = bx, bx2, cy, cy2, by, by2, cx, cx2
         m, m2 = _times(u, u2, v, v2)
         n, n2 = _times(w, w2, z, z2)
-        m, m2 = _minus(m, m2, n, n2)
         d, d2 = _difference(xyz[p, k], xyz[a, k])
+        terms += (abs(m) + abs(n)) * abs(d)
+        m, m2 = _minus(m, m2, n, n2)
         m, m2 = _times(m, m2, d, d2)
         total, rest = _minus(total, rest, -m, -m2)
-    return total + rest
+    if abs(total + rest) > _ROUNDING_TWICE * terms:
+        return float(total + rest)
+    return _exact_determinant(xyz, a, b, c, p)
 
 
 @numba.njit(cache=True, nogil=True)
-def _place(xyz: Array, plane: Array, face: Any, f: int, a: int, b: int, c: int, tolerance: float, noise: float) -> None:
+def _exact_determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
+    """Return the same from a sum without rounding: for four points nearly, or truly, on one line or plane."""
+    sides = np.empty((3, 3, 2))
+    for k in range(3):
+        sides[0, k, 0], sides[0, k, 1] = _difference(xyz[b, k], xyz[a, k])
+        sides[1, k, 0], sides[1, k, 1] = _difference(xyz[c, k], xyz[a, k])
+        sides[2, k, 0], sides[2, k, 1] = _difference(xyz[p, k], xyz[a, k])
+    parts = np.empty(200)  # of the sum so far, by rising size, none overlapping: 6 x 8 products of 4 parts at most
+    used = 0
+    for turn in range(6):
+        i = turn % 3
+        j, k = ((i + 1) % 3, (i + 2) % 3) if turn < 3 else ((i + 2) % 3, (i + 1) % 3)
+        for bits in range(8):
+            u, v, w = sides[0, i, bits & 1], sides[1, j, (bits >> 1) & 1], sides[2, k, bits >> 2]
+            if u != 0.0 and v != 0.0 and w != 0.0:
+                m, m2 = _product(u if turn < 3 else -u, v)
+                for factor in (m2, m):
+                    n, n2 = _product(factor, w)
+                    used = _add_exactly(parts, used, n2)
+                    used = _add_exactly(parts, used, n)
+    return float(parts[used - 1]) if used > 0 else 0.0
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_exactly(parts: Array, used: int, number: float) -> int:
+    """Add a number to a sum kept in parts that do not overlap; return how many there are now, none of them zero."""
+    kept = 0
+    for k in range(used):
+        number, rest = _difference(number, -parts[k])
+        if rest != 0.0:
+            parts[kept] = rest
+            kept += 1
+    if number != 0.0:
+        parts[kept] = number
+        kept += 1
+    return kept
+
+
+@numba.njit(cache=True, nogil=True)
+def _place(xyz: Array, plane: Array, face: Any, f: int, a: int, b: int, c: int, tolerance: float) -> None:
     """Make face f of three points, and its plane; no point lies above it yet."""
     face[f, 0], face[f, 1], face[f, 2] = a, b, c
     ax, ay, az = xyz[a, 0], xyz[a, 1], xyz[a, 2]
@@ -158,7 +200,7 @@ def _place(xyz: Array, plane: Array, face: Any, f: int, a: int, b: int, c: int, 
     nx, ny, nz = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
     plane[f, 0], plane[f, 1], plane[f, 2] = nx, ny, nz
     plane[f, _OFFSET] = nx * ax + ny * ay + nz * az
-    plane[f, _ABOVE] = max(noise, tolerance * np.sqrt(nx * nx + ny * ny + nz * nz))
+    plane[f, _ABOVE] = tolerance * np.sqrt(nx * nx + ny * ny + nz * nz)
     plane[f, _MOST] = 0.0
     face[f, _FIRST] = -1
     face[f, _STATE] = _HULL
@@ -170,7 +212,7 @@ def _sees(xyz: Array, plane: Array, face: Any, f: int, p: int, noise: float) -> 
     height = plane[f, 0] * xyz[p, 0] + plane[f, 1] * xyz[p, 1] + plane[f, 2] * xyz[p, 2] - plane[f, _OFFSET]
     if abs(height) > noise:
         return bool(height > 0)
-    return _determinant(xyz, face[f, 0], face[f, 1], face[f, 2], p) > noise * (_ROUNDING_TWICE / _ROUNDING)
+    return bool(_determinant(xyz, face[f, 0], face[f, 1], face[f, 2], p) > 0)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -210,10 +252,10 @@ def _start(
     a, b, c, d = _simplex(xyz, count, axis, tolerance, noise)
     if d < 0:
         return -2
-    _place(xyz, plane, face, 0, a, b, c, tolerance, noise)
-    _place(xyz, plane, face, 1, a, d, b, tolerance, noise)
-    _place(xyz, plane, face, 2, b, d, c, tolerance, noise)
-    _place(xyz, plane, face, 3, c, d, a, tolerance, noise)
+    _place(xyz, plane, face, 0, a, b, c, tolerance)
+    _place(xyz, plane, face, 1, a, d, b, tolerance)
+    _place(xyz, plane, face, 2, b, d, c, tolerance)
+    _place(xyz, plane, face, 3, c, d, a, tolerance)
     face[0, 3], face[0, 4], face[0, 5] = 1, 2, 3
     face[1, 3], face[1, 4], face[1, 5] = 3, 2, 0
     face[2, 3], face[2, 4], face[2, 5] = 1, 3, 0
@@ -230,28 +272,53 @@ def _start(
 
 
 @numba.njit(cache=True, nogil=True)
+def _face_below(xyz: Array, plane: Array, face: Any, used: int, p: int, noise: float) -> tuple[int, float]:
+    """Return a face that point p lies more than the tolerance above, and its height; -1 where there is none."""
+    for f in range(used):
+        if face[f, _STATE] == _HULL:
+            height = plane[f, 0] * xyz[p, 0] + plane[f, 1] * xyz[p, 1] + plane[f, 2] * xyz[p, 2] - plane[f, _OFFSET]
+            if abs(height) <= noise and plane[f, _ABOVE] < noise:
+                height = _determinant(xyz, face[f, 0], face[f, 1], face[f, 2], p)
+            if height > plane[f, _ABOVE]:
+                return f, height
+    return -1, 0.0
+
+
+@numba.njit(cache=True, nogil=True)
 def _share_out(
-    xyz: Array, point: Any, plane: Array, face: Any, stack: Any, loose: int, fresh: int, waiting: int
-) -> int:
-    """Hand the points of a list to the first new face that they lie above, drop the rest; return the faces waiting."""
+    xyz: Array, point: Any, plane: Array, face: Any, stack: Any,
+    loose: int, fresh: int, waiting: int, used: int, noise: float,
+) -> int:  # fmt: skip
+    """Hand the points of a list to the first face that they lie above, drop the rest; return the faces waiting.
+
+    A point outside lies above a new face. Only one that is level with a new face may have been handed, by a hair, to
+    the wrong side before, or need more digits: then all faces are tried.
+    """
     p = loose
     while p >= 0:
         following = point[p, _LINK]
         x, y, z = xyz[p, 0], xyz[p, 1], xyz[p, 2]
+        found, most, level = -1, 0.0, False
         for k in range(fresh):
             f = stack[k, _FRESH]
             height = plane[f, 0] * x + plane[f, 1] * y + plane[f, 2] * z - plane[f, _OFFSET]
-            if height > plane[f, _ABOVE]:
-                point[p, _LINK] = face[f, _FIRST]
-                face[f, _FIRST] = p
-                if height > plane[f, _MOST]:
-                    plane[f, _MOST] = height
-                    face[f, _FAR] = p
-                if face[f, _QUEUED] == 0:
-                    face[f, _QUEUED] = 1
-                    stack[waiting, _QUEUE] = f
-                    waiting += 1
+            above = max(noise, plane[f, _ABOVE])
+            if height > above:
+                found, most = f, height
                 break
+            level = level or height > -above
+        if found < 0 and level:
+            found, most = _face_below(xyz, plane, face, used, p, noise)
+        if found >= 0:
+            point[p, _LINK] = face[found, _FIRST]
+            face[found, _FIRST] = p
+            if most > plane[found, _MOST]:
+                plane[found, _MOST] = most
+                face[found, _FAR] = p
+            if face[found, _QUEUED] == 0:
+                face[found, _QUEUED] = 1
+                stack[waiting, _QUEUE] = found
+                waiting += 1
         p = following
     return waiting
 
@@ -322,7 +389,7 @@ def _cone(
             used += 1
         if point[u, _FAN] >= 0 or f >= len(face):
             return -1, free
-        _place(xyz, plane, face, f, u, v, p, tolerance, noise)
+        _place(xyz, plane, face, f, u, v, p, tolerance)
         point[u, _FAN] = f
         stack[k, _FRESH] = f
         face[f, _BESIDE] = g
@@ -392,7 +459,7 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
             point[k, _KEPT] = rows[k]
         return 0.0, count
     used, free = 4, 0
-    waiting = _share_out(xyz, point, plane, face, stack, loose, 4, 0)
+    waiting = _share_out(xyz, point, plane, face, stack, loose, 4, 0, used, noise)
     while waiting > 0:
         waiting -= 1
         f = stack[waiting, _QUEUE]
@@ -405,7 +472,7 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
             if used < 0:
                 face[:, _QUEUED] = 0
                 return np.nan, -1
-            waiting = _share_out(xyz, point, plane, face, stack, loose, edges, waiting)
+            waiting = _share_out(xyz, point, plane, face, stack, loose, edges, waiting, used, noise)
     return _total(point, plane, face, rows, used)
 
 
