@@ -55,7 +55,8 @@ def test_unknown_names_are_refused() -> None:
 
 def test_the_verb_prints_one_json_object() -> None:
     found = CliRunner().invoke(
-        bench, ["team", "--trials", "1", "--cases", "B", "--methods", "paper", "--workers", "1", "--json"]
+        bench,
+        ["team", "--trials", "1", "--cases", "B", "--methods", "paper", "--sizes", "2", "--workers", "1", "--json"],
     )
     assert found.exit_code == 0
     assert json.loads(found.stdout)["cases"]["B"]["paper"]["trials"] == 1

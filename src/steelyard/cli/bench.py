@@ -1,4 +1,4 @@
-"""`steelyard bench identify|coverage|held-object|part-coverage|materials|team`."""
+"""`steelyard bench identify|coverage|held-object|part-coverage|materials|segment|team`."""
 
 from __future__ import annotations
 
@@ -128,9 +128,27 @@ def materials(data: Path, seeds: int, as_json: bool) -> None:
 
 
 @bench.command()
+@_FOLDERS
+@click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+@click.option("--noise-mm", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Noise of the points.")
+@click.option(
+    "--colour-noise", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Of channels 0..255."
+)
+@_JSON
+def segment(data: Path, as_json: bool, **choices: Any) -> None:
+    """Parts of unlabelled clouds against the true ones, beside the paper's Tables I and II."""
+    from steelyard.bench import segment as job
+    from steelyard.bench.segment_table import segment_table
+
+    result = job.run(data, progress_bar("bench segment"), **choices)
+    print_json(result) if as_json else click.echo(segment_table(result))
+
+
+@bench.command()
 @click.option("--trials", type=click.IntRange(min=1), default=24, show_default=True, help="Seeds 100, 101, ...")
 @click.option("--cases", multiple=True, help="Only these cases: A, B, C, D (repeat the option).")
 @click.option("--methods", multiple=True, help="Only these methods.")
+@click.option("--sizes", type=click.IntRange(min=2), multiple=True, help="Only these numbers of robots in the scaling.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
 @_JSON
 def team(trials: int, as_json: bool, **choices: Any) -> None:

@@ -4,8 +4,8 @@ The unknowns are the N - 1 poses in the reference grasp, so that every closed lo
 whatever weight it would have been given; the cost is the weighted sum of squares of all N (N - 1) / 2 pairs. It depends
 on the twists through their second moments only.
 Source: "Cooperative Payload Estimation by a Team of Mocobots", III-B2, which minimises pairs and loops by BFGS and
-gives no weights; here every residual is weighed by the inverse variance that the star of pairs leaves, and each pair counts
-as seen from both of its grasps, so that the answer does not depend on the order of the robots.
+gives no weights; here every residual is weighed by the inverse variance that the star of pairs leaves, and each pair
+counts as seen from both of its grasps, so that the answer does not depend on the order of the robots.
 """
 
 from __future__ import annotations
