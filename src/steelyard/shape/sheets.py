@@ -39,54 +39,63 @@ _LEAST = 4.0  # links that a plane needs to be drawn anew
 
 
 @numba.njit(cache=True, nogil=True)
-def _least_axis(m: Array) -> Array:
-    """Return the unit axis (3,) of the least spread of a covariance (3, 3).
+def _least_axis(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> tuple[float, float, float]:
+    """Return the unit axis of the least spread of a covariance.
 
     Source: Smith 1961, eigenvalues of a symmetric 3 x 3 matrix.
     """
-    q = (m[0, 0] + m[1, 1] + m[2, 2]) / 3
-    p = (m[0, 0] - q) ** 2 + (m[1, 1] - q) ** 2 + (m[2, 2] - q) ** 2
-    p = math.sqrt((p + 2 * (m[0, 1] ** 2 + m[0, 2] ** 2 + m[1, 2] ** 2)) / 6)
-    if p == 0:
-        return np.array([0.0, 0.0, 1.0])
-    b = (m - q * np.eye(3)) / p
-    half = b[0, 0] * (b[1, 1] * b[2, 2] - b[1, 2] ** 2) - b[0, 1] * (b[0, 1] * b[2, 2] - b[1, 2] * b[0, 2])
-    half = (half + b[0, 2] * (b[0, 1] * b[1, 2] - b[1, 1] * b[0, 2])) / 2
+    mean = (xx + yy + zz) / 3
+    size = (xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * (xy * xy + xz * xz + yz * yz)
+    size = math.sqrt(size / 6)
+    if size == 0:
+        return 0.0, 0.0, 1.0
+    xx, yy, zz, xy, xz, yz = (xx - mean) / size, (yy - mean) / size, (zz - mean) / size, xy / size, xz / size, yz / size
+    half = (xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)) / 2
     least = 2 * math.cos(math.acos(min(1.0, max(-1.0, half))) / 3 + 2 * math.pi / 3)
-    rows = b - least * np.eye(3)
-    best, size = np.array([0.0, 0.0, 1.0]), 1e-24
-    for i in range(3):
-        u, v = rows[i], rows[(i + 1) % 3]
-        across = np.array([u[1] * v[2] - u[2] * v[1], u[2] * v[0] - u[0] * v[2], u[0] * v[1] - u[1] * v[0]])
-        found = (across**2).sum()
-        if found > size:
-            best, size = across / math.sqrt(found), found
-    return best
+    xx, yy, zz = xx - least, yy - least, zz - least
+    bx, by, bz, most = 0.0, 0.0, 1.0, 1e-24
+    for k in range(3):  # the axis is across any two rows; the longest product is the surest
+        if k == 0:
+            ux, uy, uz = xy * yz - xz * yy, xz * xy - xx * yz, xx * yy - xy * xy
+        elif k == 1:
+            ux, uy, uz = xy * zz - xz * yz, xz * xz - xx * zz, xx * yz - xy * xz
+        else:
+            ux, uy, uz = yy * zz - yz * yz, yz * xz - xy * zz, xy * yz - yy * xz
+        found = ux * ux + uy * uy + uz * uz
+        if found > most:
+            bx, by, bz, most = ux, uy, uz, found
+    length = math.sqrt(bx * bx + by * by + bz * bz)
+    return bx / length, by / length, bz / length
 
 
 @numba.njit(cache=True, nogil=True)
-def _plane(xyz: Array, i: int, neighbours: Integers, weight: Array) -> Array:
-    """Return the plane through point i and weighted neighbours."""
-    middle, total = xyz[i].copy(), 1.0
+def _plane(xyz: Array, i: int, neighbours: Integers, weight: Array, out: Array) -> None:
+    """Write the plane through point i and weighted neighbours into out (3,)."""
+    x, y, z = xyz[i]
+    total, sx, sy, sz = 1.0, 0.0, 0.0, 0.0
+    xx, xy, xz, yy, yz, zz = 0.0, 0.0, 0.0, 0.0, 0.0, 0.0
     for a in range(len(neighbours)):
-        middle += weight[a] * xyz[neighbours[a]]
-        total += weight[a]
-    middle /= total
-    spread_out = np.zeros((3, 3))
-    for a in range(-1, len(neighbours)):
-        away = (xyz[i] if a < 0 else xyz[neighbours[a]]) - middle
-        share = 1.0 if a < 0 else weight[a]
-        for u in range(3):
-            for v in range(3):
-                spread_out[u, v] += share * away[u] * away[v]
-    return _least_axis(spread_out)
+        j, w = neighbours[a], abs(weight[a])
+        dx, dy, dz = xyz[j, 0] - x, xyz[j, 1] - y, xyz[j, 2] - z
+        total += w
+        sx, sy, sz = sx + w * dx, sy + w * dy, sz + w * dz
+        xx, xy, xz = xx + w * dx * dx, xy + w * dx * dy, xz + w * dx * dz
+        yy, yz, zz = yy + w * dy * dy, yz + w * dy * dz, zz + w * dz * dz
+    out[0], out[1], out[2] = _least_axis(
+        xx - sx * sx / total,
+        xy - sx * sy / total,
+        xz - sx * sz / total,
+        yy - sy * sy / total,
+        yz - sy * sz / total,
+        zz - sz * sz / total,
+    )
 
 
 @numba.njit(cache=True, nogil=True)
 def _first_planes(xyz: Array, index: Integers, count: int) -> Array:
     out, even = np.empty((len(xyz), 3)), np.ones(count)
     for i in range(len(xyz)):
-        out[i] = _plane(xyz, i, index[i, :count], even)
+        _plane(xyz, i, index[i, :count], even, out[i])
     return out
 
 
@@ -94,9 +103,11 @@ def _first_planes(xyz: Array, index: Integers, count: int) -> Array:
 def _own_planes(xyz: Array, normal: Array, index: Integers, link: Array) -> Array:
     out = normal.copy()
     for i in range(len(xyz)):
-        weight = np.abs(link[i])
-        if weight.sum() + 1 >= _LEAST:
-            out[i] = _plane(xyz, i, index[i], weight)
+        total = 1.0
+        for a in range(index.shape[1]):
+            total += abs(link[i, a])
+        if total >= _LEAST:
+            _plane(xyz, i, index[i], link[i], out[i])
     return out
 
 

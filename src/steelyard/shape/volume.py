@@ -15,6 +15,8 @@ from steelyard.shape.orient import DEPTH, Oriented, oriented
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.winding import Sight, Tree
 
+_NUDGE = 1e-7  # of the diagonal
+_FLAT = 1e-4  # volume of a cell, over that of a box of its edges, below which it is a flat leftover
 _REACH = 8.0  # a cell whose circumscribed ball is wider than so many spacings is outside
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
 
@@ -77,12 +79,14 @@ def _complex(xyz: Array) -> tuple[Any, Array, Array]:
     """Return the Delaunay cells (T, 4) of points, their centroids (T, 3) and the radii (T,) of their balls."""
     from scipy.spatial import Delaunay
 
-    tets = Delaunay(xyz).simplices.astype(np.int64)
+    # Qhull spends most of its time on points in one plane: they are moved by less than any measurement notices.
+    moved = xyz + _NUDGE * np.random.default_rng(0).uniform(-1, 1, xyz.shape)
+    tets = Delaunay(moved).simplices.astype(np.int64)
     a, b, c, d = np.moveaxis(xyz[tets], 1, 0)
     u, v, w = b - a, c - a, d - a
     across = np.cross(v, w)
     six = np.einsum("td,td->t", u, across)
-    solid = np.abs(six) > 1e-12 * np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1) * np.linalg.norm(w, axis=1)
+    solid = np.abs(six) > _FLAT * np.linalg.norm(u, axis=1) * np.linalg.norm(v, axis=1) * np.linalg.norm(w, axis=1)
     tets, u, v, w, across, six = (array[solid] for array in (tets, u, v, w, across, six))
     to_middle = (
         (u**2).sum(1)[:, None] * across
