@@ -25,7 +25,7 @@ from steelyard.identify.fit import Bias
 from steelyard.identify.linear import inverse_scaled, reweighted
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
-from steelyard.identify.part_models import Masses, averaged_masses, free_masses, material_masses
+from steelyard.identify.part_models import Masses, averaged_masses, free_masses, log_evidence, material_masses
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.problem import Problem
 from steelyard.identify.shape_error import MEASURED, ShapeError
@@ -72,7 +72,7 @@ class PartMasses:
 
         Raises CannotAnswer where the log shows no weight.
         """
-        log = with_noise(log, Bias.of(self.bias).free)
+        log = self.with_noise(log, self.bias)
         problem = self._problem(Moments.of_log(log))
         first = self._conclude(problem, _start(problem), None)
         if log.time is None:
@@ -85,6 +85,23 @@ class PartMasses:
         """Return the estimate from a statistic that carries its noise."""
         problem = self._problem(moments)
         return self._conclude(problem, _start(problem), None)
+
+    @staticmethod
+    def with_noise(log: MotionLog, bias: Bias | str) -> MotionLog:
+        """Return the log with the noise that it does not declare estimated."""
+        return with_noise(log, Bias.of(bias).free)
+
+    def seen(self, moments: Moments) -> Effective:
+        """Return what a statistic says of the whole body, the error of the shape taken into account."""
+        problem = self._problem(moments)
+        data = Effective.of(problem, _start(problem), None)
+        body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), self.parts).mean)
+        data = Effective.of(problem, data.linear_at(body.vector), None)
+        return data.blurred(self.shape_error.with_grasp(body))
+
+    def log_evidence(self, data: Effective) -> Array:
+        """Return the log evidence (F,) of these parts per family of density models, up to what all cuts share."""
+        return log_evidence(data, self.parts)
 
     def _problem(self, moments: Moments) -> Problem:
         bias = Bias.of(self.bias)

@@ -41,6 +41,15 @@ def averaged_masses(data: Effective, parts: Parts) -> Masses:
     return Masses(mean, covariance)
 
 
+def log_evidence(data: Effective, parts: Parts) -> Array:
+    """Return the log evidence (F,) of the parts, summed over the models of each family.
+
+    Up to a constant of the data alone, so that different cuts of one object compare.
+    """
+    families = _families(*_in_masses(data, parts), parts.volume)
+    return np.array([float(np.logaddexp.reduce(evidence)) for _, evidence, _ in families])
+
+
 def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]) -> Masses:
     """Return masses averaged by evidence over the choices of one material per part."""
     A, b = _in_masses(data, parts)

@@ -1,0 +1,80 @@
+"""Which cut of a shape into parts explains a log."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from steelyard.errors import BadValue
+from steelyard.identify.part_cuts import PartCuts
+from steelyard.identify.part_masses import PartMasses
+from steelyard.logs.log import MotionLog
+from steelyard.parts.parts import Parts
+from steelyard.simulate.handling import handling_log
+
+
+@pytest.fixture(scope="module")
+def rod() -> Parts:
+    """Six boxes in a row."""
+    half = np.array([0.02, 0.01, 0.015])
+    rows = []
+    for k in range(6):
+        volume, c = 8 * half.prod(), np.array([0.04 * k + 0.05, 0.02 * (k % 2), 0.01 * (k % 3)])
+        second = volume * (np.diag(half**2 / 3) + np.outer(c, c))
+        inertia = np.trace(second) * np.eye(3) - second
+        rows.append([volume, *(volume * c), *inertia[np.triu_indices(3)]])
+    return Parts(np.arange(6), np.array(rows))
+
+
+DENSITY = np.array([7800.0, 7800, 1000, 1000, 1000, 1000])
+
+
+def log_of(parts: Parts, seed: int, noise: str = "low") -> MotionLog:
+    return handling_log(parts.whole(DENSITY * parts.volume), noise=noise, seed=seed)
+
+
+def cuts(rod: Parts) -> tuple[Parts, ...]:
+    right = rod.merged([[0, 1], [2, 3, 4, 5]])
+    wrong = rod.merged([[0, 1, 2, 3], [4, 5]])
+    return rod.merged([[0, 1, 2, 3, 4, 5]]), wrong, right, rod
+
+
+def test_the_log_refuses_cuts_that_cannot_give_it(rod: Parts) -> None:
+    _, weight = PartCuts(cuts(rod), bias="none").weighed(log_of(rod, 0))
+    assert weight.sum() == pytest.approx(1)
+    assert weight[0] == weight[1] == 0
+    assert weight[2] > 0.2
+
+
+def test_the_average_is_as_good_as_the_right_cut(rod: Parts) -> None:
+    truth = rod.whole(DENSITY * rod.volume).vector
+    errors = []
+    for seed in range(4):
+        log = log_of(rod, seed)
+        averaged = PartCuts(cuts(rod), bias="none").identify(log)
+        right = PartMasses(cuts(rod)[2], bias="none").identify(log)
+        errors.append([np.linalg.norm((e.parameters.vector - truth) / truth[0]) for e in (averaged, right)])
+    mean = np.mean(errors, axis=0)
+    assert mean[0] < 2 * mean[1] + 1e-6
+
+
+def test_one_cut_is_the_estimator_of_parts(rod: Parts) -> None:
+    log = log_of(rod, 1)
+    alone = PartCuts((rod,), bias="none").identify(log)
+    plain = PartMasses(rod, bias="none").identify(log)
+    np.testing.assert_array_equal(alone.parameters.vector, plain.parameters.vector)
+
+
+def test_a_prior_tips_the_scale_between_cuts_alike(rod: Parts) -> None:
+    right, fine = cuts(rod)[2:]
+    log = log_of(rod, 2)
+    _, plain = PartCuts((right, fine), bias="none").weighed(log)
+    _, tipped = PartCuts((right, fine), np.array([0.0, 2.0]), bias="none").weighed(log)
+    assert tipped[1] > plain[1]
+
+
+def test_wrong_options_are_named(rod: Parts) -> None:
+    with pytest.raises(BadValue, match="at least one cut"):
+        PartCuts(())
+    with pytest.raises(BadValue, match="2 cuts need as many prior weights"):
+        PartCuts((rod, rod), np.zeros(3))
