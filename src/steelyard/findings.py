@@ -34,6 +34,8 @@ REMEDIES: dict[str, str] = {
     "centroids-coplanar": "Move between the poses as well, or merge parts of the same material.",
     "more-parts-than-rank": "Merge parts of the same material, or turn the object faster between the poses.",
     "surface-open": "Close the surface: weld equal vertices, fill holes, or scan the missing side.",
+    "views-disagree": "Check fx, fy, cx, cy and depth_unit_m in camera.json, and that each pose belongs to its image.",
+    "several-objects": "Scan one object at a time, or check that the one kept is the one meant.",
     "parts-overlap": "Cut one part out of the other, so that they only touch and no volume counts twice.",
     "part-unseen": "Nothing to do if the part is hidden inside; give its shape, since no scan can see it.",
     "part-not-homogeneous": "Split the part where its material changes, or check the shape and the grasp pose.",
