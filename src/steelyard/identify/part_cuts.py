@@ -1,7 +1,7 @@
 """PartCuts: which cut of a solid into parts explains the wrench, and the answer averaged over those that do.
 
 Shape and colour offer several cuts, from few parts to many; the log then says which of them the forces ask for.
-Evidence weighs each: parts that the data cannot tell apart cost nothing but their prior, parts that they need are found.
+Evidence weighs each: parts that the data cannot tell apart cost nothing but their prior, parts they need are found.
 Where the cut does not matter for the answer, the average is as good as the best; where it does, the spread between cuts
 is in the error bars.
 Source: the choice of parts by the identification is the paper's future work (section VI).
