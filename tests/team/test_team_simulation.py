@@ -11,13 +11,16 @@ import pytest
 
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
+from steelyard.logs.log import MotionLog
 from steelyard.robots import Omnid
 from steelyard.simulate import team_cases
+from steelyard.simulate.conditions import regressor
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, EXACT, GRAVITY, Hinge, Presence, Slip, TeamNoise, TeamScene, case
 from steelyard.simulate.team_motions import Freedom, draw_motion
 from steelyard.simulate.team_sensing import autoregressive, read_joints
-from steelyard.spatial import Pose, cross
+from steelyard.spatial import Pose, Rotation, cross
+from steelyard.team.loop_closure import _BRACKETS
 
 FACTS = Path(__file__).resolve().parents[3] / "shared" / "facts" / "team-cases.json"
 SHORT = TeamScene(sensing="poses", kinds=("motion",), motion_samples=400)
@@ -204,8 +207,56 @@ def test_motions_show_as_much_of_a_grasp_as_they_should(name: str) -> None:
     freedom, rank = MOTIONS[name]
     time = np.arange(300) / 100
     seen = draw_motion(np.random.default_rng(1), time, (0.2, 0.9), 0.14, 0.03, freedom).at(time)
-    from steelyard.team.loop_closure import _BRACKETS
-
     twist = np.concatenate([seen.angular_velocity, seen.velocity], 1)
     values = np.linalg.svd(np.einsum("ta,abc->tbc", twist, _BRACKETS).reshape(-1, 6), compute_uv=False)
+    assert int((values > 1e-9 * values[0]).sum()) == rank
+
+
+def turned_in_a_plane(time: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Gravity, rates and accelerations (T, 3) of a turning whose rates stay in the body's x-y plane."""
+    rate = np.column_stack([np.sin(2 * time), np.cos(3 * time), 0 * time])
+    growth = np.column_stack([2 * np.cos(2 * time), -3 * np.sin(3 * time), 0 * time])
+    middle = np.column_stack([np.sin(2 * time + 0.01), np.cos(3 * time + 0.015), 0 * time])
+    turn, down = Rotation.identity(), []
+    for step in middle:
+        down.append(turn.inverse().apply([0.0, 0.0, -GRAVITY]))
+        turn = turn @ Rotation.exp(0.01 * step)
+    return np.array(down), rate, growth
+
+
+def motion_log(freedom: Freedom) -> MotionLog:
+    time = np.arange(300) / 100
+    seen = draw_motion(np.random.default_rng(1), time, (0.2, 0.9), 0.14, 0.03, freedom).at(time)
+    down = seen.rotation.inverse().apply([0.0, 0.0, -GRAVITY])
+    return MotionLog(np.zeros((300, 6)), down, seen.acceleration, seen.angular_velocity, seen.angular_acceleration)
+
+
+def plane_log() -> MotionLog:
+    down, rate, growth = turned_in_a_plane(np.arange(300) / 100)
+    return MotionLog(np.zeros((300, 6)), down, 0 * down, rate, growth)
+
+
+def still_log(poses: int) -> MotionLog:
+    turns = Rotation.exp(np.array(team_cases.STILL_TURNS[:poses]))
+    return MotionLog.of_poses(np.zeros((poses, 6)), turns.inverse().apply([0.0, 0.0, -GRAVITY]))
+
+
+WRENCH_SIDE = {
+    "one still pose": (lambda: still_log(1), 3),
+    "two still poses": (lambda: still_log(2), 4),
+    "four still poses": (lambda: still_log(4), 4),
+    "three axes": (lambda: motion_log(Freedom(np.eye(3), NONE)), 10),
+    "rates in a plane": (plane_log, 9),
+    "one horizontal axis": (lambda: motion_log(Freedom(PLANE[:, :1], NONE)), 7),
+    "about gravity": (lambda: motion_log(Freedom(UPRIGHT, np.eye(3))), 7),
+    "about gravity, no translation": (lambda: motion_log(Freedom(UPRIGHT, NONE)), 6),
+}
+
+
+@pytest.mark.parametrize("name", WRENCH_SIDE)
+def test_motions_show_as_much_of_a_body_as_they_should(name: str) -> None:
+    make, rank = WRENCH_SIDE[name]
+    stacked = regressor(make()).reshape(-1, 10)
+    size = np.linalg.norm(stacked, axis=0)
+    values = np.linalg.svd(stacked / np.where(size > 0, size, 1.0), compute_uv=False)
     assert int((values > 1e-9 * values[0]).sum()) == rank

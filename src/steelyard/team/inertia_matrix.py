@@ -5,6 +5,7 @@ Source: "Cooperative Payload Estimation by a Team of Mocobots", III-D, eq. 17-33
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
@@ -29,8 +30,23 @@ def moment_about(wrench: Array, point: Array) -> Array:
     return np.asarray(wrench[:, :3] - cross(np.broadcast_to(point, wrench[:, 3:].shape), wrench[:, 3:]))
 
 
-def inertia(omega: Array, alpha: Array, moment: Array) -> tuple[Array, Array]:
-    """Return the inertia (3, 3) [kg m^2] about the centre of mass and the formal covariance (6, 6) of its entries.
+@dataclass(frozen=True, eq=False)
+class InertiaFit:
+    """Inertia (3, 3) [kg m^2] about the centre of mass and the formal covariance (6, 6) of xx xy xz yy yz zz.
+
+    condition  of the stack with columns scaled to length 1
+    residual   rms moment left per axis [N m]; samples  rows used
+    """
+
+    matrix: Array
+    covariance: Array
+    condition: float
+    residual: float
+    samples: int
+
+
+def inertia(omega: Array, alpha: Array, moment: Array) -> InertiaFit:
+    """Return the least-squares inertia about the centre of mass (eq. 29-32); negative eigenvalues stay.
 
     omega, alpha, moment  (T, 3) in the axes of the answer, the moment about the centre of mass
     Raises CannotAnswer where the motion leaves an entry open.
@@ -41,7 +57,7 @@ def inertia(omega: Array, alpha: Array, moment: Array) -> tuple[Array, Array]:
     if len(stacked) < 6 or not (size > 0).all() or not values[-1] > LEAST_SPREAD * values[0]:
         raise CannotAnswer(
             "the payload must turn about three axes, faster and slower, to tell its inertia; this motion leaves "
-            f"entries open (least singular value {values[-1]:.1g} of {values[0]:.1g}). Turn it about all three axes."
+            "entries open. Turn it about all three axes."
         )
     entries, *_ = np.linalg.lstsq(stacked, moment.ravel(), rcond=None)
     left = moment.ravel() - stacked @ entries
@@ -49,7 +65,8 @@ def inertia(omega: Array, alpha: Array, moment: Array) -> tuple[Array, Array]:
     matrix = np.zeros((3, 3))
     for value, (i, j) in zip(entries, UPPER, strict=True):
         matrix[i, j] = matrix[j, i] = value
-    return matrix, np.asarray(variance * np.linalg.inv(stacked.T @ stacked))
+    covariance = np.asarray(variance * np.linalg.inv(stacked.T @ stacked))
+    return InertiaFit(matrix, covariance, float(values[0] / values[-1]), float(np.sqrt((left**2).mean())), len(omega))
 
 
 def made_positive(matrix: Array, negative: Negative = "clamp") -> tuple[Array, int]:

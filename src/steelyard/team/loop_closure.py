@@ -20,6 +20,7 @@ from steelyard.check import Array
 from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import exp_pose
+from steelyard.team.adjoint import adjoint
 from steelyard.team.grasp_kinematics import Pair, pair
 from steelyard.team.grasps import Grasps
 
@@ -107,15 +108,6 @@ def loop_gaps(names: Sequence[str], twists: Array, measured: Mask) -> dict[tuple
         distance = float(np.linalg.norm(round_trip.position))
         gaps[names[i], names[j], names[k]] = (float(round_trip.rotation.angle()), distance)
     return gaps
-
-
-def adjoint(pose: Pose) -> Array:
-    """Return Ad(T) (..., 6, 6) = [[R, 0], [[p]R, R]]."""
-    turn = pose.rotation.matrix
-    out = np.zeros((*pose.batch, 6, 6))
-    out[..., :3, :3] = out[..., 3:, 3:] = turn
-    out[..., 3:, :3] = cross_matrix(pose.position) @ turn
-    return out
 
 
 def _pair_cost(poses: Pose, moments: _Moments, weight: Array) -> tuple[float, Array]:

@@ -21,8 +21,9 @@ LEAST_TILT = 1e-3
 class MassAndCom:
     """Mass [kg] and centre of mass (3,) [m] in R, with formal standard deviation and covariance (3, 3).
 
-    tilt  spread of gravity's directions about their mean [rad], the least of the two directions being zero for one
-          pose; the larger one decides how well the height is known
+    residual_force, residual_moment  rms left per axis [N, N m]
+    tilt     largest spread of gravity's directions about their mean [rad]: it decides how well the height is known
+    samples  rows used
     """
 
     mass: float
@@ -32,6 +33,7 @@ class MassAndCom:
     residual_force: float
     residual_moment: float
     tilt: float
+    samples: int
 
 
 def mass(gravity: Array, force: Array) -> tuple[float, float]:
@@ -93,4 +95,5 @@ def mass_and_com(gravity: Array, wrench: Array) -> MassAndCom:
         float(np.sqrt(((wrench[:, 3:] + found * gravity) ** 2).mean())),
         float(np.sqrt(((wrench[:, :3] - found * np.cross(gravity, place)) ** 2).mean())),
         tilt,
+        len(gravity),
     )

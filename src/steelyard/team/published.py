@@ -7,7 +7,7 @@ covariance; ours are the default of `cutoff_hz`, weights by the residuals of the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -26,7 +26,7 @@ from steelyard.team import grasp_kinematics
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 from steelyard.team.grasp_kinematics import Pair
 from steelyard.team.grasps import Grasps
-from steelyard.team.inertia_matrix import Negative, inertia, made_positive, moment_about
+from steelyard.team.inertia_matrix import InertiaFit, Negative, inertia, made_positive, moment_about
 from steelyard.team.loop_closure import refine
 from steelyard.team.mass_and_com import MassAndCom, mass_and_com
 
@@ -60,8 +60,14 @@ class PublishedTeam:
         require_wrenches(log)
         grasps, pairs = self.grasps(log)
         rest = self.mass_and_com(log, grasps)
-        matrix, covariance, rows, notes, findings = self._inertia_or_not(log, grasps, rest)
-        return _assembled(log, grasps, pairs, rest, (matrix, covariance), rows, notes, findings)
+        try:
+            turning = self.inertia(log, grasps, rest.com)
+        except CannotAnswer as error:
+            open_ = Finding.of("inertia-not-identified", f"The inertia is not told: {error}")
+            return _assembled(log, grasps, pairs, rest, findings=(open_,))
+        matrix, below = made_positive(turning.matrix, self.negative)
+        notes = (f"{below} negative principal moment(s) were set to zero.",) if below else ()
+        return _assembled(log, grasps, pairs, rest, replace(turning, matrix=matrix), notes)
 
     def grasps(self, log: TeamLog) -> tuple[Grasps, dict[str, Pair]]:
         """Return the grasps in the reference grasp, and the star of pairs that they started from (eq. 1-8)."""
@@ -97,10 +103,10 @@ class PublishedTeam:
             )
         return mass_and_com(gravity, np.concatenate(wrench))
 
-    def inertia(self, log: TeamLog, grasps: Grasps, com: Array) -> tuple[Array, Array, int]:
-        """Return the inertia (3, 3) [kg m^2] about `com` (3,) [m], covariance (6, 6) and rows used (eq. 17-32).
+    def inertia(self, log: TeamLog, grasps: Grasps, com: Array) -> InertiaFit:
+        """Return the inertia about `com` (3,) [m] in R's axes (eq. 17-32); negative eigenvalues stay.
 
-        All in R's axes. Rates and angular accelerations are the reference robot's alone; negative eigenvalues stay.
+        Rates and angular accelerations are the reference robot's alone.
         """
         omega, alpha, moment = [], [], []
         for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):
@@ -111,20 +117,7 @@ class PublishedTeam:
             omega.append(rows.twist[hub, keep, :3])
             alpha.append(rows.twist_rate[hub, keep, :3])
             moment.append(moment_about(grasps.total_wrench(rows.wrench)[keep], com))
-        matrix, covariance = inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
-        return matrix, covariance, sum(len(part) for part in omega)
-
-    def _inertia_or_not(
-        self, log: TeamLog, grasps: Grasps, rest: MassAndCom
-    ) -> tuple[Array | None, Array, int, tuple[str, ...], tuple[Finding, ...]]:
-        """Return inertia, covariance, rows, notes and findings; None and a finding where motion does not tell it."""
-        try:
-            raw, covariance, rows = self.inertia(log, grasps, rest.com)
-        except CannotAnswer as error:
-            return None, np.zeros((6, 6)), 0, (), (Finding.of("inertia-not-identified", str(error)),)
-        matrix, below = made_positive(raw, self.negative)
-        note = (f"{below} negative principal moment(s) were set to zero.",) if below else ()
-        return matrix, covariance, rows, note, ()
+        return inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
 
 
 def require_wrenches(log: TeamLog) -> None:
@@ -179,37 +172,43 @@ def _assembled(
     grasps: Grasps,
     pairs: dict[str, Pair],
     rest: MassAndCom,
-    found: tuple[Array | None, Array],
-    rows: int,
-    notes: tuple[str, ...],
-    findings: tuple[Finding, ...],
+    turning: InertiaFit | None = None,
+    notes: tuple[str, ...] = (),
+    findings: tuple[Finding, ...] = (),
 ) -> TeamEstimate:
-    matrix, covariance = found
-    known = matrix is not None
+    """Return the answer of the steps; without `turning` the inertia stays open."""
+    known = turning is not None
+    # Nothing of the payload is much farther from its centre of mass than the grasps are from each other.
+    reach = float(np.linalg.norm(grasps.poses.position, axis=1).max())
     people = np.zeros((10, 10))
     people[0, 0] = rest.mass_std**2
     people[1:4, 1:4] = rest.com_covariance
-    # Nothing of the payload is much farther from its centre of mass than the grasps are from each other.
-    reach = float(np.linalg.norm(grasps.poses.position, axis=1).max())
-    people[4:, 4:] = covariance if known else (rest.mass * reach**2) ** 2 * np.eye(6)
-    body = InertialParameters.from_com(rest.mass, rest.com, matrix if matrix is not None else np.zeros((3, 3)))
+    people[4:, 4:] = turning.covariance if turning else (rest.mass * reach**2) ** 2 * np.eye(6)
+    body = InertialParameters.from_com(rest.mass, rest.com, turning.matrix if turning else np.zeros((3, 3)))
     jacobian = np.zeros((10, 10))
     jacobian[0, 0] = 1
     jacobian[1:] = com_jacobian(body.vector)
     back = np.linalg.inv(jacobian)
-    estimates = {
-        name: GraspEstimate(grasps[name], pairs[name].covariance if name in pairs else np.zeros((6, 6)))
-        for name in log.names
-    }
+    evidence = Evidence(
+        rank=10 if known else 4,
+        condition=turning.condition if turning else float(1 / max(np.sin(rest.tilt), 1e-9)),
+        samples=rest.samples + (turning.samples if turning else 0),
+        still_samples=rest.samples,
+        residual_force_N=rest.residual_force,
+        residual_torque_Nm=turning.residual if turning else rest.residual_moment,
+    )
     return TeamEstimate(
         parameters=body,
         covariance=back @ people @ back.T,
         method="paper",
-        evidence=Evidence(10 if known else 4, 1.0, rows, 0, rest.residual_force, rest.residual_moment),
+        evidence=evidence,
         identified=np.array([True] * 4 + [known] * 6),
         frame=log.reference,
         findings=findings,
         notes=(FORMAL, *notes),
         reference=log.reference,
-        grasps=estimates,
+        grasps={
+            name: GraspEstimate(grasps[name], pairs[name].covariance if name in pairs else np.zeros((6, 6)))
+            for name in log.names
+        },
     )
