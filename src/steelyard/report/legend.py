@@ -104,15 +104,19 @@ def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: f
     factor, unit = mass_unit(report.estimate.mass)
     name = report.name_of(part.label)
     true = report.truth.masses.get(part.label) if report.truth is not None else None
-    said = [f"{general(1e6 * part.volume)} cm³", f"{general(part.density, 2 if part.density < 1e3 else 3)} kg/m³"]
+    said: list[object] = [
+        f"{general(1e6 * part.volume)} cm³ · {general(part.density, 2 if part.density < 1e3 else 3)} kg/m³"
+    ]
+    if part.material:
+        said += [" · ", tag("b", part.material)]
     if true is not None:
-        said.append(f"truth {general(factor * true, 4)} {unit}")
+        said.append(f" · truth {general(factor * true, 4)} {unit}")
     return tag(
         "li",
         tag("label", _switch(part.label, name, drawn), _swatch(colour), tag("span", name, class_="name"),
             tag("span", measured(factor * part.mass, factor * part.std, unit), class_="mass")),
         share_bar(share),
-        tag("p", " · ".join(said), tag("b", f" {part.material}") if part.material else "", class_="aside"),
+        tag("p", *said, class_="aside"),
         data_label=part.label,
     )  # fmt: skip
 

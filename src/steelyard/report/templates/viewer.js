@@ -179,18 +179,19 @@
     const { right, up, toward } = axes(), aspect = canvas.clientWidth / Math.max(canvas.clientHeight, 1), tangent = 0.24;
     // As near as the parts, pulled apart or not, allow.
     let distance = 0;
-    const held = [...some];
-    if (show.ellipsoid && marks.ellipsoid) for (const a of marks.ellipsoid)
-      for (const b of marks.ellipsoid) for (const s of [1, -1])
-        held.push([add(marks.com, add(add([0, 0, 0], a, 0.71), b, 0.71 * (a === b ? 0.41 : 1)), s), middle]);
+    const held = some.map(([c, centre]) => add(c, add(centre, middle, -1), 1.3 * explode));
+    if (show.ellipsoid && marks.ellipsoid)
+      for (const a of marks.ellipsoid) for (const s of [1, -1]) held.push(add(marks.com, a, s));
     if (show.sensor && marks.sensor && Math.hypot(...add(marks.sensor.at, middle, -1)) < 4 * reach)
-      for (const a of marks.sensor.axes) held.push([add(marks.sensor.at, a, 0.22 * size), middle]);
-    for (const [c, centre] of held) {
-      const p = add(add(c, middle, -1), add(centre, middle, -1), 1.3 * explode), z = dot(p, toward);
+      for (const a of marks.sensor.axes) held.push(add(marks.sensor.at, a, 0.22 * size));
+    const ends = [0, 1, 2].map((k) => held.reduce(([l, h], c) => [Math.min(l, c[k]), Math.max(h, c[k])], [Infinity, -Infinity]));
+    const centre = ends.map(([l, h]) => (l + h) / 2);
+    for (const c of held) {
+      const p = add(c, centre, -1), z = dot(p, toward);
       distance = Math.max(distance, Math.abs(dot(p, right)) / (tangent * aspect) + z, Math.abs(dot(p, up)) / tangent + z);
     }
     distance = (1.1 * distance) / eye.zoom;
-    const target = add(middle, eye.pan), from = add(target, toward, distance);
+    const target = add(centre, eye.pan), from = add(target, toward, distance);
     const rows = [right[0], up[0], toward[0], 0, right[1], up[1], toward[1], 0, right[2], up[2], toward[2], 0,
       -dot(right, from), -dot(up, from), -dot(toward, from), 1];
     const near = Math.max(distance - 4 * reach, 0.02 * distance), far = distance + 4 * reach;
