@@ -258,7 +258,7 @@ def settled(
 
 @numba.njit(cache=True, nogil=True)
 def colours(
-    depth: Any, rgb: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float
+    rgb: Any, depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float
 ) -> Any:
     """Return the median colour (N, 3) of the views that see each point."""
     rows = np.empty((MOST_VIEWS, 6))

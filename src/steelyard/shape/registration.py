@@ -8,9 +8,56 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape import depth_images as images
 from steelyard.shape.depth_images import FACING, pixel_of
+from steelyard.shape.scene import LEAST_VIEWS, Scene, surfels
+from steelyard.shape.thinning import spread_to
 
 _STEPS = 3
+_POSE_STD = (0.005, np.radians(1.0))  # how far reported poses may be off [m, rad]
+_DISAGREE = 2.0  # times the depth noise: views that spread less are left where they are
+_WINDOWS = (0.012, 0.006, 0.003)  # how far off the surface views may be, round by round [m]
+_BETTER = 0.9  # of the spread before: else the cameras are left where they are
+_MODEL = 2500  # points that views are fitted to
+
+
+def agreed(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float) -> tuple[Array, float, float | None]:
+    """Return patches, how far the views disagree, and the rms shift of cameras if moving them made it better.
+
+    Views and the surface that they give together are fitted to each other in turn.
+    """
+    before = _disagreement(scene, patches)
+    if before < _DISAGREE or len(scene.R) < 2:
+        return patches, before, None
+    given, current = (scene.R, scene.p), patches
+    for window in _WINDOWS:
+        xyz, normal = _model(scene, current, window)
+        scene.R, scene.p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+        current = surfels(scene, mask, low, pitch)
+    after = _disagreement(scene, current)
+    if after > _BETTER * before:
+        scene.R, scene.p = given
+        return patches, before, None
+    shift = float(np.sqrt(((scene.p - given[1]) ** 2).sum(1).mean()))
+    return current, after, shift
+
+
+def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
+    """Return well-spread points (N, 3) of the surface that all views give together, and their normals."""
+    order = np.argsort(-patches[:, 6], kind="stable")
+    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _MODEL, 2 * scene.pixel)
+    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
+    support = images.settled(*scene.images(), xyz, normal, window, scene.noise, 1)
+    good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+    return xyz[good], normal[good]
+
+
+def _disagreement(scene: Scene, patches: Array) -> float:
+    """Return the median spread of the views about the surface, in standard deviations of depth."""
+    xyz, normal = _model(scene, patches, 0.005)
+    support = images.settled(*scene.images(), xyz, normal, 0.005, scene.noise, 1)
+    good = support[:, 0] >= LEAST_VIEWS
+    return float(np.median(support[good, 2])) / (0.7 * scene.sigma) if good.any() else np.inf
 
 
 def moved(
@@ -83,5 +130,3 @@ def _normal_equations(
             for c in range(6):
                 H[r, c] += weight * row[r] * row[c]
     return H, g
-
-

@@ -14,10 +14,15 @@ from typing import Any
 import numpy as np
 from scipy import ndimage, sparse
 from scipy.sparse.linalg import spsolve
+from scipy.spatial import cKDTree
 
 from steelyard.check import Array
+from steelyard.shape import depth_images as images
 from steelyard.shape.mesh import Integers
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene
 
+_WALL = 0.5  # a normal less upright than this belongs to a wall
+_FOOT, _HIGHEST_FOOT = 0.0005, 0.008  # steps in which the end of a wall is sought, and how far up [m]
 _DOWNWARD = -0.35  # a normal that points down by more than this belongs to an underside that was seen
 _STEEPER = 1.3  # than the lowest sight line: a slope that is the object's own, not the edge of what was seen
 
@@ -60,6 +65,75 @@ class Underside:
 def _slope(height: Array, axis: int) -> Array:
     """Return half the difference of the neighbours along an axis, 0 where one has no height."""
     return np.asarray(np.nan_to_num((np.roll(height, -1, axis) - np.roll(height, 1, axis)) / 2))
+
+
+def closed_below(scene: Scene, xyz: Array, normal: Array, pitch: float) -> Underside:
+    """Return the underside of the seen surface, points (N, 3) with normals, on a grid of `pitch` [m]."""
+    low = xyz[:, :2].min(0) - 2 * pitch
+    size = np.ceil((xyz[:, :2].max(0) + 2 * pitch - low) / pitch).astype(int)
+    cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
+    top = np.full(size, -np.inf)
+    np.maximum.at(top, (cell[:, 0], cell[:, 1]), xyz[:, 2])
+    top = ndimage.maximum_filter(top, 3, mode="constant", cval=-np.inf)
+    i, j = np.nonzero(np.isfinite(top))
+    foot = np.column_stack([low + pitch * (np.stack([i, j], axis=1) + 0.5), np.zeros(len(i))])
+    up = np.tile([0.0, 0.0, 1.0], (len(foot), 1))
+    support = images.settled(*scene.images(), settled := foot.copy(), up, WINDOW, scene.noise, 2)
+    table = np.zeros(size, bool)
+    table[i, j] = (support[:, 0] + support[:, 1] >= LEAST_VIEWS) & (settled[:, 2] < 0.3 * scene.sigma)
+    empty_to = np.full(size, np.inf)
+    sight = _lowest_sight(scene)
+    away = sight * pitch * ndimage.distance_transform_edt(table | ~np.isfinite(top))
+    empty_to[i, j] = _empty_to(scene, foot, table[i, j], top[i, j], pitch, away[i, j])
+    _raise_to_feet(scene, xyz, normal, low, pitch, empty_to, top)
+    return underside(xyz, normal, low, pitch, empty_to, top, sight)
+
+
+def _raise_to_feet(
+    scene: Scene, xyz: Array, normal: Array, low: Array, pitch: float, empty_to: Array, top: Array
+) -> None:
+    """Raise the empty height of the outermost columns under the object to where the walls over them end."""
+    under = np.isfinite(empty_to) & (empty_to < top)
+    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    wall = np.abs(normal[:, 2]) < _WALL
+    i, j = np.nonzero(rim)
+    at = low + pitch * (np.stack([i, j], axis=1) + 0.5)
+    if not len(i) or not wall.any():
+        return
+    away, nearest = cKDTree(xyz[wall, :2]).query(at, distance_upper_bound=2 * pitch)
+    has = np.isfinite(away)
+    i, j, nearest = i[has], j[has], nearest[has]
+    level = normal[wall][nearest].copy()
+    level[:, 2] = 0
+    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    foot = images.feet(
+        *scene.images(), xyz[wall][nearest].copy(), level, _FOOT, int(_HIGHEST_FOOT / _FOOT), scene.noise
+    )
+    empty_to[i, j] = np.maximum(empty_to[i, j], np.minimum(foot, top[i, j] - 1e-6))
+
+
+def _lowest_sight(scene: Scene) -> float:
+    """Return the slope of the lowest sight lines to the object, a tenth of the views being lower."""
+    return float(np.percentile(scene.p[:, 2] / np.linalg.norm(scene.p[:, :2], axis=1), 10))
+
+
+def _empty_to(scene: Scene, foot: Array, table_seen: Any, top: Array, step: float, near: Array) -> Array:
+    """Return up to which height the column over each foot (N, 3) was seen to be empty [m], inf if up to its top."""
+    out = np.where(table_seen, np.minimum(near, top), 0.0)
+    # Sight lines that end on the table pass over it; nearer to it than the noise only their slope tells how high.
+    height = 3 * scene.sigma
+    open_ = np.flatnonzero(table_seen)
+    out[table_seen & (top <= np.minimum(height, near))] = np.inf
+    while len(open_):
+        open_ = open_[top[open_] > height]
+        at = foot[open_].copy()
+        at[:, 2] = height
+        past = images.seen_past(*scene.images(), at, 0.0, scene.noise, LEAST_VIEWS) >= LEAST_VIEWS
+        open_ = open_[past]
+        out[open_] = height + step / 2
+        out[open_[top[open_] <= height + step]] = np.inf
+        height += step
+    return out
 
 
 def underside(
@@ -114,7 +188,7 @@ def _steepness(height: Array, under: Any) -> Array:
             total += np.where(there, step * (height - np.roll(height, step, axis)), 0.0)
             count += there
         out += (total / np.maximum(count, 1)) ** 2
-    return np.sqrt(out)
+    return np.asarray(np.sqrt(out))
 
 
 def _spanned(height: Array, fixed: Any, under: Any) -> Array:

@@ -1,0 +1,81 @@
+"""`steelyard scan VIEWS -o cloud.ply`."""
+
+from __future__ import annotations
+
+import textwrap
+import time
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from steelyard.cli.console import print_json, progress_bar
+from steelyard.errors import BadValue
+
+if TYPE_CHECKING:
+    from steelyard.shape.scan import Scan
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("views", type=click.Path(path_type=Path))
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the cloud (.ply or .npz).")
+@click.option(
+    "--points", type=click.IntRange(200, 50_000), default=3000, show_default=True, help="About so many points."
+)
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
+    """Fuse the posed RGB-D images in the folder VIEWS into one cloud of the object on the table, underside closed."""
+    from steelyard.io.cloud_files import write_cloud
+    from steelyard.io.view_folders import read_views
+    from steelyard.shape.scan import fuse
+
+    if output is not None and output.suffix.lower() not in (".ply", ".npz"):
+        raise BadValue(f"{output}: a cloud is written as .ply or .npz.")
+    read = read_views(views, progress_bar("reading views"))
+    begun = time.process_time()
+    fused = fuse(read, points)
+    seconds = time.process_time() - begun
+    if output is not None:
+        write_cloud(fused.cloud, output)
+    if as_json:
+        print_json(_plain(fused, output, seconds))
+    else:
+        click.echo(_table(fused, views, output, seconds))
+
+
+def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
+    return {
+        "views": fused.views,
+        "points": len(fused.cloud),
+        "seen_points": fused.seen,
+        "spacing_m": fused.spacing,
+        "table": {"normal": fused.table.normal.tolist(), "offset_m": fused.table.offset},
+        "depth_noise_m": fused.noise_std,
+        "disagreement": fused.disagree,
+        "cameras_moved_m": fused.moved_m,
+        "cpu_s": round(seconds, 4),
+        "stages": {name: round(value, 4) for name, value in fused.stages.items()},
+        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in fused.findings],
+        "output": None if output is None else str(output),
+    }
+
+
+def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str:
+    cloud, n = fused.cloud, fused.table.normal
+    size = " x ".join(f"{1e3 * length:.0f}" for length in cloud.xyz.max(0) - cloud.xyz.min(0))
+    moved = "as reported" if fused.moved_m is None else f"moved by {1e3 * fused.moved_m:.1f} mm (rms) until they agree"
+    rows = [
+        ("views", f"{fused.views}, poses {moved}"),
+        ("points", f"{len(cloud)}: {fused.seen} seen, {len(cloud) - fused.seen} close the underside"),
+        ("box", f"{size} mm along x, y, z of W"),
+        ("spacing", f"{1e3 * fused.spacing:.2f} mm"),
+        ("table", f"normal {n[0]:.3f} {n[1]:.3f} {n[2]:.3f}, offset {1e3 * fused.table.offset:.1f} mm"),
+        ("depth noise", f"{1e3 * fused.noise_std:.2f} mm per view, views spread {fused.disagree:.2f} times that"),
+        ("time", f"{seconds:.2f} s CPU"),
+    ]
+    lines = [f"{views}: the object on the table", ""] + [f"  {name:12s} {text}" for name, text in rows]
+    if output is not None:
+        lines += ["", f"Cloud written to {output}."]
+    for finding in fused.findings:
+        lines += ["", *textwrap.wrap(f"{finding.code}: {finding.message} {finding.remedy}", 100)]
+    return "\n".join(lines)

@@ -1,0 +1,130 @@
+"""Clouds as files: PLY (ascii, binary), PCD (ascii, binary, compressed) and NPZ in; PLY and NPZ out."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.errors import BadFile, BadValue
+from steelyard.io.array_table import ArrayTable
+from steelyard.io.pcd_files import read_pcd
+from steelyard.io.ply_files import read_ply, write_bytes
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.mesh import Colours
+
+SUFFIXES = (".ply", ".pcd", ".npz")
+_LABELS = ("label", "segmentation", "part")
+_NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
+
+
+def read_cloud(path: Path | str) -> Cloud:
+    """Read a cloud in metres by the ending of its name; points that are NaN (holes of an organised PCD) are left out.
+
+    Raises BadFile.
+    """
+    path = Path(path)
+    if not path.is_file():
+        raise BadFile(f"{path}: no such file.")
+    match path.suffix.lower():
+        case ".ply":
+            columns = read_ply(path).get("vertex", {})
+        case ".pcd":
+            columns = read_pcd(path)
+        case ".npz":
+            return _checked(path, *_of_arrays(path))
+        case other:
+            raise BadFile(f'{path}: "{other}" is no cloud. Give {", ".join(SUFFIXES)}.')
+    missing = [axis for axis in "xyz" if axis not in columns]
+    if missing:
+        raise BadFile(f'{path}: points need x, y and z; "{missing[0]}" is missing.')
+    normals = next((names for names in _NORMALS if set(names) <= set(columns)), None)
+    label = next((columns[name] for name in _LABELS if name in columns), None)
+    return _checked(
+        path, _stacked(columns, "xyz"), _rgb(columns), label, None if normals is None else _stacked(columns, normals)
+    )
+
+
+def _stacked(columns: dict[str, Any], names: Any) -> Any:
+    return np.stack([np.asarray(columns[name]) for name in names], axis=1)
+
+
+def _rgb(columns: dict[str, Any]) -> Colours | None:
+    """Return colours (N, 3) from red, green, blue (0..255, or 0..1 as floats) or from packed rgb."""
+    for names in (("red", "green", "blue"), ("r", "g", "b")):
+        if set(names) <= set(columns):
+            rgb = _stacked(columns, names)
+            if rgb.dtype.kind == "f" and np.nanmax(rgb, initial=0.0) <= 1:
+                rgb = rgb * 255
+            return np.asarray(np.clip(np.round(np.nan_to_num(rgb)), 0, 255), np.uint8)
+    for name in ("rgb", "rgba"):
+        if name in columns:
+            packed = np.ascontiguousarray(columns[name])
+            bits = packed.astype(np.float32).view(np.uint32) if packed.dtype.kind == "f" else packed.astype(np.uint32)
+            return np.stack([bits >> shift & 255 for shift in (16, 8, 0)], axis=1).astype(np.uint8)
+    return None
+
+
+def _of_arrays(path: Path) -> tuple[Any, ...]:
+    header = ArrayTable.open(path).header  # refuses pickles by their header
+    if "xyz" not in header.groups:
+        raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing.')
+    found: list[Any] = []
+    with np.load(path, allow_pickle=False) as archive:
+        for name in ("xyz", "rgb", "label", "normals"):
+            try:
+                values = archive.get(name)
+            except Exception as error:  # zip, zlib and numpy each raise their own
+                raise BadFile(f'{path}: array "{name}" is damaged ({error}). Save the file again.') from None
+            if values is not None and values.dtype.kind not in "fiub":
+                raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {values.dtype}.')
+            found.append(values)
+    return tuple(found)
+
+
+def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any) -> Cloud:
+    """Return the cloud of finite points; raises BadFile where none is left or columns differ in length."""
+    xyz = np.asarray(xyz, np.float64)
+    if xyz.ndim != 2 or xyz.shape[1] != 3:
+        raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
+    holes = np.isnan(xyz).all(1)
+    try:
+        whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals)]
+        if holes.any() and not holes.all():
+            xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
+        return Cloud(xyz, *whole)
+    except BadValue as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def write_cloud(cloud: Cloud, path: Path | str) -> None:
+    """Write a cloud as .ply (binary) or .npz, whole or not at all; raises BadFile."""
+    path = Path(path)
+    match path.suffix.lower():
+        case ".ply":
+            write_bytes(path, _ply(cloud))
+        case ".npz":
+            content = io.BytesIO()
+            columns = {"xyz": cloud.xyz, "rgb": cloud.rgb, "label": cloud.label, "normals": cloud.normals}
+            np.savez_compressed(content, allow_pickle=False, **{k: v for k, v in columns.items() if v is not None})
+            write_bytes(path, content.getvalue())
+        case other:
+            raise BadFile(f'{path}: a cloud is written as .ply or .npz, not as "{other}".')
+
+
+def _ply(cloud: Cloud) -> bytes:
+    fields: list[tuple[str, str, str, Any]] = [(axis, "double", "<f8", cloud.xyz[:, k]) for k, axis in enumerate("xyz")]
+    if cloud.normals is not None:
+        fields += [(name, "float", "<f4", cloud.normals[:, k]) for k, name in enumerate(_NORMALS[0])]
+    if cloud.rgb is not None:
+        fields += [(name, "uchar", "u1", cloud.rgb[:, k]) for k, name in enumerate(("red", "green", "blue"))]
+    if cloud.label is not None:
+        fields.append(("label", "int", "<i4", cloud.label))
+    table = np.zeros(len(cloud), [(name, kind) for name, _, kind, _ in fields])
+    for name, _, _, values in fields:
+        table[name] = values
+    header = ["ply", "format binary_little_endian 1.0", "comment units metres", f"element vertex {len(cloud)}"]
+    header += [f"property {word} {name}" for name, word, _, _ in fields]
+    return ("\n".join([*header, "end_header"]) + "\n").encode() + table.tobytes()

@@ -1,0 +1,67 @@
+"""PNG images, 8-bit colour and 16-bit depth: the one module that imports pillow (extra `images`)."""
+
+from __future__ import annotations
+
+import io
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.errors import BadFile, MissingDependency
+from steelyard.io.ply_files import write_bytes
+from steelyard.shape.mesh import Colours
+from steelyard.shape.views import Depths
+
+_MOST_PIXELS = 64_000_000
+
+
+def _pillow() -> Any:
+    try:
+        import PIL.Image
+    except ImportError:
+        raise MissingDependency.of("pillow", "images", "Reading and writing images") from None
+    return PIL.Image
+
+
+def read_depth(path: Path) -> Depths:
+    """Return a depth image (H, W) uint16; raises BadFile where it has not one channel of 16 bits."""
+    image = _opened(path)
+    if not image.mode.startswith("I"):
+        raise BadFile(f"{path}: depth must be a PNG with one channel of 16 bits; this one has mode {image.mode}.")
+    return np.asarray(_pixels(path, image), np.uint16)
+
+
+def read_colour(path: Path) -> Colours:
+    """Return a colour image (H, W, 3) uint8; raises BadFile."""
+    image = _opened(path)
+    if image.mode not in ("RGB", "RGBA", "L", "P", "LA"):
+        raise BadFile(f"{path}: colour must be a PNG with 8 bits per channel; this one has mode {image.mode}.")
+    return np.asarray(_pixels(path, image, "RGB"), np.uint8)
+
+
+def _opened(path: Path) -> Any:
+    pillow = _pillow()
+    try:
+        image = pillow.open(path, formats=("PNG",))
+    except FileNotFoundError:
+        raise BadFile(f"{path}: this image is missing.") from None
+    except (OSError, ValueError, SyntaxError):
+        raise BadFile(f"{path}: expected a PNG image; found something else.") from None
+    if image.width * image.height > _MOST_PIXELS:
+        raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than any depth camera has.")
+    return image
+
+
+def _pixels(path: Path, image: Any, mode: str | None = None) -> Any:
+    try:
+        return np.asarray(image if mode is None else image.convert(mode))
+    except (OSError, ValueError, SyntaxError) as error:
+        raise BadFile(f"{path}: this image is damaged ({error}). Save it again.") from None
+
+
+def write_image(path: Path, pixels: Depths | Colours) -> None:
+    """Write (H, W) uint16 or (H, W, 3) uint8 as PNG; raises BadFile."""
+    content = io.BytesIO()
+    _pillow().fromarray(np.ascontiguousarray(pixels)).save(content, "PNG", compress_level=1)
+    write_bytes(path, content.getvalue())

@@ -1,0 +1,142 @@
+"""PCD files, the clouds of the Point Cloud Library: ascii, binary and binary_compressed."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+from typing import Any
+
+import numba
+import numpy as np
+
+from steelyard.errors import BadFile
+
+_TYPES = {
+    ("F", "4"): "<f4", ("F", "8"): "<f8", ("U", "1"): "u1", ("U", "2"): "<u2", ("U", "4"): "<u4", ("U", "8"): "<u8",
+    ("I", "1"): "i1", ("I", "2"): "<i2", ("I", "4"): "<i4", ("I", "8"): "<i8",
+}  # fmt: skip
+
+
+def read_pcd(path: Path) -> dict[str, Any]:
+    """Return field -> values (N,), padding left out; raises BadFile."""
+    content = path.read_bytes()
+    mark = content.find(b"\nDATA ")
+    end = content.find(b"\n", mark + 1)
+    if mark < 0 or end < 0:
+        raise BadFile(f"{path}: expected a PCD file, whose header ends in a DATA line; found something else.")
+    lines = [line.split() for line in content[:end].decode("latin-1").splitlines() if line and line[0] != "#"]
+    header = {words[0].upper(): words[1:] for words in lines if words}
+    dtype, count = _layout(path, header)
+    body = content[end + 1 :]
+    kind = (header["DATA"] or [""])[0].lower()
+    match kind:
+        case "ascii":
+            table = _ascii(path, body, dtype, count)
+        case "binary":
+            table = _whole(path, body, dtype, count)
+        case "binary_compressed":
+            table = _compressed(path, body, dtype, count)
+        case _:
+            raise BadFile(f'{path}: DATA must be ascii, binary or binary_compressed; got "{kind}".')
+    return {name: table[name] for name in dtype.names or () if not name.startswith("_") and table[name].ndim == 1}
+
+
+def _layout(path: Path, header: dict[str, list[str]]) -> tuple[np.dtype[Any], int]:
+    """Return the record of one point and the number of points."""
+    names = header.get("FIELDS", [])
+    counts = header.get("COUNT", ["1"] * len(names))
+    kinds = list(zip(header.get("TYPE", []), header.get("SIZE", []), strict=False))
+    try:
+        points = int(header["POINTS"][0])
+        widths = [int(width) for width in counts]
+        types = [_TYPES[kind] for kind in kinds]
+    except (KeyError, IndexError, ValueError):
+        raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.") from None
+    if not names or len({len(names), len(types), len(widths)}) > 1 or points < 0 or min(widths) < 1:
+        raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.")
+    # padding fields are all called "_": number them
+    named = [name if name != "_" and names.count(name) == 1 else f"_{k}" for k, name in enumerate(names)]
+    fields: list[Any] = [
+        (name, kind) if width == 1 else (name, kind, (width,))
+        for name, kind, width in zip(named, types, widths, strict=True)
+    ]
+    return np.dtype(fields), points
+
+
+def _short(path: Path, count: int) -> BadFile:
+    return BadFile(f"{path}: the file ends before its {count} points.")
+
+
+def _whole(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> Any:
+    if len(body) < count * dtype.itemsize:
+        raise _short(path, count)
+    return np.frombuffer(body[: count * dtype.itemsize], dtype)
+
+
+def _ascii(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> Any:
+    width = sum(int(np.prod(dtype[name].shape)) for name in dtype.names or ())
+    words = body.split()
+    if len(words) < count * width:
+        raise _short(path, count)
+    try:
+        values = np.array(words[: count * width], dtype="S").astype(np.float64).reshape(count, width)
+    except ValueError:
+        raise BadFile(f"{path}: a point holds a word that is no number.") from None
+    table, column = np.zeros(count, dtype), 0
+    for name in dtype.names or ():
+        size = int(np.prod(dtype[name].shape))
+        found = values[:, column : column + size]
+        table[name] = found.reshape(table[name].shape)
+        column += size
+    return table
+
+
+def _compressed(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> Any:
+    """Return the points of an LZF-compressed body, in which each field lies whole behind the other."""
+    if len(body) < 8:
+        raise _short(path, count)
+    packed, size = struct.unpack("<II", body[:8])
+    if size != count * dtype.itemsize or len(body) < 8 + packed:
+        raise _short(path, count)
+    out = np.zeros(size, np.uint8)
+    if _inflate(np.frombuffer(body[8 : 8 + packed], np.uint8), out) != size:
+        raise BadFile(f"{path}: the compressed points are damaged. Save the file again.")
+    table, place = np.zeros(count, dtype), 0
+    for name in dtype.names or ():
+        length = count * dtype[name].itemsize
+        table[name] = out[place : place + length].view(dtype[name].base).reshape(table[name].shape)
+        place += length
+    return table
+
+
+@numba.njit(cache=True, nogil=True)
+def _inflate(packed: Any, out: Any) -> int:
+    """Undo LZF into `out`; return the bytes written, -1 where the data are damaged."""
+    i, o = 0, 0
+    while i < len(packed):
+        control = int(packed[i])
+        i += 1
+        if control < 32:  # a run of plain bytes
+            run = control + 1
+            if i + run > len(packed) or o + run > len(out):
+                return -1
+            out[o : o + run] = packed[i : i + run]
+            i, o = i + run, o + run
+            continue
+        run = control >> 5
+        if run == 7:
+            if i >= len(packed):
+                return -1
+            run += int(packed[i])
+            i += 1
+        if i >= len(packed):
+            return -1
+        back = o - ((control & 31) << 8) - int(packed[i]) - 1
+        i += 1
+        run += 2
+        if back < 0 or o + run > len(out):
+            return -1
+        for k in range(run):  # may overlap what it writes
+            out[o + k] = out[back + k]
+        o += run
+    return o

@@ -1,0 +1,174 @@
+"""Folders of posed RGB-D views: camera.json, poses.csv, color/NAME.png, depth/NAME.png and, if known, table.json."""
+
+from __future__ import annotations
+
+import csv
+import json
+import math
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, TypeVar
+
+import numpy as np
+
+from steelyard.errors import BadFile, BadValue
+from steelyard.io.images import read_colour, read_depth, write_image
+from steelyard.io.ply_files import write_bytes
+from steelyard.shape.views import Intrinsics, TablePlane, Views
+from steelyard.spatial import Pose, Rotation
+
+_COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
+_CAMERA = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m")
+T = TypeVar("T")
+_UNIT = 1e-3  # how far from 1 the length of a quaternion may be
+
+
+def read_views(folder: Path | str, progress: Callable[[int, int], None] | None = None) -> Views:
+    """Read a folder of views; colour is optional, all or none. Raises BadFile with the file and what is wrong."""
+    folder = Path(folder)
+    if not folder.is_dir():
+        raise BadFile(f"{folder}: no such folder. Views are a folder with camera.json, poses.csv and depth/.")
+    camera = _camera(folder / "camera.json")
+    names, X_WC = _poses(folder / "poses.csv")
+    intrinsics = _of(folder / "camera.json", lambda: _intrinsics(camera))
+    size = (intrinsics.height, intrinsics.width)
+    depth = np.zeros((len(names), *size), np.uint16)
+    coloured = (folder / "color").is_dir()
+    rgb = np.zeros((len(names), *size, 3), np.uint8) if coloured else None
+    for k, name in enumerate(names):
+        depth[k] = _sized(folder / "depth" / f"{name}.png", read_depth, size)
+        if rgb is not None:
+            rgb[k] = _sized(folder / "color" / f"{name}.png", read_colour, size)
+        if progress:
+            progress(k + 1, len(names))
+    table = _table(folder / "table.json") if (folder / "table.json").exists() else None
+    return _of(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
+
+
+def _of(path: Path, make: Callable[[], T]) -> T:
+    """Return make(), with the path in front of what is wrong with the numbers."""
+    try:
+        return make()
+    except BadValue as error:
+        raise BadFile(f"{path}: {error}") from None
+
+
+def _object(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return a JSON object that has all `keys`."""
+    try:
+        values = json.loads(path.read_text(encoding="utf-8"))
+    except FileNotFoundError:
+        raise BadFile(f"{path}: this file is missing. It needs {', '.join(keys)}.") from None
+    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
+        raise BadFile(f"{path}: expected a JSON file; {error}.") from None
+    if not isinstance(values, dict) or not set(keys) <= set(values):
+        raise BadFile(f"{path}: expected one JSON object with {', '.join(keys)}.")
+    return values
+
+
+def _number(path: Path, key: str, value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise BadFile(f'{path}: "{key}" must be a finite number; got {value!r}.')
+    return float(value)
+
+
+def _camera(path: Path) -> dict[str, float]:
+    values = _object(path, _CAMERA)
+    camera = {key: _number(path, key, values[key]) for key in _CAMERA}
+    if any(camera[key] != int(camera[key]) for key in ("width", "height")):
+        raise BadFile(f"{path}: width and height must be whole numbers of pixels.")
+    if not 0 < camera["depth_unit_m"] < 1:
+        raise BadFile(
+            f'{path}: "depth_unit_m" must be metres per step, 0.001 for millimetres; got {camera["depth_unit_m"]:g}.'
+        )
+    return camera
+
+
+def _intrinsics(camera: dict[str, float]) -> Intrinsics:
+    return Intrinsics(int(camera["width"]), int(camera["height"]), *(camera[key] for key in ("fx", "fy", "cx", "cy")))
+
+
+def _poses(path: Path) -> tuple[list[str], Pose]:
+    """Return the names of the views and the poses (V,) of the camera in W."""
+    try:
+        with path.open(newline="", encoding="utf-8") as lines:
+            rows = list(csv.DictReader(lines, skipinitialspace=True))
+    except FileNotFoundError:
+        raise BadFile(f"{path}: this file is missing. It needs the columns {', '.join(_COLUMNS)}.") from None
+    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        raise BadFile(f"{path}: cannot be read as CSV; {error}.") from None
+    if not rows or not set(_COLUMNS) <= {str(key) for key in rows[0]}:
+        raise BadFile(f"{path}: expected the columns {', '.join(_COLUMNS)} and a row per view.")
+    names, numbers = [], np.empty((len(rows), 7))
+    for k, row in enumerate(rows):
+        names.append(_name(path, k + 2, str(row["name"] or "")))
+        for c, key in enumerate(_COLUMNS[1:]):
+            try:
+                numbers[k, c] = float(row[key] or "")
+            except ValueError:
+                raise BadFile(f'{path}: line {k + 2}, column "{key}": expected a number; found "{row[key]}".') from None
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise BadFile(f'{path}: the view "{twice}" is named {names.count(twice)} times. Give each view its own name.')
+    bad = np.flatnonzero(~np.isfinite(numbers).all(1))
+    if len(bad):
+        raise BadFile(f"{path}: line {bad[0] + 2} holds NaN or infinity; {len(bad)} of {len(rows)} poses do.")
+    length = np.linalg.norm(numbers[:, 3:], axis=1)
+    off = np.flatnonzero(np.abs(length - 1) > _UNIT)
+    if len(off):
+        raise BadFile(
+            f"{path}: line {off[0] + 2}: the quaternion qw, qx, qy, qz must have length 1; it has {length[off[0]]:.4g}."
+        )
+    return names, Pose(Rotation.from_quaternion_wxyz(numbers[:, 3:] / length[:, None]), numbers[:, :3])
+
+
+def _name(path: Path, line: int, name: str) -> str:
+    """Return the name of a view, which must be a file's name inside the folder."""
+    if not name or name.startswith(".") or any(mark in name for mark in ("/", "\\", ":", "\0")):
+        raise BadFile(
+            f'{path}: line {line}: "{name}" is no name of a view. Use letters, digits, - and _ without folders.'
+        )
+    return name
+
+
+def _sized(path: Path, read: Callable[[Path], Any], size: tuple[int, int]) -> Any:
+    pixels = read(path)
+    if pixels.shape[:2] != size:
+        raise BadFile(
+            f"{path}: this image has {pixels.shape[1]} x {pixels.shape[0]} pixels; "
+            f"camera.json says {size[1]} x {size[0]}."
+        )
+    return pixels
+
+
+def _table(path: Path) -> TablePlane:
+    values = _object(path, ("normal", "offset_m"))
+    normal = values["normal"]
+    if not isinstance(normal, list) or len(normal) != 3:
+        raise BadFile(f'{path}: "normal" must be three numbers; got {normal!r}.')
+    axes = np.array([_number(path, "normal", value) for value in normal])
+    return _of(path, lambda: TablePlane(axes, _number(path, "offset_m", values["offset_m"])))
+
+
+def write_views(views: Views, folder: Path | str) -> None:
+    """Write views as a folder; images are named 0000, 0001, ... Raises BadFile."""
+    folder = Path(folder)
+    try:
+        for name in ("depth", *(["color"] if views.rgb is not None else [])):
+            (folder / name).mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
+    names = [f"{k:04d}" for k in range(len(views))]
+    for k, name in enumerate(names):
+        write_image(folder / "depth" / f"{name}.png", views.depth[k])
+        if views.rgb is not None:
+            write_image(folder / "color" / f"{name}.png", views.rgb[k])
+    lens = views.intrinsics
+    camera = {key: getattr(lens, key) for key in _CAMERA[:-1]} | {"depth_unit_m": views.depth_unit}
+    write_bytes(folder / "camera.json", json.dumps(camera, indent=1).encode())
+    numbers = np.column_stack([views.X_WC.position, views.X_WC.rotation.quaternion_wxyz()])
+    lines = [",".join([name, *map(repr, row)]) for name, row in zip(names, numbers.tolist(), strict=True)]
+    write_bytes(folder / "poses.csv", ("\n".join([",".join(_COLUMNS), *lines]) + "\n").encode())
+    if views.table is not None:
+        table = {"normal": views.table.normal.tolist(), "offset_m": views.table.offset}
+        write_bytes(folder / "table.json", json.dumps(table).encode())

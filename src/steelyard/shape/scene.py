@@ -1,0 +1,161 @@
+"""Views in the frame of the table: where the object lies, how noisy depth is, patches of surface."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from scipy import ndimage
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.shape import depth_images as images
+from steelyard.shape.table_plane import find_table, table_frame
+from steelyard.shape.thinning import spread_to
+from steelyard.shape.views import TablePlane, Views
+from steelyard.spatial import Pose
+
+LEAST_VIEWS = 3  # that must agree before something is believed
+WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
+_SAMPLES = 60_000  # points that find the table
+_STRIDE = 2  # of the pixels that are looked at
+_NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
+_REACH = 0.6  # of the camera's distance: how far from where the cameras look the object may lie
+_CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
+_MARGIN = 0.008  # of table kept around the object [m]
+
+
+@dataclass(eq=False)
+class Scene:
+    """The images with their poses in the table's frame."""
+
+    views: Views
+    X_WT: Pose
+    R: Array
+    p: Array
+    distance: float
+    noise: float
+
+    @property
+    def pixel(self) -> float:
+        """Width of a pixel at the object [m]."""
+        return self.distance / self.views.intrinsics.fx
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of depth at the object [m]."""
+        return self.noise * self.distance**2
+
+    def images(self) -> tuple[Any, float, Array, Array, Array]:
+        """Return what every pass over the images needs: depth, its unit, the camera and its poses."""
+        return self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p
+
+
+def scene_of(views: Views) -> tuple[Scene, TablePlane]:
+    """Return the images in the table's frame, and the table."""
+    R, p = views.X_WC.rotation.matrix, views.X_WC.position
+    stride = max(1, int(np.sqrt(views.depth.size / _SAMPLES)))
+    sampled = images.sampled(views.depth, views.depth_unit, views.intrinsics.vector, R, p, stride)
+    looks = _looked_at(R, p)
+    distance = float(np.median(np.linalg.norm(p - looks, axis=1)))
+    table = find_table(sampled[:, :3], p, distance, views.table)
+    X_WT = table_frame(table, looks)
+    noise = _depth_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), views.depth_unit, distance)
+    X_TC = X_WT.inverse() @ views.X_WC
+    R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
+    return Scene(views, X_WT, R.copy(), p.copy(), distance, noise), table
+
+
+def _looked_at(R: Array, p: Array) -> Array:
+    """Return the point (3,) nearest to all optical axes; where they are parallel, half a metre along the first."""
+    axis = R[:, :, 2]
+    across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
+    # A weak pull, so that a single view has an answer too.
+    start = p.mean(0) + 0.5 * axis.mean(0)
+    H = across.sum(0) + 1e-3 * np.eye(3)
+    return np.asarray(np.linalg.solve(H, np.einsum("vij,vj->i", across, p) + 1e-3 * start))
+
+
+def _depth_noise(sampled: Array, xyz: Array, unit: float, distance: float) -> float:
+    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points."""
+    spreads = []
+    view = sampled[:, 4].astype(int)
+    near = np.abs(xyz[:, 2]) < 0.03 * distance
+    for k in np.unique(view):
+        rows = near & (view == k)
+        if rows.sum() < 30:
+            continue
+        scale = sampled[rows, 3] ** 2
+        A = np.column_stack([np.ones(rows.sum()), xyz[rows, :2]]) / scale[:, None]
+        b = xyz[rows, 2] / scale
+        keep = np.ones(len(b), bool)
+        for _ in range(3):
+            plane = np.linalg.lstsq(A[keep], b[keep], rcond=None)[0]
+            rest = b - A @ plane
+            spread = float(np.subtract(*np.percentile(rest, (75, 25)))) / 1.35
+            keep = np.abs(rest) < 3 * max(spread, 1e-9)
+        spreads.append(spread)
+    # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
+    found = float(np.median(spreads)) / 0.7 if spreads else 0.0
+    return max(found, float(unit / np.sqrt(12) / distance**2))
+
+
+def object_on_table(scene: Scene) -> tuple[Any, Array, float, int]:
+    """Return where on the table the object lies, with a margin: mask (I, J), corner (2,), cell [m]; other objects."""
+    pitch = 2 * scene.pixel
+    half = int(_REACH * scene.distance / pitch)
+    low = np.full(2, -half * pitch)
+    size = 2 * half
+    sums = images.height_map(*scene.images(), _STRIDE, low, pitch, 6 * scene.sigma, size, size)
+    count, mean = sums[..., 0], sums[..., 1] / np.maximum(sums[..., 0], 1)
+    watched = count >= 0.25 * np.median(count[count > 0])
+    spread = float(np.subtract(*np.percentile(mean[watched], (75, 25)))) / 1.35
+    level = float(np.median(mean[watched]))
+    up = watched & (mean > level + max(5 * spread, 0.3 * scene.sigma))
+    label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
+    if not found:
+        raise CannotAnswer("no object was found on the table: nothing stands out of it where the cameras look.")
+    area = np.bincount(label.ravel(), minlength=found + 1)[1:]
+    largest = int(np.argmax(area)) + 1
+    others = int((area > max(0.1 * area.max(), 25)).sum()) - 1
+    margin = max(3, int(np.ceil(_MARGIN / pitch)))
+    mine = ndimage.binary_dilation(label == largest, np.ones((3, 3)), iterations=margin)
+    stranger = ndimage.binary_dilation(
+        (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(area > 25)), np.ones((3, 3))
+    )
+    return mine & ~stranger, low, pitch, others
+
+
+def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
+    """Return patches (N, 8) of the object and of the table around it."""
+    cell = _CELL * scene.pixel
+    floor = -4 * scene.sigma - 2 * cell
+    highest = float(np.median(scene.p[:, 2]))
+    layers = int((min(highest, _REACH * scene.distance) - floor) / cell) + 1
+    found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, mask, low, pitch, cell, floor, layers, scene.noise)
+    return np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
+
+
+def surface_of(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float, points: int) -> tuple[Array, Array]:
+    """Return points (N, 3) of the object's surface and normals, settled among the views."""
+    order = np.argsort(-patches[:, 6], kind="stable")
+    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, 6 * points, scene.pixel)
+    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
+    support = images.settled(*scene.images(), xyz, normal, WINDOW, scene.noise, 2)
+    least = min(LEAST_VIEWS, len(scene.R))
+    good = (support[:, 0] >= least) & (support[:, 1] <= 0.5 * support[:, 0])
+    table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
+    level, rough = 0.0, 0.1 * scene.sigma
+    object_cells = ndimage.binary_erosion(mask, np.ones((3, 3)), iterations=3)
+    cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
+    around = table & ~object_cells[cell[:, 0].clip(0, mask.shape[0] - 1), cell[:, 1].clip(0, mask.shape[1] - 1)]
+    if around.sum() >= 20:
+        level = float(np.median(xyz[around, 2]))
+        rough = float(np.subtract(*np.percentile(xyz[around, 2], (75, 25)))) / 1.35
+    xyz[:, 2] -= level
+    scene.p[:, 2] -= level
+    keep = good & (xyz[:, 2] > 5 * rough)
+    if keep.sum() < 20:
+        raise CannotAnswer("no object was found on the table: nothing stands out of it once the views are fused.")
+    return xyz[keep], normal[keep]
