@@ -260,3 +260,15 @@ def test_motions_show_as_much_of_a_body_as_they_should(name: str) -> None:
     size = np.linalg.norm(stacked, axis=0)
     values = np.linalg.svd(stacked / np.where(size > 0, size, 1.0), compute_uv=False)
     assert int((values > 1e-9 * values[0]).sum()) == rank
+
+
+def test_an_imu_feels_the_grasp_it_sits_on() -> None:
+    scene = replace(SHORT, imus=frozenset({1}))
+    trial, pose = simulate_team(scene, 3), world_poses(simulate_team(scene, 3), 1)
+    track, step = trial.log.recordings[0].tracks["robot1"], 0.01
+    felt = pose.rotation.apply(track.channels["specific_force"])[1:-1] - [0, 0, GRAVITY]
+    place = pose.position
+    assert np.abs(felt - (place[2:] - 2 * place[1:-1] + place[:-2]) / step**2).max() < 5e-3
+    turned = (pose.rotation[:-2].inverse() @ pose.rotation[2:]).log() / (2 * step)
+    assert np.abs(turned - track.channels["angular_velocity"][1:-1]).max() < 2e-3
+    assert "specific_force" not in trial.log.recordings[0].tracks["robot0"].channels

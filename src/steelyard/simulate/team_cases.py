@@ -37,7 +37,8 @@ class TeamNoise:
     force_white_N, force_spectrum   of every grasp axis
     force_bias_N, force_gain    drawn anew for every recording and grasp axis
     torque_white_Nm, torque_bias_Nm   the same for six-axis wrists
-    pose_rad, pose_m            of poses, white, when `sensing` is "poses"
+    pose_rad, pose_m, pose_spectrum   of poses, when `sensing` is "poses"
+    imu_rad_s, imu_m_s2         of the IMUs at the grasps, white
     rate_rad_s, velocity_m_s, twist_spectrum   of twists, when `sensing` is "twists"
     """
 
@@ -52,6 +53,9 @@ class TeamNoise:
     torque_bias_Nm: float = 0.0
     pose_rad: float = 0.0
     pose_m: float = 0.0
+    pose_spectrum: Spectrum = "white"
+    imu_rad_s: float = 0.0
+    imu_m_s2: float = 0.0
     rate_rad_s: float = 0.0
     velocity_m_s: float = 0.0
     twist_spectrum: Spectrum = "white"
@@ -123,6 +127,7 @@ class TeamScene:
     robots        how many
     sensing       "joints" (encoders of Omnids), "poses" or "twists" with white noise, for any number of robots
     six_axis      robots whose wrists also bear a moment; the others have passive gimbals
+    imus          robots whose grasps also bear an IMU: angular velocity and specific force (rigid payloads only)
     late_s        by how much a robot's stamps are late [s]
     dropout       share of rows that a robot loses, at random
     gaps          stretches (start, end) [s] of the motion recording that a robot loses
@@ -137,6 +142,7 @@ class TeamScene:
     robots: int = 3
     sensing: Sensing = "joints"
     six_axis: frozenset[int] = frozenset()
+    imus: frozenset[int] = frozenset()
     late_s: Mapping[int, float] = field(default_factory=dict)
     dropout: float = 0.0
     gaps: Mapping[int, tuple[tuple[float, float], ...]] = field(default_factory=dict)

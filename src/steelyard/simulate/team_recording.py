@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadValue
 from steelyard.logs.team_track import Mask, Track
 from steelyard.robots import Omnid
 from steelyard.simulate.motions import Kinematics, Motion
@@ -14,7 +15,7 @@ from steelyard.simulate.team_cases import Slip, TeamScene
 from steelyard.simulate.team_hinge import hinged_load
 from steelyard.simulate.team_motions import sines
 from steelyard.simulate.team_payload import Carried, Load, Squeeze, TeamPayload, carry, grasp_load
-from steelyard.simulate.team_sensing import read_joints, read_pose, read_twist, read_wrench
+from steelyard.simulate.team_sensing import read_imu, read_joints, read_pose, read_twist, read_wrench
 from steelyard.spatial import Pose, Rotation
 
 
@@ -127,6 +128,8 @@ def record(
         read = omnid.pose(angles)
         channels |= {"rotation": read.rotation.matrix, "position": read.position}
         record = JointRecord(stamps, angles, omnid.spring_torques(angles, wrench[:, 3:]))
+    if robot in scene.imus:
+        channels |= _imu_channels(rng, view, robot, time)
     return Track.of(stamps, None, **_with_gaps(rng, scene, plan, robot, channels)), record
 
 
@@ -138,6 +141,14 @@ def _twist_channels(
     if scene.bases_move:
         return channels | {"gravity": seen.gravity[robot]}
     return channels | {"rotation": read_pose(rng, pose, scene.noise).rotation.matrix}
+
+
+def _imu_channels(rng: np.random.Generator, view: View, robot: int, time: Array) -> dict[str, Array | None]:
+    if view.scene.hinge is not None or view.scene.slip is not None:
+        raise BadValue("IMUs are simulated on rigid payloads whose grasps hold; leave out the hinge, or the slip.")
+    grasp = view.payload.grasps[robot]
+    omega, force = read_imu(rng, view.plan.motion.at(time), grasp, view.scene.noise)
+    return {"angular_velocity": omega, "specific_force": force}
 
 
 def _with_gaps(

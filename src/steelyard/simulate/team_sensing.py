@@ -6,10 +6,10 @@ import numpy as np
 from scipy import signal
 
 from steelyard.check import Array
-from steelyard.robots import Omnid
+from steelyard.simulate.motions import Kinematics
 from steelyard.simulate.noise import unit_noise
-from steelyard.simulate.team_cases import RATE_HZ, TeamNoise
-from steelyard.spatial import Pose, Rotation
+from steelyard.simulate.team_cases import GRAVITY, RATE_HZ, TeamNoise
+from steelyard.spatial import Pose, Rotation, cross
 
 _CORNER_HZ = 2.0
 
@@ -33,16 +33,27 @@ def read_joints(rng: np.random.Generator, joints: Array, noise: TeamNoise) -> Ar
 
 
 def read_pose(rng: np.random.Generator, pose: Pose, noise: TeamNoise) -> Pose:
-    """Return poses (T,) with white noise on rotation and position, in the grasp's and the home's axes."""
-    turn = noise.pose_rad * rng.standard_normal(pose.position.shape)
-    place = noise.pose_m * rng.standard_normal(pose.position.shape)
-    return Pose(pose.rotation @ Rotation.exp(turn), pose.position + place)
+    """Return poses (T,) with noise on rotation and position, in the grasp's and the home's axes."""
+    size = np.repeat([noise.pose_rad, noise.pose_m], 3)
+    error = size * unit_noise(rng, len(pose.position), 6, noise.pose_spectrum, RATE_HZ)
+    return Pose(pose.rotation @ Rotation.exp(error[:, :3]), pose.position + error[:, 3:])
 
 
 def read_twist(rng: np.random.Generator, twist: Array, noise: TeamNoise) -> Array:
     """Return body twists (T, 6) with noise of the case's spectrum."""
     size = np.repeat([noise.rate_rad_s, noise.velocity_m_s], 3)
     return np.asarray(twist + size * unit_noise(rng, len(twist), 6, noise.twist_spectrum, RATE_HZ))
+
+
+def read_imu(rng: np.random.Generator, motion: Kinematics, grasp: Pose, noise: TeamNoise) -> tuple[Array, Array]:
+    """Return angular velocity and specific force a - g (T, 3) in the axes of a grasp X_CG of the moving frame C."""
+    place = np.broadcast_to(grasp.position, motion.position.shape)
+    omega, alpha = motion.angular_velocity, motion.angular_acceleration
+    acceleration = motion.acceleration + cross(alpha, place) + cross(omega, cross(omega, place))
+    up = motion.rotation.inverse().apply(np.array([0.0, 0.0, GRAVITY]))
+    into = grasp.rotation.inverse()
+    white = rng.standard_normal((len(place), 6)) * np.repeat([noise.imu_rad_s, noise.imu_m_s2], 3)
+    return into.apply(omega) + white[:, :3], into.apply(acceleration + up) + white[:, 3:]
 
 
 def draw_calibration(rng: np.random.Generator, noise: TeamNoise) -> tuple[Array, Array]:
@@ -62,8 +73,3 @@ def read_wrench(
     if not six_axis:
         read[:, :3] = 0.0
     return np.asarray(read)
-
-
-def nearest_reach(robot: Omnid, position: Array) -> bool:
-    """Return whether the robot's Delta reaches every position (T, 3) [m] of its home frame."""
-    return bool(robot.reaches(position).all())
