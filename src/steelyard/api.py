@@ -4,7 +4,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
+from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
 from steelyard.identify.noise_aware import NoiseAware
@@ -18,6 +20,11 @@ from steelyard.parts.parts import Parts
 from steelyard.pipelines import held_object
 from steelyard.spatial import Pose
 
+if TYPE_CHECKING:
+    from steelyard.pipelines.shape_in_parts import Shape
+    from steelyard.shape.cloud import Cloud
+    from steelyard.shape.views import Views
+
 DEFAULTS = held_object.Options()
 Log = str | Path | Recording | MotionLog
 
@@ -28,6 +35,7 @@ def identify(
     *,
     tool: str | Path | Recording | Estimate | None = None,
     parts: str | Path | Parts | None = None,
+    scan: str | Path | Cloud | Views | Shape | None = None,
     pose_in_sensor: str | Pose | None = None,
     data: str | Path | None = None,
 ) -> Estimate:
@@ -37,7 +45,10 @@ def identify(
              fitted as it is, without alignment and sanity checks)
     options  method, bias and prior size
     tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared
-    parts    the object's homogeneous parts in its own frame, or a mesh (.ply) whose faces carry part numbers
+    parts    the object's homogeneous parts in its own frame; or a mesh (.ply) whose faces carry part numbers, or parts
+             saved by `segment` (.npz)
+    scan     what was seen of the object instead: a cloud (.ply, .pcd, .npz), a folder of views, or their values; it is
+             closed, cut into parts, and the log chooses among the cuts
     pose_in_sensor  where the object's frame sits in the sensor: a Pose, a TOML file with [object], or its inline table;
              it takes the place of what the description says
     data     folder that relative paths in the description start from
@@ -50,8 +61,46 @@ def identify(
     if pose_in_sensor is not None:
         recording = _placed(recording, pose_in_sensor)
     known = _tool(recording.tool if tool is None else tool, data)
-    shape = parts_of_mesh(read_mesh(Path(parts))) if isinstance(parts, str | Path) else parts
-    return held_object.identify(recording, options, known, shape)
+    if parts is not None and scan is not None:
+        raise BadValue("parts and a scan both say what the object looks like; give one of them.")
+    return held_object.identify(recording, options, known, _parts(parts) if scan is None else shape_of(scan))
+
+
+def _parts(parts: str | Path | Parts | None) -> Parts | None:
+    """Return the parts, read where they are given as a path."""
+    if not isinstance(parts, str | Path):
+        return parts
+    if Path(parts).suffix.lower() == ".npz":
+        from steelyard.io.parts_files import read_parts
+
+        return read_parts(parts).parts
+    return parts_of_mesh(read_mesh(Path(parts)))
+
+
+def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None) -> Shape:
+    """Return the closed solid in homogeneous parts of what was seen of an object.
+
+    scan   a cloud (.ply, .pcd, .npz), a folder of views, or their values
+    parts  how many, where that is known; chosen by shape and colour where not
+
+    Raises BadInput where nothing closed can be made of it.
+    """
+    from steelyard.pipelines.shape_in_parts import Shape, shape_of
+
+    if isinstance(scan, Shape):
+        return scan
+    return shape_of(_seen(Path(scan)) if isinstance(scan, str | Path) else scan, parts)
+
+
+def _seen(path: Path) -> Cloud | Views:
+    """Return the views of a folder, or the cloud of a file."""
+    if path.is_dir():
+        from steelyard.io.view_folders import read_views
+
+        return read_views(path)
+    from steelyard.io.cloud_files import read_cloud
+
+    return read_cloud(path)
 
 
 def _placed(recording: Recording, place: str | Pose) -> Recording:

@@ -45,7 +45,12 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 @click.option(
     "--parts",
     type=click.Path(path_type=Path),
-    help="Mesh (.ply) of the object whose faces carry part numbers; needs [object] pose_in_sensor.",
+    help="Parts of the object: a mesh (.ply) whose faces carry part numbers, or parts.npz of `steelyard segment`.",
+)
+@click.option(
+    "--scan",
+    type=click.Path(path_type=Path),
+    help="Cloud of the object (.ply, .pcd, .npz) or folder of views: closed, cut into parts, and used for the inertia.",
 )
 @click.option(
     "--pose-in-sensor",
@@ -61,8 +66,9 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 @click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
-def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, pendant: bool,
-             pose_in_sensor: str | None, output: Path | None, as_json: bool, **chosen: Any) -> None:  # fmt: skip
+def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, scan: Path | None,
+             pendant: bool, pose_in_sensor: str | None, output: Path | None, as_json: bool, **chosen: Any
+             ) -> None:  # fmt: skip
     """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
     if pendant == (log is not None):
         raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
@@ -73,7 +79,7 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     from steelyard.pipelines.held_object import Options
 
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
-    given = {"tool": tool, "parts": parts, "pose_in_sensor": pose_in_sensor, "data": data}
+    given = {"tool": tool, "parts": parts, "scan": scan, "pose_in_sensor": pose_in_sensor, "data": data}
     estimate = api.identify(recording, Options(**chosen), **given)  # type: ignore[arg-type]
     if output is not None:
         write_result(estimate, output)

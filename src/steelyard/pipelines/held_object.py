@@ -8,7 +8,7 @@ Every step is a named room; what it noticed travels along as findings.
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
@@ -20,7 +20,7 @@ from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.noise_levels import with_declared, without_dead
-from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.rest import RIPPLE
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
@@ -29,6 +29,9 @@ from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
 from steelyard.sanity import after, dead_channels, examine, fitted_gravity, levelled, untouched
+
+if TYPE_CHECKING:
+    from steelyard.pipelines.shape_in_parts import Shape
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # A ball's radius of gyration per axis is its diameter times this.
@@ -66,12 +69,13 @@ def identify(
     recording: Recording,
     options: Options = Options(),
     tool: Recording | Estimate | None = None,
-    parts: Parts | None = None,
+    parts: Parts | Shape | None = None,
 ) -> Estimate:
     """Return mass, centre of mass and inertia of what the robot holds, in the frame of the sensor.
 
     tool   a recording or a result of the gripper alone: it is taken away, and its sensor bias is shared
-    parts  the object's homogeneous parts in its own frame O; the recording says where O sits in the sensor
+    parts  the object's homogeneous parts in its own frame O, or its shape as scanned: then the log also chooses among
+           cuts of the shape into parts; the recording says where O sits in the sensor
 
     Raises CannotAnswer where the data do not fix mass and centre of mass, BadInput where they make no sense.
     """
@@ -97,6 +101,8 @@ def identify(
     if unmeasured:
         estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())
+    if parts is not None and not isinstance(parts, Parts):
+        before = (*before, *parts.findings)
     return _in_recording_sign(
         replace(
             _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late),
@@ -157,23 +163,27 @@ def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
     return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))
 
 
-def _shape(parts: Parts, recording: Recording) -> tuple[Parts, ShapeError]:
-    """Return the parts in the sensor's frame and how wrong they may be there."""
+def _shape(parts: Parts | Shape, recording: Recording) -> tuple[tuple[Parts, ...], ShapeError]:
+    """Return the cuts into parts in the sensor's frame and how wrong they may be there."""
     if recording.object_pose is None:
         raise BadValue(
             "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
         )
     grasp_m, grasp_rad = recording.object_pose_std or (0.0, 0.0)
-    return parts.in_frame(recording.object_pose), replace(MEASURED, grasp_m=grasp_m, grasp_rad=grasp_rad)
+    cuts, error = ((parts,), MEASURED) if isinstance(parts, Parts) else (parts.cuts()[1], parts.error)
+    placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts)
+    return placed, replace(error, grasp_m=grasp_m, grasp_rad=grasp_rad)
 
 
 def _estimator(
-    options: Options, log: MotionLog, bias: Bias, shape: tuple[Parts, ShapeError] | None = None
-) -> tuple[NoiseAware | LeastSquares | Geodesic | PartMasses, tuple[str, ...]]:
+    options: Options, log: MotionLog, bias: Bias, shape: tuple[tuple[Parts, ...], ShapeError] | None = None
+) -> tuple[NoiseAware | LeastSquares | Geodesic | PartCuts, tuple[str, ...]]:
     """Return the estimator and what there is to say about the choice."""
     if shape is not None and options.method == "auto":
-        why = f"method: auto chose part-masses, because the shape is given in {len(shape[0])} parts"
-        return PartMasses(shape[0], bias=bias, shape_error=shape[1]), (why,)
+        cuts, error = shape
+        given = f"is given in {len(cuts[0])} parts" if len(cuts) == 1 else f"was scanned, in {len(cuts)} cuts"
+        why = f"method: auto chose part-masses, because the shape {given}"
+        return PartCuts(cuts, bias=bias, shape_error=error), (why,)
     if options.method == "least-squares":
         return LeastSquares(bias=bias), ()
     if options.method == "geodesic":

@@ -1,0 +1,94 @@
+"""`steelyard segment CLOUD -o parts.npz`."""
+
+from __future__ import annotations
+
+import textwrap
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import click
+
+from steelyard.cli.console import print_json, say_if_compiling
+
+if TYPE_CHECKING:
+    from steelyard.pipelines.shape_in_parts import Shape
+
+
+@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("scan", type=click.Path(path_type=Path))
+@click.option("--parts", type=click.IntRange(1, 40), help="How many parts; chosen by shape and colour where left out.")
+@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write parts.npz.")
+@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+def segment(scan: Path, parts: int | None, output: Path | None, as_json: bool) -> None:
+    """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""
+    say_if_compiling()
+    from steelyard.api import shape_of
+
+    shape = shape_of(scan, parts)
+    if output is not None:
+        _write(shape, output)
+    if as_json:
+        print_json(_plain(shape, output))
+    else:
+        click.echo(_table(shape, scan, output))
+
+
+def _write(shape: Shape, output: Path) -> None:
+    from steelyard.io.parts_files import SavedParts, write_parts
+
+    made = shape.segmentation
+    write_parts(SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names), output)
+
+
+def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
+    made, parts = shape.segmentation, shape.parts
+    rows = zip(
+        made.names, parts.volume, parts.centroid, made.rgb if made.rgb is not None else [None] * len(made), strict=True
+    )
+    return {
+        "volume_m3": shape.solid.mesh.volume,
+        "volume_std_m3": shape.solid.volume_std * shape.solid.mesh.volume,
+        "points": len(shape.solid.cloud),
+        "tets": len(shape.solid.mesh),
+        "parts": [
+            {
+                "label": k,
+                "name": name,
+                "volume_m3": float(parts.volume[k]),
+                "centroid_m": parts.centroid[k].tolist(),
+                "rgb": None if made.rgb is None else [round(float(c)) for c in made.rgb[k]],
+            }
+            for k, name in enumerate(made.names)
+        ],
+        "sureness": {}
+        if made.cuts is None
+        else {n: round(float(s), 4) for n, s in enumerate(made.sureness, 1) if s > 1e-3},
+        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in shape.findings],
+        "output": None if output is None else str(output),
+    }
+
+
+def _table(shape: Shape, scan: Path, output: Path | None) -> str:
+    made, parts, volume = shape.segmentation, shape.parts, shape.solid.mesh.volume
+    count = f"{len(made)} part{'s' * (len(made) != 1)}"
+    lines = [
+        f"{scan}: {1e6 * volume:.4g} +- {1e6 * shape.solid.volume_std * volume:.2g} cm^3 in {count}",
+        "",
+        "  part   volume cm^3   share   centroid mm                 colour",
+    ]
+    for k in range(len(made)):
+        x, y, z = 1e3 * parts.centroid[k]
+        colour = "" if made.rgb is None else "#" + "".join(f"{round(float(c)):02x}" for c in made.rgb[k])
+        share = 100 * parts.volume[k] / volume
+        lines.append(
+            f"  {k:4d}   {1e6 * parts.volume[k]:11.4g}   {share:4.1f} %   {x:8.1f} {y:8.1f} {z:8.1f}   {colour}"
+        )
+    if made.cuts is not None:
+        order = sorted(range(len(made.sureness)), key=lambda k: -made.sureness[k])[:4]
+        said = ", ".join(f"{k + 1}: {100 * made.sureness[k]:.0f} %" for k in order if made.sureness[k] > 0.005)
+        lines += ["", f"  How many parts, by shape and colour: {said}. A log of forces can decide further."]
+    if output is not None:
+        lines += ["", f"Parts written to {output}. Look at them: steelyard report RESULT --parts {output}"]
+    for finding in shape.findings:
+        lines += ["", *textwrap.wrap(f"{finding.code}: {finding.message} {finding.remedy}", 100)]
+    return "\n".join(lines)

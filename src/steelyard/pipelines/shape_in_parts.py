@@ -1,0 +1,80 @@
+"""What an object looks like: views or a cloud become a closed solid in homogeneous parts.
+
+views -> fuse -> cloud -> enclose -> solid -> segment -> parts, and the cuts that a log may still choose from
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from steelyard.findings import Finding
+from steelyard.identify.shape_error import MEASURED, ShapeError
+from steelyard.parts.parts import Parts
+from steelyard.parts.segment import Segmentation, segment
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.views import Views
+from steelyard.shape.volume import Solid, enclose
+
+# A finer cut than this is not offered to a log: ten numbers cannot tell so many masses.
+MOST_PARTS = 16
+
+
+@dataclass(frozen=True, eq=False)
+class Shape:
+    """A solid in parts, in the frame of the scan O.
+
+    solid         the closed volume
+    segmentation  its parts as shape and colour alone say
+    scan          the fusion of the views that it came from, None where a cloud was given
+    """
+
+    solid: Solid
+    segmentation: Segmentation
+    scan: Scan | None = None
+
+    @property
+    def parts(self) -> Parts:
+        """The parts as shape and colour alone say."""
+        return self.segmentation.parts
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What one must know of views, solid and parts."""
+        seen = () if self.scan is None else self.scan.findings
+        return (*seen, *self.solid.findings, *self.segmentation.findings)
+
+    @property
+    def error(self) -> ShapeError:
+        """How wrong the shape may be: no less than a measured mesh, more as far as the solid is unsure of itself."""
+        return ShapeError(
+            com_m=max(MEASURED.com_m, self.solid.surface_m),
+            inertia_share=max(MEASURED.inertia_share, self.solid.volume_std),
+        )
+
+    def cuts(self) -> tuple[tuple[int, ...], tuple[Parts, ...]]:
+        """Return numbers of parts that a log may choose from, and the parts of each cut.
+
+        About the number that shape and colour chose, and half of it: which seams are between materials is what the
+        forces know better.
+        """
+        if self.segmentation.cuts is None:
+            return (len(self.segmentation),), (self.segmentation.parts,)
+        chosen = len(self.segmentation)
+        most = min(MOST_PARTS, len(self.segmentation.cuts.length))
+        wanted = {max(1, chosen // 2), chosen - 1, chosen, chosen + 1}
+        numbers = tuple(sorted({min(k, most) for k in wanted if k >= 1}))
+        return numbers, tuple(self.segmentation.cut(k).parts for k in numbers)
+
+
+def shape_of(seen: Views | Scan | Cloud, parts: int | None = None) -> Shape:
+    """Return the solid in parts behind views, a fused scan or a cloud.
+
+    parts  how many, where that is known; chosen by shape and colour where not
+
+    Raises CannotAnswer or BadInput where nothing closed can be made of it.
+    """
+    if isinstance(seen, Views):
+        seen = fuse(seen)
+    solid = enclose(seen.cloud if isinstance(seen, Scan) else seen)
+    return Shape(solid, segment(solid.cloud, solid, parts=parts), seen if isinstance(seen, Scan) else None)
