@@ -42,9 +42,7 @@ def _write(shape: Shape, output: Path) -> None:
 
 def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
     made, parts = shape.segmentation, shape.parts
-    rows = zip(
-        made.names, parts.volume, parts.centroid, made.rgb if made.rgb is not None else [None] * len(made), strict=True
-    )
+    sureness = [] if made.cuts is None else made.sureness
     return {
         "volume_m3": shape.solid.mesh.volume,
         "volume_std_m3": shape.solid.volume_std * shape.solid.mesh.volume,
@@ -60,9 +58,7 @@ def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
             }
             for k, name in enumerate(made.names)
         ],
-        "sureness": {}
-        if made.cuts is None
-        else {n: round(float(s), 4) for n, s in enumerate(made.sureness, 1) if s > 1e-3},
+        "sureness": {n: round(float(s), 4) for n, s in enumerate(sureness, 1) if s > 1e-3},
         "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in shape.findings],
         "output": None if output is None else str(output),
     }
