@@ -83,6 +83,17 @@ def test_parts_of_a_segmentation_with_a_pose(capsys: pytest.CaptureFixture[str],
     assert "<b>one" not in page
 
 
+def test_a_scan_gives_points_and_colours(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    pytest.importorskip("steelyard.io.cloud_files")
+    run(capsys, folder, "@ols.json", "--parts", "@parts.npz", "-o", "@out.html")
+    without = (folder / "out.html").read_text(encoding="utf-8")
+    run(capsys, folder, "@ols.json", "--parts", "@parts.npz", "--scan", "@hammer/points.npz", "-o", "@out.html")
+    page = (folder / "out.html").read_text(encoding="utf-8")
+    for said in ('data-show="points"', "Own colours"):
+        assert said in page
+        assert said not in without
+
+
 def test_only_the_shape_where_nothing_says_where_it_sits(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     status, _, err = run(capsys, folder, "@ols.json", "--parts", "@parts.npz", "-o", "@out.html")
     assert status == 0

@@ -16,7 +16,8 @@ def decimals(std: float) -> int:
     """Return how many decimals show two figures of a standard deviation."""
     if not np.isfinite(std) or std <= 0:
         return 3
-    return int(np.clip(1 - np.floor(np.log10(std)), 0, 9))
+    rounded = float(f"{std:.1e}")  # 0.0999 is shown as 0.10, not as 0.100
+    return int(np.clip(1 - np.floor(np.log10(rounded)), 0, 9))
 
 
 def fixed(value: float, places: int) -> str:
