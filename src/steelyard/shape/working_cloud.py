@@ -1,0 +1,114 @@
+"""The cloud that a solid is made from: in metres, one object, without repeats, thinned where there is too much."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue
+from steelyard.findings import Finding
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.mesh import Integers
+
+LEAST = 20  # points that can show a solid
+_TOO_LONG_M = 5.0  # no object that an arm holds is longer
+_SAME = 1e-7  # of the diagonal: points nearer than this are one
+_FLAT = 1e-4  # of the longest extent: less depth than this is a plane
+_DRAWN = 12  # points drawn for each that is kept
+_APART = 6.0  # spacings between the points of two objects, at least
+_PIECE = 0.02  # of the points: fewer are strays
+_LINKS = 12  # neighbours by which pieces hang together
+
+
+def working_cloud(cloud: Cloud, most: int) -> tuple[Cloud, tuple[Finding, ...]]:
+    """Return the points to make a solid from, at most about `most`, and what was done to them.
+
+    Millimetres become metres, repeated points one, and of several objects the largest stays. Raises BadValue where
+    fewer than twenty points remain or all lie in a plane.
+    """
+    findings = []
+    cloud, found = _in_metres(cloud)
+    findings += found
+    cloud = _without_repeats(cloud)
+    cloud, found = _thinned(cloud, most)
+    findings += found
+    cloud, found = _one_object(cloud)
+    _require_solid(cloud.xyz)
+    return cloud, (*findings, *found)
+
+
+def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
+    if cloud.diagonal <= _TOO_LONG_M:
+        return cloud, []
+    text = f"The points span {cloud.diagonal:.4g} m, more than an arm can hold; they were read as millimetres."
+    return Cloud(cloud.xyz * 1e-3, cloud.rgb, cloud.label, cloud.normals), [Finding.of("cloud-in-mm", text)]
+
+
+def _without_repeats(cloud: Cloud) -> Cloud:
+    step = max(_SAME * cloud.diagonal, 1e-300)
+    first = np.unique(np.round((cloud.xyz - cloud.xyz.min(0)) / step), axis=0, return_index=True)[1]
+    return cloud if len(first) == len(cloud) else cloud.chosen(np.sort(first))
+
+
+def _thinned(cloud: Cloud, most: int) -> tuple[Cloud, list[Finding]]:
+    """Return at most about `most` well-spread points, of a fair draw where there are many more."""
+    if len(cloud) <= 1.04 * most:
+        return cloud, []
+    from steelyard.shape.thinning import spread_to
+
+    drawn = np.random.default_rng(0).permutation(len(cloud))[: _DRAWN * most]
+    chosen = cloud.chosen(np.sort(drawn))
+    sides = np.tile([0.0, 0.0, 1.0], (len(chosen), 1)) if chosen.normals is None else chosen.normals
+    least = 0.1 * chosen.diagonal / np.sqrt(most)
+    kept, apart = spread_to(chosen.xyz, sides, np.arange(len(chosen)), most, least)
+    text = f"Of {len(cloud)} points {len(kept)} were used, {apart * 1e3:.2g} mm apart."
+    return chosen.chosen(np.sort(kept)), [Finding.of("cloud-thinned", text)]
+
+
+def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
+    """Return the largest of the pieces that lie far apart."""
+    if len(cloud) < LEAST:
+        return cloud, []
+    piece, spacing = _pieces(cloud.xyz)
+    sizes = np.bincount(piece)
+    large = np.flatnonzero(sizes >= max(_PIECE * len(cloud), LEAST))
+    if len(sizes) == 1 or not len(large):
+        return cloud, []
+    main = int(np.argmax(sizes))
+    gap = _gap(cloud.xyz[piece == main], cloud.xyz[piece != main])
+    if len(large) == 1 or gap < _APART * spacing:
+        return cloud, []
+    text = (
+        f"The points form {len(large)} pieces, {gap * 1e3:.3g} mm apart; the largest, {sizes[main]} points, was kept."
+    )
+    return cloud.chosen(piece == main), [Finding.of("several-objects", text)]
+
+
+def _pieces(xyz: Array) -> tuple[Integers, float]:
+    """Return the piece (N,) of each point, joined where nearest neighbours are not far apart, and the spacing [m]."""
+    from scipy.sparse import coo_matrix
+    from scipy.sparse.csgraph import connected_components
+    from scipy.spatial import cKDTree
+
+    k = min(_LINKS, len(xyz) - 1)
+    distance, index = cKDTree(xyz).query(xyz, k + 1)
+    spacing = float(np.median(distance[:, -1])) * float(np.sqrt(np.pi / k))
+    close = distance[:, 1:] < _APART * spacing
+    rows = np.repeat(np.arange(len(xyz)), k)[close.ravel()]
+    graph = coo_matrix((np.ones(len(rows)), (rows, index[:, 1:][close])), (len(xyz), len(xyz)))
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64), spacing
+
+
+def _gap(a: Array, b: Array) -> float:
+    from scipy.spatial import cKDTree
+
+    return float(cKDTree(a).query(b)[0].min())
+
+
+def _require_solid(xyz: Array) -> None:
+    if len(xyz) < LEAST:
+        raise BadValue(f"a solid needs at least {LEAST} different points; got {len(xyz)}. Scan the object again.")
+    extent = np.linalg.svd(xyz - xyz.mean(0), compute_uv=False)
+    if extent[2] < _FLAT * extent[0]:
+        kind = "on a line" if extent[1] < _FLAT * extent[0] else "in a plane"
+        raise BadValue(f"all {len(xyz)} points lie {kind}, which encloses nothing. Scan the object from more sides.")
