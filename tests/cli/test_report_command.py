@@ -10,6 +10,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from scipy.spatial import Delaunay
 
 from steelyard.cli.main import main
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
@@ -18,7 +19,7 @@ from steelyard.io.object_writing import write_object
 from steelyard.io.parts_files import SavedParts, write_parts
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recording_files import write_recording
-from steelyard.shape.published_surface import published_surface
+from steelyard.shape.tets import TetMesh
 from steelyard.simulate import hammer
 from steelyard.simulate.workshop import known_object
 
@@ -40,7 +41,8 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
     write_mesh(made.tool.mesh, where / "hammer.ply")
     known = known_object(made.tool)
     write_object(known, where / "hammer")
-    solid = published_surface(known.cloud)
+    points = known.cloud.xyz[:150]
+    solid = TetMesh(points, Delaunay(points).simplices)
     labels = np.digitize(solid.centroids[:, 2], np.quantile(solid.centroids[:, 2], [0.3, 0.7]))
     write_parts(SavedParts(solid, labels, names=("<b>one</b>", "two", "three")), where / "parts.npz")
     return where
