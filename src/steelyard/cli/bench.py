@@ -158,3 +158,16 @@ def team(trials: int, as_json: bool, **choices: Any) -> None:
 
     result = job.run(trials, progress_bar("bench team"), **choices)
     print_json(result) if as_json else click.echo(team_table(result))
+
+
+@bench.command()
+@click.option("--tets", type=click.IntRange(min=100), default=5000, show_default=True, help="Tetrahedra of the solid.")
+@click.option("--many", type=click.IntRange(min=0), default=150_000, show_default=True, help="And of the large one.")
+@click.option("--repeats", type=click.IntRange(min=1), default=20, show_default=True, help="Runs per time.")
+@_JSON
+def speed(tets: int, many: int, repeats: int, as_json: bool) -> None:
+    """How fast are clusters and hulls, beside the same algorithm with SciPy's Qhull?"""
+    from steelyard.bench import speed as job
+
+    result = job.run(tets, many, repeats, progress_bar("bench speed"))
+    print_json(result) if as_json else click.echo(job.speed_table(result))

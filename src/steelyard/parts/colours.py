@@ -46,10 +46,7 @@ class ColourModes:
 
 def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
     """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255."""
-    from scipy.spatial import cKDTree
-
-    colour = np.asarray(rgb, dtype=np.float64) / 255
-    near = cKDTree(skin.vertices).query(skin.vertices, min(17, len(colour)))[1][:, 1:]
+    colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near
     lamp = _lamp(colour, skin, near)
     sure = np.ones(len(colour), dtype=bool)
     if lamp.any():
@@ -69,7 +66,7 @@ def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
 def _lamp(colour: Array, skin: Skin, near: Integers) -> Array:
     """Return the lamp (3,): direction times strength; 0 where the brightness does not follow the normals."""
     flat = skin.flatness > np.clip(np.median(skin.flatness), 0.9, 0.98)
-    apart = near[:, 3::4]  # some rings away: next neighbours share their triangles, and so their errors
+    apart = near[:, 3::6]  # some rings away: next neighbours share their triangles, and so their errors
     i, j = np.repeat(np.arange(len(near)), apart.shape[1]), apart.ravel()
     both = flat[i] & flat[j]
     i, j = i[both], j[both]
@@ -78,6 +75,9 @@ def _lamp(colour: Array, skin: Skin, near: Integers) -> Array:
     scale = 1 / np.maximum((one + two).ravel(), 4 / 255)[:, None]
     rows = (one[:, :, None] * n[j][:, None] - two[:, :, None] * n[i][:, None]).reshape(-1, 3) * scale
     side = (two - one).reshape(-1, 1) * scale
+    turned = np.abs(rows).sum(1) > _LAMP_SEEN
+    if not turned.any() or np.median(np.abs(side[turned])) < _ROUGH / 10:
+        return np.zeros(3)
     lamp = np.zeros(3)
     for _ in range(20):
         off = rows @ lamp - side[:, 0]
@@ -118,14 +118,15 @@ def _averaged(colour: Array, near: Integers, noise: float) -> Array:
 def _modes(colour: Array, near: Integers, sure: Any, reach: float) -> Array:
     """Return colours (M, 3) that many points are near to, the most frequent first; at least one."""
     alike = (np.linalg.norm(colour[near] - colour[:, None], axis=2) < reach).mean(1)
-    cell, member, count = np.unique(
-        np.floor(colour[sure] / (reach / 4)).astype(np.int64), axis=0, return_inverse=True, return_counts=True
-    )
-    member = member.ravel()
+    grid = np.floor(colour[sure] / (reach / 4)).astype(np.int64)
+    grid -= grid.min(0)
+    key = np.ravel_multi_index(tuple(grid.T), tuple(grid.max(0) + 1))
+    cell, member, count = np.unique(key, return_inverse=True, return_counts=True)
     centre = np.stack([np.bincount(member, colour[sure][:, k], len(cell)) for k in range(3)], axis=1) / count[:, None]
     company = np.bincount(member, alike[sure], len(cell))
     close = np.linalg.norm(centre[:, None] - centre, axis=2) < reach
-    left, found = np.ones(len(cell), dtype=bool), []
+    left = np.ones(len(cell), dtype=bool)
+    found: list[Array] = []
     while left.any():
         crowd = np.where(left, close @ (count * left), -1)
         best = int(crowd.argmax())
@@ -159,7 +160,8 @@ def _votes(label: Integers, near: Integers, count: int) -> Array:
     """Return how many neighbours (V, count) of each point have each label; -1 has no vote."""
     votes = label[near]
     voter, _ = np.nonzero(votes >= 0)
-    return np.bincount(voter * count + votes[votes >= 0], minlength=len(near) * count).reshape(-1, count)
+    counted = np.bincount(voter * count + votes[votes >= 0], minlength=len(near) * count)
+    return counted.reshape(-1, count).astype(np.float64)
 
 
 def _without_blends(
@@ -174,7 +176,7 @@ def _without_blends(
     size = np.bincount(label, minlength=count)
     for m in np.argsort(size, kind="stable") if count > 2 else ():
         mine = label == m
-        votes = _votes(label, near, count)[mine].astype(np.float64)
+        votes = _votes(label, near, count)[mine]
         beside = np.where(np.arange(count) == m, 0, votes.sum(0))
         two = np.argsort(-beside, kind="stable")[:2]
         if beside[two].min() < 0.1 * beside.sum() or beside[two].sum() < 0.8 * beside.sum():

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numba
 import numpy as np
 
 from steelyard.check import Array
@@ -64,27 +67,67 @@ def _absorbed(piece: Integers, size: Array, pairs: Integers, pull: Array, least:
 
     size  (T,) summed over the tets of a piece; a piece below the least joins larger ones or others below it
     """
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
+    return np.unique(_rounds(piece, size, np.ascontiguousarray(pairs), pull, least), return_inverse=True)[1]
 
+
+@numba.njit(cache=True, nogil=True)
+def _root(parent: Any, k: int) -> int:
+    while parent[k] != k:
+        parent[k] = parent[parent[k]]
+        k = parent[k]
+    return k
+
+
+@numba.njit(cache=True, nogil=True)
+def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> Any:
+    count = piece.max() + 1
+    parent, total = np.arange(count), np.zeros(count)
+    for t in range(len(piece)):
+        total[piece[t]] += size[t]
     while True:
-        count = int(piece.max()) + 1
-        total = np.bincount(piece, size, count)
-        ends = piece[pairs]
-        apart = ends[:, 0] != ends[:, 1]
-        ends, pairs, pull = ends[apart], pairs[apart], pull[apart]
-        both = np.concatenate([ends, ends[:, ::-1]])
-        small = total[both[:, 0]] < least
-        if not small.any():
-            return np.unique(piece, return_inverse=True)[1]
-        key, place = np.unique((both[:, 0] * count + both[:, 1])[small], return_inverse=True)
-        strength = np.bincount(place, np.concatenate([pull, pull])[small])
-        source, target = np.divmod(key, count)
-        order = np.lexsort((target, -strength, source))
-        source, target = source[order], target[order]
-        first = np.r_[True, source[1:] != source[:-1]]
-        graph = coo_matrix((np.ones(first.sum()), (source[first], target[first])), shape=(count, count))
-        piece = np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)[piece]
+        # The ends of every contact, by cluster.
+        start = np.zeros(count + 1, np.int64)
+        for e in range(len(pairs)):
+            a, b = _root(parent, piece[pairs[e, 0]]), _root(parent, piece[pairs[e, 1]])
+            if a != b:
+                start[a + 1] += 1
+                start[b + 1] += 1
+        start = np.cumsum(start)
+        fill, far, weight = start[:-1].copy(), np.empty(start[-1], np.int64), np.empty(start[-1])
+        for e in range(len(pairs)):
+            a, b = _root(parent, piece[pairs[e, 0]]), _root(parent, piece[pairs[e, 1]])
+            if a != b:
+                far[fill[a]], far[fill[b]] = b, a
+                weight[fill[a]] = weight[fill[b]] = pull[e]
+                fill[a] += 1
+                fill[b] += 1
+        goal, strength = np.full(count, -1, np.int64), np.zeros(count)
+        for a in range(count):
+            if parent[a] != a or total[a] >= least:
+                continue
+            for k in range(start[a], start[a + 1]):
+                strength[far[k]] += weight[k]
+            best = -1
+            for k in range(start[a], start[a + 1]):
+                if best < 0 or strength[far[k]] > strength[best]:
+                    best = far[k]
+            for k in range(start[a], start[a + 1]):
+                strength[far[k]] = 0.0
+            goal[a] = best
+        joined = False
+        for a in range(count):
+            if goal[a] >= 0:
+                p, q = _root(parent, a), _root(parent, goal[a])
+                if p != q:
+                    parent[max(p, q)] = min(p, q)
+                    total[min(p, q)] += total[max(p, q)]
+                    joined = True
+        if not joined:
+            break
+    label = np.empty(len(piece), np.int64)
+    for t in range(len(piece)):
+        label[t] = _root(parent, piece[t])
+    return label
 
 
 def _specks_to_nearest(mesh: TetMesh, piece: Integers, size: Array) -> Integers:

@@ -20,7 +20,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.skin import Skin
-from steelyard.shape.hull import TOLERANCE, hull_volume, hull_work
+from steelyard.shape.hull import hull_volume, hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
@@ -28,6 +28,9 @@ STRAIGHT, CREASED = 0.04, 0.25  # mean turn [rad] across a border that is no sea
 NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cube cut in half has 1.6
 PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part
 FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surface are worth a part of their own
+_BLUNT = (
+    0.005  # hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them
+)
 _SIZE = 0.02  # small clusters first (as in clustering.Hollow)
 _STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
 # Columns of the table of contacts between two clusters.
@@ -72,7 +75,7 @@ def seam_tree(
         colour.astype(np.int64),
         contact,
         touch,
-        TOLERANCE * 10,
+        _BLUNT,
         (STRAIGHT, CREASED, NECK, FLANK),
     )
     if faults:
@@ -156,7 +159,7 @@ def _support(row: Any, smaller: float, limits: tuple[float, float, float, float]
         else:
             over = mixed
     crease = (turn / max(over, 1e-3 * length) - straight_most) / (creased - straight_most)
-    return min(max(crease, 0.0), 1.0) * min(neck, 1.0)
+    return float(min(max(crease, 0.0), 1.0) * min(neck, 1.0))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -256,7 +259,8 @@ def _merge(
                         if alive[b] and changed[b] and price[a, b] < price[a, best[a]]:
                             best[a] = b
         changed[:] = False
-        p, q, kept = -1, -1, -1
+        p, q, kept, count, h = -1, -1, -1, 0, 0.0
+        last_p, last_q = -1, -1
         while True:
             p = -1
             for a in range(n):
@@ -275,6 +279,7 @@ def _merge(
             else:
                 faults += 1
             exact[p, q] = True
+            last_p, last_q = p, q
             stage = 0 if colour[p] == colour[q] and colour[p] >= 0 else 2
             support = _support(contact[p, q], min(volume[p], volume[q]), limits)
             paint = PAINT * min(share[p], share[q])
@@ -289,9 +294,10 @@ def _merge(
                     elif q < 0 or volume[a] < volume[q]:
                         q = a
             p, q = min(p, q), max(p, q)
-        stamp += 1
-        count = _joined((p, q), pool, offset, length, mark, stamp, rows)
-        h, kept = hull_volume(xyz, rows, count, tolerance, work)
+        if last_p != p or last_q != q:
+            stamp += 1
+            count = _joined((p, q), pool, offset, length, mark, stamp, rows)
+            h, kept = hull_volume(xyz, rows, count, tolerance, work)
         if kept < 0:
             faults, kept, h = faults + 1, count, max(hull[p], hull[q])
             for i in range(count):

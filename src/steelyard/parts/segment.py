@@ -24,10 +24,11 @@ from steelyard.parts.parts import Parts
 from steelyard.parts.pieces import cell_colours, inner_faces, pieces_of
 from steelyard.parts.prints import without_prints
 from steelyard.parts.seams import seam_tree
-from steelyard.parts.skin import skin_of
+from steelyard.parts.skin import Skin, skin_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Colours, Integers
 from steelyard.shape.tets import TetMesh
+from steelyard.spatial import cross
 
 PER_PART = 0.1  # worth of a part: a hollow of a tenth of the volume at a full seam, or a hundredth of the surface
 
@@ -111,6 +112,27 @@ class Segmentation:
         return replace(self, names=tuple(names))
 
 
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """A solid in small pieces of one colour each, before they are joined.
+
+    skin     its boundary
+    piece    (T,) the piece of every tet
+    colour   (N,) the colour of every piece
+    pairs    (I, 2) tets that share a face, corners (I, 3) of the faces
+    nearest  (points,) the tet nearest to every point of the cloud
+    """
+
+    cloud: Cloud
+    mesh: TetMesh
+    skin: Skin
+    piece: Integers
+    colour: Integers
+    pairs: Integers
+    corners: Integers
+    nearest: Integers
+
+
 def segment(cloud: Cloud, solid: Any, *, parts: int | None = None, per_part: float = PER_PART) -> Segmentation:
     """Return the solid of a cloud in its homogeneous parts.
 
@@ -119,23 +141,50 @@ def segment(cloud: Cloud, solid: Any, *, parts: int | None = None, per_part: flo
     parts     how many, where that is known; chosen by description length where not
     per_part  worth of a part: larger gives fewer
     """
+    return parts_of_pieces(coloured_pieces(cloud, solid), parts=parts, per_part=per_part)
+
+
+def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
+    """Return the small pieces that parts are put together from: the first half of `segment`."""
     mesh: TetMesh = solid if isinstance(solid, TetMesh) else solid.mesh
-    nearest = _nearest_cell(cloud, mesh)
+    nearest = nearest_cell(cloud.xyz, mesh.centroids)
     skin = skin_of(mesh)
     colour = np.zeros(len(mesh.vertices), dtype=np.int64)
     if cloud.rgb is not None:
-        modes = colour_modes(_vertex_colours(cloud, mesh), skin)
-        colour = without_prints(modes.label, skin)
+        colour = without_prints(colour_modes(_vertex_colours(cloud, mesh), skin).label, skin)
     pairs, corners = inner_faces(mesh)
     a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
-    areas = np.linalg.norm(np.cross(b - a, c - a), axis=1) / 2
+    areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
     piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)
-    tree = seam_tree(mesh, skin, piece, of_piece, pairs, corners)
+    return Pieces(cloud, mesh, skin, piece, of_piece, pairs, corners, nearest)
+
+
+def parts_of_pieces(pieces: Pieces, *, parts: int | None = None, per_part: float = PER_PART) -> Segmentation:
+    """Return the parts put together from small pieces: the second half of `segment`."""
+    tree = seam_tree(pieces.mesh, pieces.skin, pieces.piece, pieces.colour, pieces.pairs, pieces.corners)
     cuts = cuts_of(tree.hierarchy, tree.seam, per_part)
+    one = np.zeros(len(pieces.mesh), dtype=np.int64)
     whole = Segmentation(
-        mesh, np.zeros(len(mesh), np.int64), tree.hierarchy, cuts, None, nearest * 0, ("part 0",), cloud, nearest
+        pieces.mesh, one, tree.hierarchy, cuts, None, one[pieces.nearest], ("part 0",), pieces.cloud, pieces.nearest
     )
     return whole.cut(cuts.count if parts is None else parts)
+
+
+def nearest_cell(points: Array, centroids: Array) -> Integers:
+    """Return which of the centroids (T, 3) is nearest to each point (N, 3).
+
+    Raises BadValue where half of the points are farther away than the centroids are apart.
+    """
+    from scipy.spatial import cKDTree
+
+    gap, nearest = cKDTree(centroids, balanced_tree=False, compact_nodes=False).query(points)
+    far, size = float(np.median(gap)), float(np.linalg.norm(centroids.max(0) - centroids.min(0)))
+    if far > size > 0:
+        raise BadValue(
+            f"half of the points lie more than {far:.3g} m from a solid {size:.3g} m large. "
+            "Give the cloud and the solid in one frame and unit."
+        )
+    return np.asarray(nearest, dtype=np.int64)
 
 
 def by_volume(labels: Any, mesh: TetMesh) -> Integers:
@@ -144,20 +193,6 @@ def by_volume(labels: Any, mesh: TetMesh) -> Integers:
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.lexsort((first, -np.bincount(inverse, mesh.volumes)))] = np.arange(len(first))
     return np.asarray(rank[inverse])
-
-
-def _nearest_cell(cloud: Cloud, mesh: TetMesh) -> Integers:
-    """Return the tet (N,) whose centroid is nearest to each point; raises BadValue where cloud and solid are apart."""
-    from scipy.spatial import cKDTree
-
-    gap, nearest = cKDTree(mesh.centroids).query(cloud.xyz)
-    size = float(np.linalg.norm(np.ptp(mesh.vertices[mesh.tets.ravel()], axis=0)))
-    if np.median(gap) > size:
-        raise BadValue(
-            f"half of the points lie more than {np.median(gap):.3g} m from a solid {size:.3g} m large. "
-            "Give the cloud and the solid in one frame and unit."
-        )
-    return np.asarray(nearest, dtype=np.int64)
 
 
 def _vertex_colours(cloud: Cloud, mesh: TetMesh) -> Colours:

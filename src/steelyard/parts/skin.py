@@ -12,6 +12,7 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross
 
+NEAR = 16
 SMOOTH = 0.5  # weight of a neighbour's normal beside the vertex's own
 
 
@@ -51,11 +52,19 @@ class Skin:
         return np.asarray(np.linalg.norm(self.vertices[self.edges[:, 1]] - self.vertices[self.edges[:, 0]], axis=1))
 
     @cached_property
+    def near(self) -> Integers:
+        """The nearest other vertices (V, up to 16) of each, nearest first."""
+        from scipy.spatial import cKDTree
+
+        count = min(NEAR + 1, len(self.vertices))
+        return np.asarray(cKDTree(self.vertices).query(self.vertices, count)[1][:, 1:], dtype=np.int64)
+
+    @cached_property
     def _vertex_sums(self) -> tuple[Array, Array]:
         corner, count = self.triangles.ravel(), len(self.vertices)
         area = np.bincount(corner, np.repeat(self.areas, 3), count)
         total = [np.bincount(corner, np.repeat(self.area_vectors[:, k], 3), count) for k in range(3)]
-        return np.stack(total, axis=1), area
+        return np.stack(total, axis=1), np.asarray(area, dtype=np.float64)
 
     @cached_property
     def vertex_areas(self) -> Array:
@@ -73,9 +82,7 @@ class Skin:
         """Normals (V, 3) averaged over each vertex and its neighbours on the boundary."""
         total = self._vertex_sums[0]
         i, j = self.edges.T
-        around = [
-            np.bincount(i, total[j, k], len(total)) + np.bincount(j, total[i, k], len(total)) for k in range(3)
-        ]
+        around = [np.bincount(i, total[j, k], len(total)) + np.bincount(j, total[i, k], len(total)) for k in range(3)]
         total = total + SMOOTH * np.stack(around, axis=1)
         return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
 

@@ -17,6 +17,7 @@ from steelyard.spatial import Pose, Rotation, cross
 
 # The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
+_ONE_KEY = 1 << 21  # vertices: three of their numbers fit in one of 64 bits
 
 
 @dataclass(frozen=True, eq=False)
@@ -64,9 +65,16 @@ class TetMesh:
     @cached_property
     def neighbours(self) -> Integers:
         """The cell (T, 4) behind the face opposite each corner, -1 at the surface."""
-        corners = np.sort(self.tets[:, FACES].reshape(-1, 3), axis=1)
-        order = np.lexsort(corners.T)
-        same = (corners[order[1:]] == corners[order[:-1]]).all(1)
+        a, b, c = self.tets[:, FACES].reshape(-1, 3).T
+        low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
+        if len(self.vertices) < _ONE_KEY:
+            key = (low * len(self.vertices) + (a + b + c - low - high)) * len(self.vertices) + high
+            order = np.argsort(key, kind="stable")
+            same = key[order[1:]] == key[order[:-1]]
+        else:
+            corners = np.stack([low, a + b + c - low - high, high])
+            order = np.lexsort(corners)
+            same = (corners[:, order[1:]] == corners[:, order[:-1]]).all(0)
         first, second = order[:-1][same], order[1:][same]
         found = np.full(4 * len(self), -1, dtype=np.int64)
         found[first], found[second] = second // 4, first // 4

@@ -1,0 +1,102 @@
+"""Colours of a surface: light taken out, noise averaged, prints and mixtures told from parts."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from parts_blocks import body, solid
+
+from steelyard.parts.colours import colour_modes
+from steelyard.parts.prints import without_prints
+from steelyard.parts.skin import skin_of
+
+BAR = ((0, 0, 0), (0.12, 0.02, 0.02))
+HALVES = [((0, 0, 0), (0.06, 0.02, 0.02)), ((0.06, 0, 0), (0.12, 0.02, 0.02))]
+LAMP = np.array([0.15, -0.25, 0.41])
+
+
+def noisy(rgb, sigma, seed=0):
+    return np.clip(np.round(rgb + np.random.default_rng(seed).normal(size=rgb.shape) * sigma), 0, 255).astype(np.uint8)
+
+
+def two_halves(one, two):
+    cloud = body(HALVES, [one, two])
+    return cloud, skin_of(solid(cloud, [BAR]))
+
+
+def agreement(label, true):
+    """Share of points whose colour is that of most points of their true colour."""
+    return max(np.mean(label == true), np.mean(label == 1 - true)) if label.max() == 1 else 0.0
+
+
+def test_one_colour_is_one_mode():
+    cloud = body([BAR], [(120, 130, 140)])
+    modes = colour_modes(cloud.rgb, skin_of(solid(cloud, [BAR])))
+    assert len(modes.rgb) == 1
+    assert not modes.lamp.any()
+    assert modes.noise == 0
+    np.testing.assert_allclose(modes.rgb[0], (120, 130, 140), atol=0.5)
+
+
+@pytest.mark.parametrize("sigma", [0, 5, 10])
+def test_two_colours_are_told_apart_under_the_noise_of_a_camera(sigma):
+    cloud, skin = two_halves((200, 60, 50), (60, 62, 66))
+    modes = colour_modes(noisy(cloud.rgb, sigma), skin)
+    assert len(modes.rgb) == 2
+    assert agreement(modes.label, cloud.labels) > 0.98
+
+
+def test_near_greys_without_noise_are_two_colours():
+    cloud, skin = two_halves((229, 229, 229), (229, 234, 237))
+    modes = colour_modes(cloud.rgb, skin)
+    assert len(modes.rgb) == 2
+    assert agreement(modes.label, cloud.labels) > 0.98
+
+
+@pytest.mark.parametrize("sigma", [0, 3])
+def test_a_lamp_is_found_and_taken_out(sigma):
+    cloud = body([BAR], [(200, 204, 208)])
+    skin = skin_of(solid(cloud, [BAR]))
+    face = np.zeros_like(cloud.xyz)  # true normals: colours of a scan do not know of our triangles
+    for axis in range(3):
+        face[cloud.xyz[:, axis] == BAR[0][axis], axis] = -1
+        face[cloud.xyz[:, axis] == BAR[1][axis], axis] = 1
+    lit = noisy(0.7 * cloud.rgb * (1 + face @ LAMP)[:, None], sigma)
+    modes = colour_modes(lit, skin)
+    np.testing.assert_allclose(modes.lamp, LAMP, atol=0.03)
+    assert np.bincount(modes.label).max() > 0.97 * len(cloud)
+
+
+def test_no_lamp_is_seen_where_colours_differ_by_part():
+    cloud, skin = two_halves((220, 220, 220), (70, 70, 70))
+    assert not colour_modes(noisy(cloud.rgb, 5), skin).lamp.any()
+
+
+def test_a_run_from_one_colour_to_the_other_is_no_third():
+    cloud, skin = two_halves((0, 255, 255), (229, 229, 229))
+    along = np.clip((cloud.xyz[:, 0] - 0.055) / 0.01, 0, 1)[:, None]
+    rgb = ((1 - along) * np.array([0, 255, 255]) + along * np.array([229, 229, 229])).astype(np.uint8)
+    assert len(colour_modes(rgb, skin).rgb) == 2
+
+
+def test_a_print_is_no_part_but_a_ring_is():
+    cloud = body([BAR], [(230, 230, 230)], points=3000)
+    skin = skin_of(solid(cloud, [BAR]))
+    x, y, z = cloud.xyz.T
+    label = np.zeros(len(cloud), dtype=np.int64)
+    printed = (z == 0.02) & (abs(x - 0.03) < 0.006) & (abs(y - 0.01) < 0.006)
+    ring = abs(x - 0.09) < 0.006
+    label[printed], label[ring] = 1, 2
+    cleaned = without_prints(label, skin)
+    assert printed.sum() > 20
+    assert not cleaned[printed].any()
+    assert (cleaned[ring] == 2).mean() > 0.97
+
+
+def test_the_order_of_points_changes_nothing():
+    cloud, skin = two_halves((200, 60, 50), (60, 62, 66))
+    rgb = noisy(cloud.rgb, 8)
+    order = np.random.default_rng(1).permutation(len(cloud))
+    moved = cloud.chosen(order)
+    other = colour_modes(rgb[order], skin_of(solid(moved, [BAR])))
+    np.testing.assert_array_equal(colour_modes(rgb, skin).label[order], other.label)
