@@ -157,6 +157,18 @@ def _union(pool: Any, offset: Any, length: Any, a: int, b: int, mark: Any, stamp
 
 
 @numba.njit(cache=True, nogil=True)
+def _stored(pool: Any, filled: int, vertex: Any, kept: int) -> Any:
+    """Return the pool, a larger one where need be, with the vertices kept by the last hull at its end."""
+    if filled + kept > len(pool):
+        larger = np.empty(2 * (filled + kept), np.int32)
+        larger[:filled] = pool[:filled]
+        pool = larger
+    for i in range(kept):
+        pool[filled + i] = vertex[i, 2]
+    return pool
+
+
+@numba.njit(cache=True, nogil=True)
 def _merge_all(
     xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
     tolerance: float, size: float,
@@ -266,12 +278,7 @@ def _merge_all(
             cost[made] = 1 + known[e] - volume[a] - volume[b] if key[e] > 0 else -1.0 / (key[e] * all_tets * all_tets)
         volume[c], hull[c], tets[c] = volume[a] + volume[b], known[e], tets[a] + tets[b]
         group[c] = group[a] if group[a] == group[b] else -1
-        if filled + kept > len(pool):
-            larger = np.empty(2 * (filled + kept), np.int32)
-            larger[:filled] = pool[:filled]
-            pool = larger
-        for i in range(kept):
-            pool[filled + i] = vertex[i, 2]
+        pool = _stored(pool, filled, vertex, kept)
         offset[c], length[c] = filled, kept
         filled += kept
         gone[a] = gone[b] = True
@@ -318,6 +325,12 @@ def _merge_all(
         c = n + made
         merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
         cost[made], volume[c], hull[c] = np.inf, va + vb, h
+        if kept < 0:
+            faults += 1
+            kept = 0
+        pool = _stored(pool, filled, vertex, kept)
+        offset[c], length[c] = filled, kept
+        filled += kept
         heapq.heappush(bodies, (va + vb, c))
         made += 1
     return merges, cost, volume, hull, faults, hulls, points
