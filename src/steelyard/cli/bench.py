@@ -73,10 +73,10 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
 )
 @click.option(
     "--parts",
-    type=click.Choice(["truth", "truth-split", "truth-merged"]),
-    default="truth",
+    type=click.Choice(["segmented", "truth", "truth-split", "truth-merged"]),
+    default="segmented",
     show_default=True,
-    help="Parts given to the estimators: the true ones, each cut in pieces, or joined.",
+    help="Parts: found in the clouds with labels unseen, the true ones, each cut in pieces, or joined.",
 )
 @click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
 @click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
@@ -171,3 +171,18 @@ def speed(tets: int, many: int, repeats: int, as_json: bool) -> None:
 
     result = job.run(tets, many, repeats, progress_bar("bench speed"))
     print_json(result) if as_json else click.echo(job.speed_table(result))
+
+
+@bench.command()
+@click.option("--tools", multiple=True, help="Only these families (repeat the option).")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of pose, arc and noise.")
+@click.option("--views", "count", type=click.IntRange(min=8), default=127, show_default=True, help="Images per scan.")
+@click.option("--pose-mm", type=float, default=0.0, show_default=True, help="Error of the reported camera positions.")
+@click.option("--pose-deg", type=float, default=0.0, show_default=True, help="Error of the reported camera rotations.")
+@_JSON
+def scan(tools: tuple[str, ...], pose_mm: float, pose_deg: float, as_json: bool, **choices: Any) -> None:
+    """Built tools scanned by simulated views on a table: volume against the truth, CPU of every stage."""
+    from steelyard.bench import scan as job
+
+    result = job.run(tools, pose_std=(pose_mm, pose_deg), progress=progress_bar("bench scan"), **choices)
+    print_json(result) if as_json else click.echo(job.scan_table(result))

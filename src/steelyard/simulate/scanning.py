@@ -30,11 +30,13 @@ class Scanned:
     """A simulated scan: the views, and the truth that nobody sees.
 
     views  what the camera and the robot report
+    exact  depth without errors at the true poses, without colour
     X_WO   true pose of the mesh's frame in W; the table is z = 0
     X_WC   true poses (V,) of the camera
     """
 
     views: Views
+    exact: Views
     X_WO: Pose
     X_WC: Pose
 
@@ -69,16 +71,23 @@ def scan_mesh(
     X_WC = wrist_arc(target, distance, count, elevations=elevations, start=rng.uniform(0, 360))
     size = (intrinsics.height, intrinsics.width)
     depth, rgb = np.zeros((count, *size), np.uint16), np.zeros((count, *size, 3), np.uint8)
+    exact = np.zeros_like(depth)
     colour = _shaded(placed)
     for k in range(count):
         z, cosine, rgb[k] = render(placed, colour, intrinsics, X_WC[k])
+        exact[k] = np.minimum(np.round(z / depth_unit), 65535)
         if noise is not None:
             z = _measured(z, cosine, noise, rng)
             rgb[k] = _grainy(rgb[k], noise.rgb, rng)
         depth[k] = np.minimum(np.round(z / depth_unit), 65535)
     reported = disturbed(X_WC, *pose_std, rng) if any(pose_std) else X_WC
     table = TablePlane(np.array([0.0, 0.0, 1.0]), 0.0) if table_known else None
-    return Scanned(Views(depth, rgb, intrinsics, reported, depth_unit, table), X_WO, X_WC)
+    return Scanned(
+        Views(depth, rgb, intrinsics, reported, depth_unit, table),
+        Views(exact, None, intrinsics, X_WC, depth_unit, table),
+        X_WO,
+        X_WC,
+    )
 
 
 def resting_pose(mesh: TriangleMesh, yaw: float = 0.0) -> Pose:
