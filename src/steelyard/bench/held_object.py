@@ -19,6 +19,7 @@ from steelyard.bench.held_object_cases import (
     METHODS,
     PART_METHODS,
     PARTS,
+    RIVALS,
     Case,
     Method,
     load_case,
@@ -81,10 +82,10 @@ def run(
 ) -> dict[str, Any]:
     """Return the bench over the object folders in `data`, in the shape of `formats`.
 
-    `parts`: "truth"; "truth-split", each true part in two or three pieces; "truth-merged", true parts of one density
-    joined, and under `mixed_merge` the two heaviest parts of different density joined. Empty choices mean all there
-    are (of the methods: those that use parts, unless these are the true ones). `progress(done, objects)` is called
-    after every object.
+    `parts`: "segmented", found in the cloud with its labels unseen; "truth"; "truth-split", each true part in two or
+    three pieces; "truth-merged", true parts of one density joined, and under `mixed_merge` the two heaviest parts of
+    different density joined. Empty choices mean all there are (of the methods: those that use parts, where these are
+    split or merged). `progress(done, objects)` is called after every object.
     """
     plans = [_plan(parts, tuple(noises), seeds, tuple(methods), repeats)]
     if parts == "truth-merged":
@@ -119,7 +120,9 @@ def _plan(parts: str, noises: tuple[str, ...], seeds: int, methods: tuple[str, .
         for name in names:
             if name not in there:
                 raise BadValue(f"There is no {what} '{name}'; there are: {', '.join(there)}.")
-    everything = METHODS if parts == "truth" else PART_METHODS
+    everything = {"truth": (*PART_METHODS, *RIVALS), "segmented": (*PART_METHODS, "paper-route", *RIVALS)}.get(
+        parts, PART_METHODS
+    )
     return Plan(parts, noises or SCENARIOS, seeds, methods or everything, repeats)
 
 
@@ -167,6 +170,8 @@ def _object(plan: Plan, folder: Path) -> Outcome | None:
         "mass_kg": float(case.known.truth.mass),
         "still_rows": int(case.log.still.sum()),
     }
+    if case.seen is not None:
+        entry["segmentation"] = case.seen.scores
     rows = []
     for noise in plan.noises:
         for seed in range(plan.seeds if any(noise_std(noise)) else 1):
@@ -236,5 +241,24 @@ def _result(plan: Plan, outcomes: list[Outcome]) -> dict[str, Any]:
         "mean": summary(rows, plan.noises, plan.methods, np.mean),
         "median": summary(rows, plan.noises, plan.methods, np.median),
         "bound": bound_means([(outcome.entry["half"], outcome.bounds) for outcome in outcomes]),
+        **_correlations(outcomes, rows),
         "rows": rows,
     }
+
+
+def _correlations(outcomes: list[Outcome], rows: list[Row]) -> dict[str, Any]:
+    """Return how scores of the segmentation rank with the error at low noise, where parts were found."""
+    entries = [o.entry for o in outcomes if "segmentation" in o.entry]
+    if not entries:
+        return {}
+    from steelyard.bench.segmented import rank_correlations
+
+    out = {}
+    for method in ("ours", "paper-route"):
+        errors: dict[str, list[float]] = {}
+        for row in rows:
+            if row["method"] == method and row["noise"] == "low" and row["riemannian"] is not None:
+                errors.setdefault(row["object"], []).append(row["riemannian"])
+        scored = [{"object": e["object"]} | e["segmentation"][method] for e in entries if e["object"] in errors]
+        out[method] = rank_correlations(scored, {name: float(np.mean(e)) for name, e in errors.items()})
+    return {"rank_correlation": out}

@@ -6,6 +6,7 @@ import zlib
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -15,6 +16,7 @@ from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior, uniform_body
 from steelyard.identify.least_squares import LeastSquares
+from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.part_masses_published import PublishedPartMasses
 from steelyard.identify.point_masses import PointMasses
@@ -27,9 +29,13 @@ from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import solids_of
 from steelyard.simulate.handling import STILL_ANGULAR_SPEED, STILL_SPEED, with_noise
 
-PARTS = ("truth", "truth-split", "truth-merged", "truth-merged-mixed")
+if TYPE_CHECKING:
+    from steelyard.bench.segmented import Segmented
+
+PARTS = ("segmented", "truth", "truth-split", "truth-merged", "truth-merged-mixed")
 PART_METHODS = ("ours", "ours-still", "hps")
-METHODS = (*PART_METHODS, "geo", "geo-published-prior", "ols", "point-mass")
+RIVALS = ("geo", "geo-published-prior", "ols", "point-mass")
+METHODS = (*PART_METHODS, "paper-route", *RIVALS)
 POINTS = 600
 # A thousandth of the scenario "low".
 TRACE = Noise.of_std(2.5e-4, 2.5e-5, 5e-5, 2.5e-6)
@@ -46,6 +52,7 @@ class Case:
     parts        in S; part_masses (P,) [kg] their true masses, None where unknown
     log          exact and ordered, rows at rest marked by their true speed
     true_parts   the object's own parts in S, for the bound; groups of them share a density
+    seen         what its cloud gives, where the parts are found and not given
     """
 
     known: KnownObject
@@ -54,6 +61,7 @@ class Case:
     log: MotionLog
     true_parts: Parts
     groups: tuple[tuple[int, ...], ...]
+    seen: Segmented | None = None
 
     @property
     def bounds(self) -> Array:
@@ -68,7 +76,13 @@ def load_case(folder: Path, parts: str) -> Case | None:
     groups = _same_density(own, known.part_masses)
     chosen = own
     masses = known.part_masses
-    if parts == "truth-split":
+    seen = None
+    if parts == "segmented":
+        from steelyard.bench.segmented import segmented
+
+        seen = segmented(known)
+        chosen, masses = seen.parts, None
+    elif parts == "truth-split":
         chosen, owner = split_parts(known)
         share = chosen.volume / own.volume[owner]
         masses = None if masses is None else masses[owner] * share
@@ -78,7 +92,7 @@ def load_case(folder: Path, parts: str) -> Case | None:
             return None
         chosen = own.merged(joined)
         masses = None if masses is None else np.array([masses[list(g)].sum() for g in joined])
-    return Case(known, chosen, masses, exact_rows(known), own, tuple(tuple(g) for g in groups))
+    return Case(known, chosen, masses, exact_rows(known), own, tuple(tuple(g) for g in groups), seen)
 
 
 def exact_rows(known: KnownObject) -> MotionLog:
@@ -192,9 +206,9 @@ class Method:
 
 def methods_for(case: Case, names: tuple[str, ...]) -> list[Method]:
     """Return the methods of those names for one object; the wrench has no bias and none estimates one."""
-    estimators: dict[str, Callable[[], PartMasses | ShapeGeodesic | LeastSquares | PointMasses]] = {
-        "ours": lambda: PartMasses(case.parts, bias="none"),
-        "ours-still": lambda: PartMasses(case.parts, bias="none"),
+    estimators: dict[str, Callable[[], PartMasses | PartCuts | ShapeGeodesic | LeastSquares | PointMasses]] = {
+        "ours": lambda: _ours(case),
+        "ours-still": lambda: _ours(case),
         "geo": lambda: ShapeGeodesic(uniform_body(case.true_parts)),
         "geo-published-prior": lambda: ShapeGeodesic(published_prior(_inside(case)), float(case.known.truth.mass)),
         "ols": lambda: LeastSquares("ordinary", bias="none"),
@@ -202,14 +216,22 @@ def methods_for(case: Case, names: tuple[str, ...]) -> list[Method]:
     }
     out = []
     for name in names:
-        if name == "hps":
-            out.append(Method(name, PublishedPartMasses(case.parts).identify, _all_rows, None))
+        if name == "hps" or (name == "paper-route" and case.seen is not None):
+            parts = case.parts if name == "hps" or case.seen is None else case.seen.paper
+            out.append(Method(name, PublishedPartMasses(parts).identify, _all_rows, None))
             continue
         if name not in estimators:
             raise BadValue(f"There is no method '{name}' here; there are: {', '.join(METHODS)}.")
         made = estimators[name]()
         out.append(Method(name, made.identify, _still_rows if name == "ours-still" else _all_rows, made.solve))
     return out
+
+
+def _ours(case: Case) -> PartMasses | PartCuts:
+    """Return our estimator: with the parts given, or over the cuts of what was seen."""
+    if case.seen is None:
+        return PartMasses(case.parts, bias="none")
+    return PartCuts(case.seen.cuts, bias="none", shape_error=case.seen.error)
 
 
 def _inside(case: Case) -> Array:

@@ -28,6 +28,9 @@ def held_object_table(result: dict[str, Any]) -> str:
             if _runs(halves[half]):
                 lines += ["", *block(f"{noise}, {half}: mean", _rows(result, noise, half), _COLUMNS)]
         lines += ["", *block(f"{noise}, all: median", _medians(result, noise), _COLUMNS)]
+    for method, scores in result.get("rank_correlation", {}).items():
+        said = ", ".join(f"{name} {'-' if value is None else format(value, '.2f')}" for name, value in scores.items())
+        lines += ["", f"rank correlation with the Riemannian error at low noise, {method}: {said}"]
     if "mixed_merge" in result:
         lines += ["", "the two heaviest parts of different density joined:", held_object_table(result["mixed_merge"])]
         lines += [_found(result["mixed_merge"])]
@@ -55,7 +58,7 @@ def _rows(result: dict[str, Any], noise: str, half: str) -> dict[str, dict[str, 
     if limits:
         rows["bound, parts known"] = blank | {k: v for k, v in limits.items() if k != "groups"}
         rows["bound, equal densities known"] = blank | limits["groups"]
-    if half == "all" and result["parts"] == "truth":
+    if half == "all" and result["parts"] in ("truth", "segmented"):
         for name, row in result.get("table_iv", {}).get(noise, {}).items():
             rows[f"Table IV {name}"] = blank | row
     return rows

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tempfile
+from collections.abc import Mapping
 from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -13,7 +14,11 @@ from steelyard.cli.console import print_json, say, say_if_compiling
 
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
-    from steelyard.parts.parts import Parts
+    from steelyard.logs.log import MotionLog
+    from steelyard.pipelines.shape_in_parts import Shape
+    from steelyard.report import Report
+    from steelyard.simulate.hammer import Seen
+    from steelyard.spatial import Pose
 
 SEED = 0
 
@@ -21,60 +26,105 @@ SEED = 0
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the made noise.")
 @click.option(
-    "--keep", type=click.Path(path_type=Path), metavar="DIR", help="Keep the made log and mesh in this folder."
+    "-o", "--output", type=click.Path(path_type=Path), default=Path("report.html"), show_default=True,
+    help="The page to write.",
+)  # fmt: skip
+@click.option(
+    "--keep", type=click.Path(path_type=Path), metavar="DIR", help="Keep log, cloud, parts and result in this folder."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def demo(seed: int, keep: Path | None, as_json: bool) -> None:
-    """Make a hammer's log, write it as files, identify it from them, and compare with the truth."""
+def demo(seed: int, output: Path, keep: Path | None, as_json: bool) -> None:
+    """Scan a made hammer, cut the scan into parts, identify it from a made log, and compare with the truth."""
     say_if_compiling()
+    from steelyard import api
     from steelyard.cli.table import estimate_table
     from steelyard.cli.versus import summary, versus_table
-    from steelyard.io import result_dict
-    from steelyard.io.ply_files import write_mesh
+    from steelyard.io import read_recording, result_dict, write_result
+    from steelyard.io.cloud_files import write_cloud
+    from steelyard.io.parts_files import SavedParts, write_parts
     from steelyard.io.recording_files import write_recording
+    from steelyard.logs.alignment import align
+    from steelyard.report import write_report
     from steelyard.simulate import hammer
 
-    made = hammer.recording(seed)
+    seen = hammer.scanned(seed)
+    shape = api.shape_of(seen.views)
     with tempfile.TemporaryDirectory() as scratch:
-        log = write_recording(made.recording, keep or Path(scratch))
-        mesh = log.with_name("hammer.ply")
-        write_mesh(made.tool.mesh, mesh)
-        answers = _answers(log, mesh, made.tool.parts.in_frame(made.tool.X_OS.inverse()))
-    with_parts, *others = answers.values()
+        folder = keep or Path(scratch)
+        log = write_recording(seen.recording, folder)
+        write_cloud(shape.solid.cloud, folder / "hammer.ply")
+        made = shape.segmentation
+        write_parts(SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names), folder / "parts.npz")
+        recording = read_recording(log)
+        rows = align(recording).log
+        answers = _answers(log, shape, rows, seen.X_SW)
+        best = next(iter(answers.values()))
+        write_result(best, folder / "result.json")
+    write_report(_page(answers, shape, rows, seen, seed), output)
     if as_json:
-        rivals = zip(("without_parts", "ols", "geo"), others, strict=True)
-        extra = {"truth": made.truth.vector.tolist(), "truth_part_masses_kg": made.tool.masses.tolist(), "seed": seed}
-        print_json(result_dict(with_parts) | extra | {key: summary(rival, made.truth) for key, rival in rivals})
+        keys = ("without_scan", "ols", "geo")
+        others = {key: summary(rival, seen.truth) for key, rival in zip(keys, list(answers.values())[1:], strict=True)}
+        extra = {"truth": seen.truth.vector.tolist(), "seed": seed, "report": str(output)}
+        print_json(result_dict(best) | extra | others)
         return
-    parts = dict(enumerate(zip(made.tool.part_names, map(float, made.tool.masses), strict=True)))
-    title = f"A hammer of three parts in slow motion, made log (seed {seed})"
-    click.echo(estimate_table(with_parts, title, hammer.truth_for_people(made.truth), parts))
-    click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, made.truth))
-    kept = f"The log is in {keep}; identify it with: steelyard identify {log} --parts {mesh}"
-    say(kept if keep else "Keep log and mesh with --keep DIR.")
+    title = f"A hammer, scanned from {len(seen.views)} views and turned slowly, made data (seed {seed})"
+    click.echo(estimate_table(best, title, hammer.truth_for_people(seen.truth), _names(best, shape, seen)))
+    click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
+    say(f"The page with the parts in 3D: {output}")
+    say(
+        f"Log and cloud are in {keep}; try: steelyard identify {log} --scan {keep / 'hammer.ply'}"
+        if keep
+        else "Keep log, cloud and parts with --keep DIR."
+    )
 
 
-def _answers(log: Path, mesh: Path, parts: Parts) -> dict[str, Estimate]:
-    """Return the answers from the files: with parts, without, and by the two rivals on the same aligned rows.
+def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, Estimate]:
+    """Return the answers: from the files with the scan and without, and by the two rivals on the same aligned rows.
 
-    parts  in the frame of the sensor
-
-    GEO knows no bias: it gets the rows tared by what OLS found.
+    GEO knows no bias: it gets the rows tared by what OLS found, and one density over the scanned shape.
     """
     from steelyard import api
     from steelyard.identify.geodesic_shape import ShapeGeodesic, uniform_body
     from steelyard.identify.least_squares import LeastSquares
-    from steelyard.io import read_recording
-    from steelyard.logs.alignment import align
 
-    recording = read_recording(log)
-    with_parts, without = api.identify(recording, parts=mesh), api.identify(recording)
-    rows = align(recording).log
     ordinary = LeastSquares("ordinary").identify(rows)
     tared = replace(rows, wrench=rows.wrench - ordinary.wrench_bias)
     return {
-        "with parts": with_parts,
-        "without parts": without,
+        "with the scan": api.identify(log, scan=shape),
+        "without": api.identify(log),
         "OLS": ordinary,
-        "GEO, uniform shape": ShapeGeodesic(uniform_body(parts)).identify(tared),
+        "GEO, uniform shape": ShapeGeodesic(uniform_body(shape.parts.in_frame(X_SW))).identify(tared),
     }
+
+
+def _names(best: Estimate, shape: Shape, seen: Seen) -> dict[int, tuple[str, float]]:
+    """Return what each part found is called, and its true mass: that of the true part it mostly lies in, by volume."""
+    made = shape.segmentation.cut(len(best.parts))
+    owner = seen.true_part(made.mesh.centroids)
+    out = {}
+    for k in range(len(made)):
+        inside = made.labels == k
+        home = int(owner[inside][made.mesh.volumes[inside].argmax()])
+        density = float(seen.tool.densities[home])
+        out[k] = (seen.tool.part_names[home], density * float(made.mesh.volumes[inside].sum()))
+    return out
+
+
+def _page(answers: Mapping[str, Estimate], shape: Shape, rows: MotionLog, seen: Seen, seed: int) -> Report:
+    """Return the page: the parts of the cut that the log chose, in the colours they were seen in."""
+    from steelyard.report import Report, Residuals, Truth, scene_of_solid
+
+    (_, best), *rivals = answers.items()
+    made = shape.segmentation.cut(len(best.parts))
+    left = rows.wrench - rows.predicted(best.parameters.vector) + best.wrench_bias
+    names = {k: name for k, (name, _) in _names(best, shape, seen).items()}
+    return Report(
+        "A hammer, scanned and weighed",
+        best,
+        scene_of_solid(made.mesh, made.labels, shape.solid.cloud, made.rgb, seen.X_SW),
+        None if rows.time is None else Residuals(rows.time, left[:, 3:], left[:, :3], rows.still),
+        dict(rivals),
+        Truth(seen.truth),
+        names,
+        {"command": f"steelyard demo --seed {seed}", "seed": str(seed)},
+    )

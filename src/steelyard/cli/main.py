@@ -16,7 +16,7 @@ VERBS: dict[str, tuple[str, str]] = {
         "steelyard.cli.identify:identify",
         "Log -> mass, centre of mass, inertia, error bars, findings.",
     ),
-    "scan": ("steelyard.cli.scan:scan", "Posed RGB-D views -> one coloured cloud of the object on the table."),
+    "scan": ("steelyard.cli.scan:scan", "Posed RGB-D views -> one coloured cloud of the object."),
     "segment": ("steelyard.cli.segment:segment", "Cloud or views -> closed volume in homogeneous parts."),
     "compare": ("steelyard.cli.compare:compare", "Two results: the same object or not, with a p-value."),
     "report": ("steelyard.cli.report:report", "Result -> one page: numbers, the parts in 3D, residuals, findings."),

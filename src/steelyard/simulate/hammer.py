@@ -6,7 +6,7 @@ poses from the robot's encoders on another, no accelerometer.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 
 import numpy as np
@@ -15,9 +15,13 @@ from steelyard.check import Array, frozen
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
+from steelyard.shape.mesh import Integers
+from steelyard.shape.views import Views
 from steelyard.simulate.motions import Kinematics, Step, StopAndGo
-from steelyard.spatial import Rotation
+from steelyard.simulate.scanning import scan_mesh
+from steelyard.spatial import Pose, Rotation
 from steelyard.workshop import catalogue
+from steelyard.workshop.sampling import surface_cloud
 from steelyard.workshop.tools import Tool
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -25,6 +29,7 @@ WRENCH_HZ, POSE_HZ, DURATION = 100.0, 25.0, 49.0
 FORCE_STD, TORQUE_STD = 0.1, 0.005
 BIAS = np.array([0.12, -0.31, 0.05, 3.2, -1.4, 7.9])
 ENCODER_M, ENCODER_RAD = 2e-5, 5e-5
+VIEWS = 36
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +77,36 @@ def recording(seed: int = 0) -> Example:
     )
     made = Recording(streams, frozen(GRAVITY), -1, object_pose=tool().X_OS.inverse(), name="hammer")
     return Example(made, truth, tool())
+
+
+@dataclass(frozen=True, eq=False)
+class Seen(Example):
+    """The same with views of the hammer on a table.
+
+    views  RGB-D images with the poses of the camera in W
+    X_SW   where the world of the views sits in the sensor once the robot has gripped the hammer
+    X_WO   where the hammer lay; nobody sees it
+    """
+
+    views: Views
+    X_SW: Pose
+    X_WO: Pose
+
+    def true_part(self, points: Array) -> Integers:
+        """Return the true part (N,) that each point (N, 3) of W is nearest to."""
+        from scipy.spatial import cKDTree
+
+        surface = surface_cloud(self.tool)
+        return np.asarray(surface.labels[cKDTree(surface.xyz).query(self.X_WO.inverse().apply(points))[1]])
+
+
+def scanned(seed: int = 0, views: int = VIEWS) -> Seen:
+    """Return the hammer's views on a table, and its recording with the place of the views' world in the sensor."""
+    made = recording(seed)
+    scan = scan_mesh(made.tool.mesh, seed, count=views)
+    X_SW = made.tool.X_OS.inverse() @ scan.X_WO.inverse()
+    placed = replace(made.recording, object_pose=X_SW)
+    return Seen(placed, made.truth, made.tool, scan.views, X_SW, scan.X_WO)
 
 
 def _exact(seen: Kinematics) -> MotionLog:

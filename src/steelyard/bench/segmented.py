@@ -1,0 +1,95 @@
+"""Objects of the held-object bench as they are seen: parts by our own segmentation of the cloud, and by the paper's."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.evaluate.segments import score_segments, surface_gap
+from steelyard.identify.shape_error import ShapeError
+from steelyard.parts.clustering import cluster
+from steelyard.parts.known import KnownObject
+from steelyard.parts.parts import Parts
+from steelyard.parts.segment import nearest_cell
+from steelyard.parts.supervoxels import pieces_of_points, supervoxels
+from steelyard.pipelines.shape_in_parts import shape_of
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.mesh import Integers
+from steelyard.shape.published_surface import published_surface
+from steelyard.shape.tets import TetMesh
+
+# The paper cuts its tree at this depth: four parts.
+DEPTH = 2
+SCORES = ("impurity", "gce", "hausdorff_mm")
+
+
+@dataclass(frozen=True, eq=False)
+class Segmented:
+    """What the cloud of an object gives, labels unseen.
+
+    parts   in S, as shape and colour alone say
+    cuts    in S, among which a log may choose
+    error   how wrong the shape may be
+    paper   in S, by the paper's route: ball pivoting, thickening, its clustering from supervoxels, four parts
+    scores  "ours" and "paper-route" -> volume ratio, impurity, GCE, Hausdorff, parts
+    """
+
+    parts: Parts
+    cuts: tuple[Parts, ...]
+    error: ShapeError
+    paper: Parts
+    scores: dict[str, dict[str, Any]]
+
+
+def segmented(known: KnownObject) -> Segmented:
+    """Return both segmentations of the object's cloud without its labels."""
+    cloud = Cloud(known.cloud.xyz, known.cloud.rgb)
+    shape = shape_of(cloud)
+    thick = published_surface(cloud)
+    tree = cluster(thick, pieces_of_points(thick, cloud, supervoxels(cloud)))
+    labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
+    paper = Parts(np.arange(labels.max() + 1), thick.moments(labels, int(labels.max()) + 1))
+    made = shape.segmentation
+    return Segmented(
+        parts=shape.parts.in_frame(known.X_SO),
+        cuts=tuple(cut.in_frame(known.X_SO) for cut in shape.cuts()[1]),
+        error=shape.error,
+        paper=paper.in_frame(known.X_SO),
+        scores={
+            "ours": _scores(known, made.mesh, made.labels),
+            "paper-route": _scores(known, thick, labels),
+        },
+    )
+
+
+def _scores(known: KnownObject, mesh: TetMesh, labels: Integers) -> dict[str, Any]:
+    """Return the scores of parts of a solid against the labelled cloud."""
+    scores = score_segments(known.cloud.labels, labels[nearest_cell(known.cloud.xyz, mesh.centroids)])
+    true = float(known.parts.volume.sum())
+    return {
+        "volume_ratio": mesh.volume / true,
+        "impurity": scores.impurity,
+        "gce": scores.gce,
+        "hausdorff_mm": surface_gap(mesh.vertices[mesh.surface].reshape(-1, 3), known.cloud.xyz).hausdorff_mm,
+        "n_parts": int(labels.max()) + 1,
+        "n_true": scores.n_true,
+    }
+
+
+def rank_correlations(rows: list[dict[str, Any]], riemannian: dict[str, float]) -> dict[str, float | None]:
+    """Return Spearman's rank correlation of each score with the Riemannian error over objects (the paper's section VI).
+
+    rows        one per object: "object" and the scores
+    riemannian  object -> its mean error
+    """
+    from scipy.stats import spearmanr
+
+    errors = [riemannian[row["object"]] for row in rows]
+    out: dict[str, float | None] = {}
+    for name in SCORES:
+        values = [row[name] for row in rows]
+        spread = len(rows) > 2 and len(set(values)) > 1 and len(set(errors)) > 1
+        out[name] = float(spearmanr(values, errors).statistic) if spread else None
+    return out
