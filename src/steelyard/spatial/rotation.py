@@ -138,7 +138,10 @@ class Rotation:
         return Rotation._trusted(self.matrix @ other.matrix)
 
     def __getitem__(self, index: Any) -> Rotation:
-        return Rotation(self.matrix[index])
+        chosen = self.matrix[index]
+        if chosen.shape[-2:] != (3, 3):
+            raise BadValue(f"an index must choose among the batch {self.batch}; {index!r} cuts into the matrices.")
+        return Rotation._trusted(chosen)
 
     @property
     def batch(self) -> tuple[int, ...]:

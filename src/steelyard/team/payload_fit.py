@@ -1,9 +1,8 @@
-"""The ten parameters of the payload from all recordings at once, the force bias of each under one prior.
+"""The ten parameters of the payload from all recordings at once, force bias and gain of each under one prior.
 
-Sensors are tared when they like: every recording r has its own bias b_r of the summed wrench, b_r ~ N(0, s^2 C), C what a
-unit bias of every force axis of every grasp adds up to. Still and moving rows are fitted together: the force equation in
-motion and the spread of tilts share the centre of mass. s is averaged over a ladder by its evidence: with no bias, no
-accuracy is lost to it, with one, none is pretended.
+Still and moving rows are fitted together: the force equation in motion and the spread of tilts share the centre of
+mass. How large bias and gain are is averaged over a ladder by its evidence: with none, no accuracy is lost to them;
+with some, none is pretended. Noise of the wrench per band by expectation maximisation.
 Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, centre and inertia one after the other.
 """
 
@@ -14,148 +13,217 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
-from steelyard.identify.correlated import score_variance
-from steelyard.identify.effective import Effective
-from steelyard.identify.linear import inverse_scaled
-from steelyard.identify.problem import BiasPrior, Problem
-from steelyard.identify.regressor import residual_map
-from steelyard.identify.solution import Solution
-from steelyard.logs.log import MotionLog, Noise
-from steelyard.logs.moments import Moments, features
-from steelyard.team.fused_motion import Fused
+from steelyard.logs.log import Mask
+from steelyard.identify.regressor import motion_map
+from steelyard.team.payload_model import ROUNDING, Group, Normal, normal, residual_scatter
 
-# [N] bias of a force axis: from none to as much as a light payload weighs.
-LADDER = np.geomspace(0.01, 10.0, 13)
+# [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
+BIAS = np.geomspace(0.01, 10.0, 10)
+GAIN = np.array([0.0, 3e-3, 0.01, 0.03, 0.1])
 ROUNDS = 4
-# [N m, N] noise is not taken below it.
-LEAST_NOISE = np.repeat([1e-6, 1e-5], 3)
+# Noise has settled where it changes by less than this share.
+SETTLED = 0.03
+# What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
+SHOWN = 0.3
+# Information below this share of the largest is rounding.
+RANK = 1e-11
 
 
 @dataclass(frozen=True, eq=False)
 class PayloadFit:
-    """Ten parameters (10,) in B with covariance (10, 10), what the log alone says of them, and how it came about.
+    """Ten parameters (10,) in B with covariance (10, 10), and how they came about.
 
+    lost         (10, L) directions, in units of mass and size, that the rows do not show
+    scale        (10,) those units
     information  (10, 10) F, so that a change of the rows that moves F phi by d moves phi by F^-1 d
-    bias_N       spread of force bias per axis that the recordings show
-    logs         rows with their noise     chi2 per degree of freedom
+    bias_N, gain spread of force bias and gain per axis that the recordings show
+    weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
     """
 
     parameters: Array
     covariance: Array
+    lost: Array
+    scale: Array
     information: Array
-    weights: tuple[Array, ...]
+    condition: float
     bias_N: float
-    logs: tuple[MotionLog, ...]
+    gain: float
+    groups: tuple[Group, ...]
+    weights: tuple[Array, ...]
+    blind: tuple[tuple[Array, ...], ...]
+    residual: Array
     chi2: float
 
 
-def fit_payload(recordings: tuple[Fused, ...], unit_bias: Array) -> PayloadFit:
-    """Return the fit; `unit_bias` (6, 6) is C, per (N on every force axis) squared, in B's axes.
+def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with_gain: bool = True) -> PayloadFit:
+    """Return the fit of groups of recordings.
 
-    Raises CannotAnswer where all rows together leave one of the ten open.
+    D  (6, 6 N) sums the pushes at B     C  (6, 6) of a unit bias per force axis     size  of the team [m]
     """
-    logs = tuple(r.log for r in recordings)
-    phi = _ordinary(logs)
-    noise = [np.ones(6)] * len(logs)
-    scales = LADDER
+    ladder = np.array([(b, g) for b in BIAS for g in (GAIN if with_gain else GAIN[:1])])
+    phi, groups = _start(groups, D, size)
+    scale = _units(phi, size)
+    starts = np.cumsum([0, *(len(group.parts) for group in groups)])
     for _ in range(ROUNDS):
-        noise = _wrench_noise(logs, phi, noise)
-        noisy = tuple(_with_wrench(log, n) for log, n in zip(logs, noise, strict=True))
-        problems = [Problem.of(Moments.of_log(log, by_block=False), True) for log in noisy]
-        models = [_model(noisy, problems, phi, s**2 * unit_bias) for s in scales]
-        evidence = np.array([m.evidence for m in models])
-        weight = np.exp(evidence - evidence.max())
+        weights = tuple(group.weights(phi) for group in groups)
+        normals = [
+            normal(part, D, W, group.motion_noise)
+            for group, W in zip(groups, weights, strict=True)
+            for part in group.parts
+        ]
+        models = _Models.of(normals, C, ladder, scale)
+        weight = np.exp(models.evidence - models.evidence.max())
         weight /= weight.sum()
-        phi = sum((w * m.phi for w, m in zip(weight, models, strict=True)), np.zeros(10))
-    covariance = sum(
-        (w * (m.covariance + np.outer(m.phi - phi, m.phi - phi)) for w, m in zip(weight, models, strict=True)),
-        np.zeros((10, 10)),
-    )
-    best = models[int(np.argmax(weight))]
+        phi, best = weight @ models.phi, int(np.argmax(weight))
+        renewed = tuple(_judged(g, D, models, best, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
+        change = max(
+            float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max())
+            for new, old in zip(renewed, groups, strict=True)
+        )
+        if change < SETTLED:
+            break
+        groups = renewed
+    off = models.phi - phi
+    covariance = np.tensordot(weight, models.covariance, 1) + np.einsum("l,lp,lq->pq", weight, off, off)
+    bias, gain = np.sqrt(weight @ np.square(ladder))
+    rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
+    blind = tuple(tuple(models.blind[best, a:b]) for a, b in zip(starts[:-1], starts[1:], strict=True))
+    noise = sum((n.noise for n in normals), np.zeros((10, 10)))
+    values, vectors = np.linalg.eigh((models.information[best] - noise) * np.outer(scale, scale))
+    shown = _shown(values)
+    condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
     return PayloadFit(
-        phi, covariance, best.information, best.weights, float(np.exp(weight @ np.log(scales))), noisy, best.chi2
+        phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, float(bias), float(gain),
+        groups, weights, blind, _residual(groups), float(models.chi2[best]) / max(6 * rows - 10, 1.0),
+    )  # fmt: skip
+
+
+def _units(phi: Array, size: float) -> Array:
+    mass = max(abs(float(phi[0])), 1e-3)
+    return np.concatenate([[mass], np.full(3, mass * size), np.full(6, mass * size**2)])
+
+
+def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tuple[Group, ...]]:
+    """Return phi by least squares with moments in units of force times size, and the noise that is then left."""
+    unit = np.concatenate([np.full(3, size**2), np.ones(3)])
+    loud = tuple(
+        replace(g, motion_noise=np.zeros_like(g.motion_noise), wrench_noise=np.tile(unit, (len(g.wrench_noise), 1)))
+        for g in groups
     )
+    weight = np.linalg.inv(np.diag(unit))[None]
+    every = [
+        normal(part, D, np.repeat(weight, len(g.wrench_noise), 0), g.motion_noise) for g in loud for part in g.parts
+    ]
+    flat = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)])
+    first = _Models.of(every, np.diag(unit), np.array([[1.0, 0.0]]), flat)
+    left, count = np.zeros(6), 0.0
+    for k, part in enumerate(part for group in loud for part in group.parts):
+        left += residual_scatter(part, D, first.solution(0, k), np.zeros((16, 16))).sum(0)
+        count += float(part.judged_rows.sum())
+    phi = first.phi[0]
+    noise = np.maximum(left / max(count, 1.0), (ROUNDING * abs(phi[0]) * 9.81) ** 2 * unit)
+    return phi, tuple(replace(g, wrench_noise=np.tile(noise, (len(g.wrench_noise), 1))) for g in groups)
 
 
 @dataclass(frozen=True, eq=False)
-class _Model:
-    """The answer at one spread of the bias."""
+class _Models:
+    """The answers at L sizes (bias, gain), and the bias of every recording beside each.
+
+    phi (L, 10)     covariance, information (L, 10, 10)     evidence, chi2 (L,)
+    inner (L, R, 6, 6) covariance of a bias beside a known body     blind (L, R, 10, 6) H_pb H_bb^-1
+    """
 
     phi: Array
     covariance: Array
     information: Array
-    weights: tuple[Array, ...]
-    evidence: float
-    chi2: float
+    evidence: Array
+    chi2: Array
+    inner: Array
+    blind: Array
+    right: Array
 
-
-def _model(logs: tuple[MotionLog, ...], problems: list[Problem], phi: Array, bias: Array) -> _Model:
-    precision = np.linalg.inv(bias)
-    said, pull, evidence = np.zeros((10, 10)), np.zeros(10), 0.0
-    plain, right, constant, rows, weights = np.zeros((10, 10)), np.zeros(10), 0.0, 0.0, []
-    for log, problem in zip(logs, problems, strict=True):
-        known = replace(problem, bias_prior=BiasPrior(np.zeros(6), precision))
-        linear = np.concatenate([phi, np.zeros(6)])
-        W = known.noise_weights(known.residual_map(linear))
-        H, g = known.normal_equations(W)
-        inner = np.linalg.inv(H[10:, 10:])
-        linear[10:] = inner @ (g[10:] - H[10:, :10] @ phi)
-        score = score_variance(log, known, Solution.unconstrained(linear))
-        data = Effective.of(known, linear, score)
-        said, pull = said + data.information, pull + data.pull
-        plain += H[:10, :10] - H[:10, 10:] @ inner @ H[10:, :10]
-        right += g[:10] - H[:10, 10:] @ inner @ g[10:]
-        wrench = known.scatter[:, 12:18, 12:18]
-        constant += float(np.einsum("cij,cji->", W, wrench)) - float(g[10:] @ inner @ g[10:])
-        evidence += 0.5 * float(np.linalg.slogdet(precision)[1] - np.linalg.slogdet(H[10:, 10:])[1])
-        rows += problem.samples
-        weights.append(W)
-    covariance = inverse_scaled(said)
-    found = covariance @ pull
-    seen = inverse_scaled(plain) @ right
-    chi2 = constant - float(right @ seen)
-    evidence -= 0.5 * chi2 + 0.5 * float(np.linalg.slogdet(plain)[1])
-    return _Model(found, covariance, said, tuple(weights), evidence, chi2 / max(6 * rows - 10, 1.0))
-
-
-def _ordinary(logs: tuple[MotionLog, ...]) -> Array:
-    """Return phi (10,) by least squares with force and moment in units of their own, each recording with its bias."""
-    H, g = np.zeros((10, 10)), np.zeros(10)
-    for log in logs:
-        problem = Problem.of(Moments.of_log(_with_wrench(log, np.ones(6)), by_block=False), True)
-        W = np.eye(6)[None]
-        prior = replace(problem, bias_prior=BiasPrior(np.zeros(6), np.eye(6)))
-        full, right = prior.normal_equations(W)
-        inner = np.linalg.inv(full[10:, 10:])
-        H += full[:10, :10] - full[:10, 10:] @ inner @ full[10:, :10]
-        g += right[:10] - full[:10, 10:] @ inner @ right[10:]
-    values = np.linalg.eigvalsh(H / np.sqrt(np.outer(np.diag(H), np.diag(H))))
-    if not values[0] > 1e-10:
-        raise CannotAnswer(
-            "all rows together leave some of the ten parameters open; turn the payload about three axes."
+    @classmethod
+    def of(cls, normals: list[Normal], C: Array, ladder: Array, scale: Array) -> _Models:
+        """Return the models at every (bias, gain) of the ladder (L, 2)."""
+        H, g = np.stack([n.H for n in normals]), np.stack([n.g for n in normals])
+        pulled = np.stack([n.pulled for n in normals])
+        bias, gain = np.square(ladder.T)[..., None, None, None]
+        spread = bias * C + gain * pulled
+        held = H[:, 10:, 10:] + np.linalg.inv(spread)
+        inner = np.linalg.inv(held)
+        blind = H[:, :10, 10:] @ inner
+        plain = H[:, :10, :10].sum(0) - (blind @ H[:, 10:, :10]).sum(1)
+        right = g[:, :10].sum(0) - (blind @ g[:, 10:, None])[..., 0].sum(1)
+        taken = np.einsum("ri,lrij,rj->l", g[:, 10:], inner, g[:, 10:])
+        unit = np.outer(scale, scale)
+        full = plain * unit
+        ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(10)
+        seen = np.linalg.solve(full + ridge, (scale * right)[..., None])[..., 0]
+        chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
+        evidence = -0.5 * (chi2 + np.linalg.slogdet(np.eye(10) + full)[1])
+        evidence -= 0.5 * (np.linalg.slogdet(spread)[1] + np.linalg.slogdet(held)[1]).sum(1)
+        phi, covariance = _answers(full, sum((n.noise for n in normals), np.zeros((10, 10))) * unit, scale * right)
+        return cls(
+            scale * phi, unit * covariance, plain, evidence, chi2, inner, blind, np.broadcast_to(g[:, 10:], (len(H), 6))
         )
-    return np.asarray(inverse_scaled(H) @ g)
+
+    def solution(self, model: int, recording: int) -> Array:
+        """Return [phi, bias] (16,) of one recording."""
+        phi, blind = self.phi[model], self.blind[model, recording]
+        return np.concatenate([phi, self.inner[model, recording] @ self.right[recording] - blind.T @ phi])
+
+    def doubt(self, model: int, recording: int) -> Array:
+        """Return their covariance (16, 16)."""
+        covariance, blind = self.covariance[model], self.blind[model, recording]
+        cross = -blind.T @ covariance
+        return np.block([[covariance, cross.T], [cross, self.inner[model, recording] - cross @ blind]])
 
 
-def _wrench_noise(logs: tuple[MotionLog, ...], phi: Array, before: list[Array]) -> list[Array]:
-    """Return standard deviations (6,) per recording, pooled over those alike: what is left of the rows, less a mean."""
-    squares, counts = [], []
-    for log in logs:
-        left = features(log) @ residual_map(phi, np.zeros(6)).T
-        left = left - left.mean(0)
-        squares.append((left**2).sum(0))
-        counts.append(max(len(log) - 1, 1))
-    resting = [not log.angular_velocity.any() for log in logs]
-    out = []
-    for rest in resting:
-        same = [k for k, other in enumerate(resting) if other == rest]
-        pooled = sum(squares[k] for k in same) / sum(counts[k] for k in same)
-        out.append(np.maximum(np.sqrt(pooled), LEAST_NOISE))
-    return out
+def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
+    """Return phi (L, 10) and covariance (L, 10, 10) in units of `scale`.
+
+    What noise in the motion adds to the information is taken out. A lost direction stays at zero, as unsure as a body
+    of this mass and size can be.
+    """
+    values, vectors = np.linalg.eigh(full - noise)
+    shown = _shown(values)
+    inverse = (vectors * np.where(shown, 1 / np.where(shown, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
+    lost = vectors * ~shown[:, None]
+    covariance = inverse @ full @ inverse + lost @ lost.swapaxes(1, 2)
+    return (inverse @ right[..., None])[..., 0], covariance
 
 
-def _with_wrench(log: MotionLog, std: Array) -> MotionLog:
-    """Return the log with its wrench noise (6,) [N m, N] declared beside that of its motion."""
-    motion = np.zeros(6) if log.noise is None else log.noise[0].acceleration
-    return replace(log, noise=(Noise(motion, std**2),))
+def _shown(values: Array) -> Mask:
+    """Return which rising information (..., 10), in units of what a body can be, is more than noise and rounding."""
+    return np.asarray((values > SHOWN**-2.0) & (values > RANK * values[..., -1:]))
+
+
+def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> Group:
+    """Return the group with its wrench noise renewed: what is left of the rows in each band, less the motion's share."""
+    squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
+    for k, part in enumerate(group.parts):
+        squares += residual_scatter(part, D, models.solution(best, start + k), models.doubt(best, start + k))
+        rows += part.judged_rows
+    phi = models.phi[best]
+    M = motion_map(phi)[:, :6]
+    shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
+    seen = squares / np.maximum(rows, 1.0)[:, None]
+    thin = rows < 1
+    if thin.any() and not thin.all():
+        seen[thin] = seen[~thin].mean(0)
+    size = np.maximum((D[:, np.arange(D.shape[1]) % 6 >= 3] ** 2).mean(1), 1e-12)
+    least = np.maximum(0.02 * seen, (ROUNDING * abs(phi[0]) * 9.81) ** 2 * size)
+    # Where the path errs less than was thought, its noise shrinks with it.
+    share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
+    return replace(
+        group,
+        motion_noise=group.motion_noise * share[:, None, None],
+        wrench_noise=np.maximum(seen - shared * share[:, None], least),
+    )
+
+
+def _residual(groups: tuple[Group, ...]) -> Array:
+    """Return the rms (6,) of what is left of the summed moment and force, per row."""
+    total = sum((g.wrench_noise * sum(p.rows for p in g.parts)[:, None]).sum(0) for g in groups)
+    rows = sum(float(p.rows.sum()) for g in groups for p in g.parts)
+    return np.asarray(np.sqrt(total / max(rows, 1.0)))

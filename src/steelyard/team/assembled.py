@@ -1,0 +1,62 @@
+"""From the fits in the balance frame to one estimate in the reference grasp."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Evidence
+from steelyard.inertia import InertialParameters
+from steelyard.inertia.forms import com_jacobian
+from steelyard.logs.team_log import TeamLog
+from steelyard.team.body_rows import balance_frame
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.team.payload_doubt import moved_by_gains, moved_by_grasps
+from steelyard.team.payload_fit import SHOWN, PayloadFit
+from steelyard.team.pose_covariance import grasp_covariance
+from steelyard.team.pose_fit import PoseFit
+
+
+def assembled(
+    log: TeamLog, fit: PoseFit, payload: PayloadFit, D: Array, late: Mapping[str, float]
+) -> TeamEstimate:
+    """Return the estimate of a team with standing bases."""
+    grasps = fit.team.grasps
+    balance = balance_frame(grasps)
+    spread = grasp_covariance(fit)
+    moved = moved_by_grasps(payload, balance.inverse() @ grasps)
+    inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
+    body = InertialParameters(payload.parameters).in_frame(balance)
+    change = np.stack([InertialParameters(row).in_frame(balance).vector for row in np.eye(10)], axis=1)
+    estimates = {name: GraspEstimate(grasps[i], spread.of(i), spread.lost(i)) for i, name in enumerate(log.names)}
+    samples = {g.parts[0].still: sum(p.samples for p in g.parts) for g in payload.groups}
+    moment, force = payload.residual[:3], payload.residual[3:]
+    return TeamEstimate(
+        parameters=body,
+        covariance=change @ inner @ change.T,
+        method="joint",
+        evidence=Evidence(
+            10 - payload.lost.shape[1], payload.condition, sum(samples.values()), samples.get(True, 0),
+            float(np.sqrt((force**2).mean())), float(np.sqrt((moment**2).mean())), payload.chi2,
+        ),
+        identified=_identified(body, change @ inner @ change.T, payload),
+        frame=log.reference,
+        reference=log.reference,
+        grasps=estimates,
+        clock_offsets_s=dict(late) if spread.late is not None else {},
+        clock_offset_std_s=spread.delays(log.names),
+    )  # fmt: skip
+
+
+def _identified(body: InertialParameters, covariance: Array, payload: PayloadFit) -> Array:
+    """Return which (10,) of mass, centre of mass and inertia about it are known to a good part of what they can be."""
+    if not payload.lost.shape[1]:
+        return np.ones(10, np.bool_)
+    jacobian = np.zeros((10, 10))
+    jacobian[0, 0] = 1
+    jacobian[1:] = com_jacobian(body.vector)
+    std = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
+    scale = payload.scale / np.concatenate([[1.0], np.full(3, payload.scale[0]), np.ones(6)])
+    return np.asarray(std < SHOWN * scale)

@@ -1,0 +1,155 @@
+"""What the payload does and what the robots push, in one frame fixed to the payload: rows of one recording.
+
+B is the balance frame at the middle of the grasps: there the noise of the summed force and moment is uncorrelated. The
+motion comes from poses of the whole team, which place the payload far better than one gimbal encoder: rotation then
+comes from positions over a baseline of a metre. Rows are cut into runs without gaps.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.conditioning import lowpass
+from steelyard.logs.log import Mask
+from steelyard.spatial import Pose, Rotation, cross, cross_matrix
+from steelyard.team.stacked import Stretch
+
+# The path is smoothed at so many times the highest frequency that is used, which leaves that band as it is.
+PATH_FILTER = 2.0
+# Cycles of the highest frequency that a run must last, and that are left out at its ends.
+LEAST_CYCLES, END_CYCLES = 12.0, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Run:
+    """Rows of one recording without a gap, all in B's axes.
+
+    motion   (T, 12) angular acceleration, acceleration less gravity, omega omega^T (xx xy xz yy yz zz)
+    pushed   (T, 6 N) moment and force of every robot in its own grasp axes, zero where it holds nothing
+    rows     which rows of the recording these are
+    """
+
+    motion: Array
+    pushed: Array
+    rows: slice
+    rate: float
+
+
+@dataclass(frozen=True, eq=False)
+class BodyRows:
+    """Runs of one recording; `still` where the payload rests."""
+
+    name: str
+    still: bool
+    runs: tuple[Run, ...]
+
+
+def balance_frame(grasps: Pose) -> Pose:
+    """Return X_RB: at the middle of the grasps (N,), along the axes in which they spread."""
+    centre = grasps.position.mean(0)
+    off = grasps.position - centre
+    _, axes = np.linalg.eigh(off.T @ off)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return Pose(Rotation(axes), centre)
+
+
+def reach(grasps: Pose) -> float:
+    """Return the rms distance of the grasps from their middle [m]: the size of the team."""
+    off = grasps.position - grasps.position.mean(0)
+    return float(max(np.sqrt((off**2).sum(-1).mean()), 1e-3))
+
+
+def summing(X_BG: Pose) -> Array:
+    """Return (6, 6 N): from moment and force of every robot in its grasp to the team's at B."""
+    turn = X_BG.rotation.matrix
+    out = np.zeros((6, len(turn), 6))
+    out[:3, :, :3] = out[3:, :, 3:] = np.moveaxis(turn, 0, 1)
+    out[:3, :, 3:] = np.moveaxis(cross_matrix(X_BG.position) @ turn, 0, 1)
+    return out.reshape(6, -1)
+
+
+def from_poses(part: Stretch, path: Pose, known: Mask, gravity: Array, highest_hz: float) -> BodyRows:
+    """Return the rows of one recording from the payload's path X_HB (T,), where it is `known` (T,).
+
+    gravity  (3,) [m/s^2] in H     highest_hz  of the band that is used
+    """
+    good, still = part.complete & known, part.kind == "still"
+    pushed = (part.wrench * part.carries[..., None]).reshape(len(part), -1)
+    runs = []
+    for rows in _runs(good, part, still, highest_hz):
+        place, turn = path.position[rows], path.rotation[rows]
+        if still:
+            down = turn.inverse().apply(gravity)
+            motion = np.zeros((len(down), 12))
+            motion[:, 3:6] = -down
+            runs.append(Run(motion, pushed[rows], rows, part.rate))
+            continue
+        motion = _moving(turn, place, gravity, part.rate, PATH_FILTER * highest_hz)
+        cut = int(np.ceil(END_CYCLES * part.rate / highest_hz / PATH_FILTER)) + 2
+        inside = slice(rows.start + cut, rows.stop - cut)
+        runs.append(Run(motion[cut:-cut], pushed[inside], inside, part.rate))
+    return BodyRows(part.name, still, tuple(runs))
+
+
+def _runs(good: Mask, part: Stretch, still: bool, highest_hz: float) -> list[slice]:
+    """Return the stretches of good rows seen by one set of robots: where it changes, the path jumps by its noise."""
+    change = np.zeros(len(good), np.bool_)
+    if not still:
+        change[1:] = (part.seen[1:] != part.seen[:-1]).any(1)
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
+    least = max(3.0, (0.0 if still else LEAST_CYCLES) * part.rate / highest_hz)
+    out = []
+    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        inner = [start, *(start + np.flatnonzero(change[start + 1 : stop]) + 1), stop]
+        out += [slice(int(a), int(b)) for a, b in zip(inner[:-1], inner[1:], strict=True) if b - a >= least]
+    return out
+
+
+def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz: float) -> Array:
+    """Return the motion (T, 12) of a path that is smoothed, then differentiated."""
+    middle = Rotation.nearest(turn.matrix.mean(0))
+    path = np.concatenate([(middle.inverse() @ turn).log(), place], axis=1)
+    if cutoff_hz < 0.45 * rate:
+        path = lowpass(path, cutoff_hz, rate)
+    turn, place = middle @ Rotation.exp(path[:, :3]), path[:, 3:]
+    omega, alpha, second = np.zeros((3, len(place), 3))
+    omega[1:-1] = (turn[:-2].inverse() @ turn[2:]).log() * (rate / 2)
+    half = (turn[:-1].inverse() @ turn[1:]).log() * rate
+    alpha[1:-1] = (half[1:] - half[:-1]) * rate
+    second[1:-1] = (place[2:] - 2 * place[1:-1] + place[:-2]) * rate**2
+    return features(omega, alpha, turn.inverse().apply(second - gravity))
+
+
+def features(omega: Array, alpha: Array, supported: Array) -> Array:
+    """Return (T, 12) of angular velocity, its derivative and acceleration less gravity (T, 3) each."""
+    x, y, z = omega.T
+    return np.concatenate([alpha, supported, np.stack([x * x, x * y, x * z, y * y, y * z, z * z], 1)], axis=1)
+
+
+def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, highest_hz: float) -> BodyRows:
+    """Return the rows from twists (T, 6) in B and acceleration less gravity (T, 3) of a robot whose base moves.
+
+    `supported` is NaN where nobody can tell gravity; the derivative of the velocity is added here.
+    """
+    good, still = part.complete & known, part.kind == "still"
+    pushed = (part.wrench * part.carries[..., None]).reshape(len(part), -1)
+    runs = []
+    for rows in _runs(good, part, still, highest_hz):
+        if still:
+            motion = np.zeros((rows.stop - rows.start, 12))
+            motion[:, 3:6] = supported[rows]
+            runs.append(Run(motion, pushed[rows], rows, part.rate))
+            continue
+        smooth = twist[rows]
+        if PATH_FILTER * highest_hz < 0.45 * part.rate:
+            smooth = lowpass(smooth, PATH_FILTER * highest_hz, part.rate)
+        rise = np.zeros_like(smooth)
+        rise[1:-1] = (smooth[2:] - smooth[:-2]) * (part.rate / 2)
+        lifted = rise[:, 3:] + cross(smooth[:, :3], smooth[:, 3:]) + supported[rows]
+        motion = features(smooth[:, :3], rise[:, :3], lifted)
+        cut = int(np.ceil(END_CYCLES * part.rate / highest_hz / PATH_FILTER)) + 2
+        runs.append(Run(motion[cut:-cut], pushed[rows][cut:-cut], slice(rows.start + cut, rows.stop - cut), part.rate))
+    return BodyRows(part.name, still, tuple(runs))

@@ -1,0 +1,58 @@
+"""How noise of the fused path enters accelerations and the direction of gravity, band by band.
+
+Its size comes from the joint fit, its colour from the residuals of the same fit: structures and encoders err slowly,
+and second derivatives weigh every frequency by its fourth power.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.spatial import cross_matrix
+from steelyard.team.body_rows import BodyRows
+from steelyard.team.spectra import band_power
+
+# So many robots tell the colour well enough.
+ENOUGH = 6
+
+
+def motion_noise(
+    recordings: Sequence[BodyRows], residuals: Sequence[Array], path: Array, edges: Array, highest_hz: float, order: int
+) -> Array:
+    """Return the covariance (K, 6, 6) of angular acceleration and acceleration less gravity in every band.
+
+    residuals  (T, N, 6) of each recording's rows     path  (6, 6) covariance of a row of the path, in B's axes
+    order      differences from path to acceleration: 2 for poses, 1 for twists
+    """
+    fast, slow = _shares(recordings, residuals, edges, highest_hz, order), None
+    out = np.zeros((len(edges), 6, 6))
+    if not recordings[0].still:
+        out += fast[:, None, None] * path
+    if order == 2:
+        slow = _shares(recordings, residuals, edges, highest_hz, 0)
+        down = np.mean([run.motion[:, 3:6].mean(0) for r in recordings for run in r.runs], axis=0)
+        tilt = cross_matrix(down) @ path[:3, :3] @ cross_matrix(down).T
+        out[:, 3:, 3:] += slow[:, None, None] * tilt
+    return out
+
+
+def _shares(
+    recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: Array, highest_hz: float, order: int
+) -> Array:
+    """Return the mean square per row (K,) of noise of unit variance after `order` differences."""
+    total, rows = np.zeros(len(edges)), np.zeros(len(edges))
+    for recording, residual in zip(recordings, residuals, strict=True):
+        flat = residual[:, :ENOUGH].reshape(len(residual), -1)
+        size = np.sqrt((flat**2).mean(0))
+        flat = flat[:, size > 0] / size[size > 0]
+        if not flat.shape[1]:
+            continue
+        for run in recording.runs:
+            part = band_power(flat[run.rows], run, edges, highest_hz, order).mean(1)
+            there = np.isfinite(part)
+            total[there] += part[there] * len(run.motion)
+            rows[there] += len(run.motion)
+    return np.asarray(total / np.maximum(rows, 1.0))

@@ -1,0 +1,63 @@
+"""What errors of grasps and gains do to the ten parameters: seen from elsewhere, a force has another moment."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import basis
+from steelyard.spatial import Pose, cross_matrix
+from steelyard.team.payload_fit import PayloadFit
+from steelyard.team.payload_model import gain_columns
+
+
+def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
+    """Return d phi / d grasps (10, 6 N) for steps in each grasp's own axes; X_BG (N,) in the balance frame."""
+    count = len(X_BG.position)
+    turned = _turned(X_BG)
+    right = np.zeros((10, count, 6))
+    for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
+        for part, blind in zip(group.parts, blinds, strict=True):
+            for W, S in zip(weights, part.scatter, strict=True):
+                pushes = S[:, 12:-1].reshape(len(S), count, 6)
+                change = np.einsum("ab,ikbc,xic->axik", W, turned, pushes, optimize=True)
+                right += np.einsum("pax,axik->pik", basis(), change[:, :12])
+                right -= np.tensordot(blind, change[:, -1], axes=1)
+    return np.asarray(_kept(fit) @ right.reshape(10, -1))
+
+
+def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
+    """Return the covariance (10, 10) that gain errors of `fit.gain` add beyond their mean, which acts as a bias."""
+    force, unit = gain_columns(D)
+    back, out = _kept(fit), np.zeros((10, 10))
+    for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
+        for part, blind in zip(group.parts, blinds, strict=True):
+            S = part.scatter
+            mean = S[:, :, -1].sum(0) / max(float(S[:, -1, -1].sum()), 1e-300)
+            varying = S[:, :, 12 + force] - S[:, :, -1:] * mean[12 + force]
+            pulled = weights @ unit
+            right = np.einsum("pax,kau,kxu->pu", basis(), pulled, varying[:, :12], optimize=True)
+            right -= blind @ np.einsum("kau,ku->au", pulled, varying[:, -1])
+            moved = back @ right
+            out += fit.gain**2 * moved @ moved.T
+    return out
+
+
+def _kept(fit: PayloadFit) -> Array:
+    """Return F^-1 (10, 10) in the directions that the rows show."""
+    scaled = fit.information * np.outer(fit.scale, fit.scale)
+    inverse = np.linalg.pinv(scaled, hermitian=True, rcond=1e-10) * np.outer(fit.scale, fit.scale)
+    keep = np.eye(10) - (fit.scale[:, None] * (fit.lost @ fit.lost.T)) / fit.scale
+    return np.asarray(keep @ inverse)
+
+
+def _turned(X_BG: Pose) -> Array:
+    """Return how the summing block (6, 6) of each grasp changes per step k of its own (N, 6, 6, 6)."""
+    R, P = X_BG.rotation.matrix, cross_matrix(X_BG.position)
+    out = np.zeros((len(R), 6, 6, 6))
+    for k in range(3):
+        axis = cross_matrix(np.eye(3)[k])
+        out[:, k, :3, :3] = out[:, k, 3:, 3:] = R @ axis
+        out[:, k, :3, 3:] = P @ R @ axis
+        out[:, 3 + k, :3, 3:] = cross_matrix(R[:, :, k]) @ R
+    return out
