@@ -20,13 +20,12 @@ POINTS = 4000
 _NUDGE = 1e-7  # of the diagonal
 _FLAT = 1e-4  # volume of a cell, over that of a box of its edges, below which it is a flat leftover
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
-_BARE = 0.62  # area that the points stand for over that of the solid: below this some surface has no points of its own
+_BLURRED = 0.335  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
-_DISAGREE = 0.1  # of the points: more than this disagree only where walls could not be told apart
-_LONG = 5.0  # spacings: triangles of the solid with longer edges are slivers along its hull, or bridge a hole
 _OPEN = 0.07  # length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
-_STD, _UNSURE, _THIN, _HOLE = 0.025, 0.1, 0.5, 1.0  # standard deviations of the volume: of any, per share of ...
+# Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
+_STD, _UNSURE, _THIN, _HOLE = 0.025, 0.1, 0.5, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,17 +60,19 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
     used, findings = working_cloud(cloud, points)
     surface, turned = _oriented(used)
-    tets, score = _complex(surface)
+    tets, found, votes = _complex(surface)
+    score = found - 0.5 + votes
     if not (score > 0).any():
         raise BadValue(
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
-    against, bare, gap = _fit(surface, tets[score > 0])
+    against = _against(surface, tets[score > 0])
     if used.normals is not None and against > _TURNED:
         text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
         again = enclose(replace(used, normals=None), points)
         return replace(again, findings=(*findings, Finding.of("normals-flipped", text), *again.findings))
-    return _solid(used, surface, tets, score, (*findings, *turned), (against, bare, gap))
+    mesh = TetMesh(used.xyz, tets)
+    return _solid(used, surface, mesh, score, _doubt(mesh.volumes, found, votes), (*findings, *turned))
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
@@ -84,8 +85,8 @@ def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
     return replace(surface, normals=-surface.normals), found
 
 
-def _complex(surface: Oriented) -> tuple[Any, Array]:
-    """Return the Delaunay cells (T, 4) of the points, and how far each is inside (T,), above zero."""
+def _complex(surface: Oriented) -> tuple[Any, Array, Array]:
+    """Return the Delaunay cells (T, 4) of the points, winding numbers (T,) in them, and their corners' votes (T,)."""
     from scipy.spatial import Delaunay
 
     # Qhull spends most of its time on points in one plane: they are moved by less than any measurement notices.
@@ -96,62 +97,51 @@ def _complex(surface: Oriented) -> tuple[Any, Array]:
     u, v, w = b - a, c - a, d - a
     six = np.abs((np.cross(u, v) * w).sum(1))
     tets = tets[six > _FLAT * np.sqrt((u**2).sum(1) * (v**2).sum(1) * (w**2).sum(1))]
-    return tets, _score(surface, tets, xyz[tets].mean(1))
-
-
-def _score(surface: Oriented, tets: Any, centres: Array) -> Array:
-    """Return how far cells (T,) are inside: winding number less a half, and the mean vote of the corners' normals."""
+    centres = xyz[tets].mean(1)
     targets = Tree.of(centres)
     discs = Discs.on(surface.tree, surface.normals, surface.area, DEPTH, _JUMP * surface.spacing)
     found = targets.back(discs.winding(Sight.of(targets, surface.tree)))
-    return np.asarray(np.clip(found, -0.5, 1.5) - 0.5 + _votes(surface, tets, centres))
+    return tets, np.clip(found, 0, 2).astype(float), _votes(surface, tets, centres)
 
 
 def _votes(surface: Oriented, tets: Any, centres: Array) -> Array:
+    """Return how much the normals (-1..1) of the corners of cells (T,) say that they lie inside."""
     away = centres[:, None] - surface.xyz[tets]
     cosine = np.einsum("tkd,tkd->tk", away, surface.normals[tets]) / np.linalg.norm(away, axis=2)
     return np.asarray(-cosine.mean(1))
 
 
-def _fit(surface: Oriented, inside: Any) -> tuple[float, float, float]:
-    """Return how well the cells inside fit the points.
+def _doubt(volumes: Array, found: Array, votes: Array) -> float:
+    """Return how little the cells inside look like it: 0 for a clean solid, 1/2 where walls and gaps are one blur.
 
-    The share of the points on the solid's surface whose normals disagree with it, the area that the points stand for
-    over that of the solid, and the vector area that the points leave open over the sum of their areas.
+    What their mean winding number lacks to 1, and twice the share of them that the normals call outside.
     """
+    inside = volumes * (found - 0.5 + votes > 0)
+    return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
+
+
+def _against(surface: Oriented, inside: Any) -> float:
+    """Return the share of the points whose normals disagree with the surface of the cells inside."""
     skin = TetMesh(surface.xyz, inside).surface
     corners = surface.xyz[skin]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    area = np.linalg.norm(across, axis=1) / 2
-    out = np.zeros(surface.xyz.shape)
-    for k in range(3):
-        np.add.at(out, skin[:, k], across)
-    length = np.linalg.norm(out, axis=1)
-    on = length > 0
-    cosine = (out[on] * surface.normals[on]).sum(1) / length[on]
-    sampled = area[np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2).max(1) < _LONG * surface.spacing]
-    gap = np.linalg.norm((surface.area[:, None] * surface.normals).sum(0)) / surface.area.sum()
-    return float((cosine < _AGAINST).sum() / len(on)), float(surface.area.sum() / max(sampled.sum(), 1e-30)), float(gap)
+    out = np.stack([np.bincount(skin.ravel(), np.repeat(across[:, k], 3), len(surface.xyz)) for k in range(3)], 1)
+    return float(((out * surface.normals).sum(1) < _AGAINST * np.linalg.norm(out, axis=1)).mean())
 
 
 def _solid(
-    cloud: Cloud,
-    surface: Oriented,
-    tets: Any,
-    score: Array,
-    findings: tuple[Finding, ...],
-    fit: tuple[float, float, float],
+    cloud: Cloud, surface: Oriented, mesh: TetMesh, score: Array, doubt: float, findings: tuple[Finding, ...]
 ) -> Solid:
     inside = score > 0
-    mesh = TetMesh(cloud.xyz, tets[inside])
-    sure = np.minimum(2 * score[inside], 1.0)
-    against, bare, gap = fit
-    thin, hole = bare < _BARE or against > _DISAGREE, gap > _OPEN
+    solid, sure = mesh.chosen(inside), np.minimum(2 * score[inside], 1.0)
+    total = float(surface.area.sum())
+    gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
+    thin, hole = doubt > _BLURRED, gap > _OPEN
     if thin:
+        apart = surface.spacing * cloud.diagonal * 1e3
         text = (
-            f"Walls about as thin as half the spacing of the points ({surface.spacing * cloud.diagonal * 1e3:.2g} mm) "
-            f"could not be told from the gaps beside them: {100 * against:.0f} % of the points contradict the surface "
-            f"of the solid, which has {1 / bare:.1f} times the area that they stand for."
+            f"Walls are too thin for points {apart:.2g} mm apart to tell them from gaps: "
+            f"their mean winding number inside is blurred to {1 - doubt:.2f}."
         )
         findings += (Finding.of("thin-thickened", text),)
     if hole:
@@ -159,8 +149,7 @@ def _solid(
             f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
         )
         findings += (Finding.of("surface-open", text),)
-    unsure = float((mesh.volumes * (1 - sure)).sum() / mesh.volume)
-    std = np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * thin) ** 2 + (_HOLE * gap * hole) ** 2)
-    area = float(surface.area.sum()) * cloud.diagonal**2
+    unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
+    std = float(np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * thin) ** 2 + (_HOLE * gap * hole) ** 2))
     kept = replace(cloud, normals=surface.normals)
-    return Solid(mesh, kept, sure, float(std), float(std) * mesh.volume / area, findings)
+    return Solid(solid, kept, sure, std, std * solid.volume / (total * cloud.diagonal**2), findings)
