@@ -6,6 +6,7 @@ Monograms as in Drake: `R_AB` turns coordinates in B into coordinates in A, and 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,6 +120,11 @@ class Rotation:
         row = np.take_along_axis(_quaternion_products(self.matrix, squares), biggest, -2)[..., 0, :]
         q = row / np.linalg.norm(row, axis=-1, keepdims=True)
         return np.asarray(np.where(q[..., :1] < 0, -q, q))
+
+    @classmethod
+    def joined(cls, parts: Sequence[Rotation], axis: int = 0) -> Rotation:
+        """Return rotations one after the other along an axis of the batch, `axis` counted from the front."""
+        return cls._trusted(np.concatenate([part.matrix for part in parts], axis=axis))
 
     def inverse(self) -> Rotation:
         """Return R_BA."""

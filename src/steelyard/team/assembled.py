@@ -19,9 +19,7 @@ from steelyard.team.pose_covariance import grasp_covariance
 from steelyard.team.pose_fit import PoseFit
 
 
-def assembled(
-    log: TeamLog, fit: PoseFit, payload: PayloadFit, D: Array, late: Mapping[str, float]
-) -> TeamEstimate:
+def assembled(log: TeamLog, fit: PoseFit, payload: PayloadFit, D: Array, late: Mapping[str, float]) -> TeamEstimate:
     """Return the estimate of a team with standing bases."""
     grasps = fit.team.grasps
     balance = balance_frame(grasps)

@@ -8,8 +8,10 @@ comes from positions over a baseline of a metre. Rows are cut into runs without 
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
+from scipy.fft import prev_fast_len
 
 from steelyard.check import Array
 from steelyard.logs.conditioning import lowpass
@@ -88,9 +90,10 @@ def from_poses(part: Stretch, path: Pose, known: Mask, gravity: Array, highest_h
             runs.append(Run(motion, pushed[rows], rows, part.rate))
             continue
         motion = _moving(turn, place, gravity, part.rate, PATH_FILTER * highest_hz)
-        cut = int(np.ceil(END_CYCLES * part.rate / highest_hz / PATH_FILTER)) + 2
-        inside = slice(rows.start + cut, rows.stop - cut)
-        runs.append(Run(motion[cut:-cut], pushed[inside], inside, part.rate))
+        inside = _inside(rows, part.rate, highest_hz)
+        runs.append(
+            Run(motion[inside.start - rows.start : inside.stop - rows.start], pushed[inside], inside, part.rate)
+        )
     return BodyRows(part.name, still, tuple(runs))
 
 
@@ -104,8 +107,15 @@ def _runs(good: Mask, part: Stretch, still: bool, highest_hz: float) -> list[sli
     out = []
     for start, stop in zip(edges[::2], edges[1::2], strict=True):
         inner = [start, *(start + np.flatnonzero(change[start + 1 : stop]) + 1), stop]
-        out += [slice(int(a), int(b)) for a, b in zip(inner[:-1], inner[1:], strict=True) if b - a >= least]
+        out += [slice(int(a), int(b)) for a, b in pairwise(inner) if b - a >= least]
     return out
+
+
+def _inside(rows: slice, rate: float, highest_hz: float) -> slice:
+    """Return the rows without the ends, where the filter has only one side: as many as transform quickly."""
+    cut = int(np.ceil(END_CYCLES * rate / highest_hz / PATH_FILTER)) + 2
+    length = prev_fast_len(rows.stop - rows.start - 2 * cut, real=True)
+    return slice(rows.start + cut, rows.start + cut + length)
 
 
 def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz: float) -> Array:
@@ -150,6 +160,8 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
         rise[1:-1] = (smooth[2:] - smooth[:-2]) * (part.rate / 2)
         lifted = rise[:, 3:] + cross(smooth[:, :3], smooth[:, 3:]) + supported[rows]
         motion = features(smooth[:, :3], rise[:, :3], lifted)
-        cut = int(np.ceil(END_CYCLES * part.rate / highest_hz / PATH_FILTER)) + 2
-        runs.append(Run(motion[cut:-cut], pushed[rows][cut:-cut], slice(rows.start + cut, rows.stop - cut), part.rate))
+        inside = _inside(rows, part.rate, highest_hz)
+        runs.append(
+            Run(motion[inside.start - rows.start : inside.stop - rows.start], pushed[inside], inside, part.rate)
+        )
     return BodyRows(part.name, still, tuple(runs))

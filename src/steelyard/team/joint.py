@@ -6,7 +6,6 @@ recording
 
 from __future__ import annotations
 
-from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -20,17 +19,20 @@ from steelyard.team.assembled import assembled
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses, reach, summing
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.motion_noise import motion_noise
-from steelyard.team.payload_fit import PayloadFit, fit_payload
+from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
-from steelyard.team.pose_fit import PoseFit, fit_poses
+from steelyard.team.pose_fit import FEW_ROWS, PoseFit, fit_poses
+from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import TeamMotion
 from steelyard.team.published import require_wrenches
 from steelyard.team.spectra import band_edges, gathered
 from steelyard.team.stacked import Stretch, all_poses, stretches
 
-# Clocks are put right until they move by less than this [s].
-PUNCTUAL = 2e-5
+# Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
+PUNCTUAL = 2e-4
+# A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
+DOUBTED = 4.0
 CLOCK_ROUNDS = 6
 
 
@@ -65,15 +67,22 @@ class JointTeam:
         late = dict.fromkeys(log.names, 0.0)
         parts = stretches(log, late)
         data = TeamMotion(*all_poses(parts))
-        fit = fit_poses(data, first_team(data, reference, log.names), reference)
+        start = first_team(data, reference, log.names)
+        few = slice(None, None, max(1, len(data.valid) // FEW_ROWS if self.clocks else 1))
+        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference)
+        if len(data.valid) > len(fit.team.motion.position):
+            fit = replace(fit, team=replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes)))
         if not self.clocks:
             return parts, fit, late
         for _ in range(CLOCK_ROUNDS):
             timed = replace(data, twist=_twists(parts, fit))
             fit = fit_poses(timed, replace(fit.team, delays=np.zeros(len(log.names))), reference, fit.noise)
             step = fit.team.delays
+            doubt = np.zeros_like(step)
+            timed_ones = fit.unknown % OWN == OWN - 1
+            doubt[fit.unknown[timed_ones] // OWN] = np.sqrt(np.diag(fit.solved.inverse)[timed_ones])
             late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
-            if np.abs(step).max() < PUNCTUAL:
+            if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * doubt)).all():
                 break
             parts = stretches(log, late)
             data = TeamMotion(*all_poses(parts))

@@ -27,23 +27,20 @@ def motion_noise(
     residuals  (T, N, 6) of each recording's rows     path  (6, 6) covariance of a row of the path, in B's axes
     order      differences from path to acceleration: 2 for poses, 1 for twists
     """
-    fast, slow = _shares(recordings, residuals, edges, highest_hz, order), None
+    shares = _shares(recordings, residuals, edges, highest_hz)
     out = np.zeros((len(edges), 6, 6))
     if not recordings[0].still:
-        out += fast[:, None, None] * path
+        out += shares[order, :, None, None] * path
     if order == 2:
-        slow = _shares(recordings, residuals, edges, highest_hz, 0)
         down = np.mean([run.motion[:, 3:6].mean(0) for r in recordings for run in r.runs], axis=0)
         tilt = cross_matrix(down) @ path[:3, :3] @ cross_matrix(down).T
-        out[:, 3:, 3:] += slow[:, None, None] * tilt
+        out[:, 3:, 3:] += shares[0, :, None, None] * tilt
     return out
 
 
-def _shares(
-    recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: Array, highest_hz: float, order: int
-) -> Array:
-    """Return the mean square per row (K,) of noise of unit variance after `order` differences."""
-    total, rows = np.zeros(len(edges)), np.zeros(len(edges))
+def _shares(recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: Array, highest_hz: float) -> Array:
+    """Return the mean square per row (3, K) of noise of unit variance after 0, 1 and 2 differences."""
+    total, rows = np.zeros((3, len(edges))), np.zeros(len(edges))
     for recording, residual in zip(recordings, residuals, strict=True):
         flat = residual[:, :ENOUGH].reshape(len(residual), -1)
         size = np.sqrt((flat**2).mean(0))
@@ -51,8 +48,8 @@ def _shares(
         if not flat.shape[1]:
             continue
         for run in recording.runs:
-            part = band_power(flat[run.rows], run, edges, highest_hz, order).mean(1)
-            there = np.isfinite(part)
-            total[there] += part[there] * len(run.motion)
+            part = band_power(flat[run.rows], run, edges, highest_hz)
+            there = np.isfinite(part[0])
+            total[:, there] += part[:, there] * len(run.motion)
             rows[there] += len(run.motion)
     return np.asarray(total / np.maximum(rows, 1.0))

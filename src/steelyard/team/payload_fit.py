@@ -9,12 +9,13 @@ Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, ce
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.log import Mask
 from steelyard.identify.regressor import motion_map
+from steelyard.logs.log import Mask
 from steelyard.team.payload_model import ROUNDING, Group, Normal, normal, residual_scatter
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
@@ -87,7 +88,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     covariance = np.tensordot(weight, models.covariance, 1) + np.einsum("l,lp,lq->pq", weight, off, off)
     bias, gain = np.sqrt(weight @ np.square(ladder))
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
-    blind = tuple(tuple(models.blind[best, a:b]) for a, b in zip(starts[:-1], starts[1:], strict=True))
+    blind = tuple(tuple(models.blind[best, a:b]) for a, b in pairwise(starts))
     noise = sum((n.noise for n in normals), np.zeros((10, 10)))
     values, vectors = np.linalg.eigh((models.information[best] - noise) * np.outer(scale, scale))
     shown = _shown(values)
@@ -199,7 +200,7 @@ def _shown(values: Array) -> Mask:
 
 
 def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> Group:
-    """Return the group with its wrench noise renewed: what is left of the rows in each band, less the motion's share."""
+    """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
     squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
     for k, part in enumerate(group.parts):
         squares += residual_scatter(part, D, models.solution(best, start + k), models.doubt(best, start + k))

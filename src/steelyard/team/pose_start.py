@@ -17,6 +17,8 @@ from steelyard.team.poses import Team, TeamMotion
 
 # Turns about the one axis of rotation that are tried where it is the only one.
 TURNS = 24
+# Rotation about a second axis is at least this share of that about the first, or it counts as none.
+ONE_AXIS = 0.1
 # Fewer common rows than this start nothing.
 FEWEST = 8
 # [rad] Rotations below this are noise and place nothing.
@@ -63,7 +65,10 @@ def _grasp(T_r: Pose, T_i: Pose) -> Pose:
     a, b = A.position - A.position.mean(0), B.position - B.position.mean(0)
     turning, moving = alpha.T @ beta, a.T @ b
     candidates = [_wahba(turning), _wahba(moving)]
-    axis = np.linalg.svd(alpha, full_matrices=False)[2][0]
+    spread, axes = np.linalg.eigh(alpha.T @ alpha)
+    axis = axes[:, 2]
+    if spread[1] > ONE_AXIS**2 * spread[2] and spread[1] > len(alpha) * ROTATION_NOISE**2:
+        return Pose(candidates[0], _position(A, B, candidates[0])[0])
     for angle in np.arange(TURNS) * (2 * np.pi / TURNS):
         candidates.append(Rotation.exp(angle * axis) @ candidates[0])
     found = [_position(A, B, R) for R in candidates]

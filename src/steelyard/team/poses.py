@@ -39,11 +39,15 @@ class TeamMotion:
     @cached_property
     def patterns(self) -> tuple[Mask, Integers]:
         """Return the different sets of robots that have poses (C, N), and which of them each row (T,) has."""
+        if self.valid.all():
+            return np.ones((1, self.count), np.bool_), np.zeros(len(self.valid), np.int64)
         found, place = np.unique(self.valid, axis=0, return_inverse=True)
         return found, place.ravel()
 
     def motion_seen(self, grasps: Pose, homes: Pose) -> Pose:
         """Return the payload (T,) in the reference home as the first robot with a pose at that time sees it."""
+        if self.valid[:, 0].all():
+            return homes[0] @ self.poses[:, 0] @ grasps[0].inverse()
         first = np.argmax(self.valid, axis=1)
         return homes[first] @ self.poses[np.arange(len(first)), first] @ grasps[first].inverse()
 

@@ -97,19 +97,19 @@ def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
     return Spectra(recording.name, recording.still, scatter, rows, judged, judged_rows, samples)
 
 
-def band_power(values: Array, run: Run, edges: Array, highest_hz: float, derivative: int) -> Array:
-    """Return the mean square (K, D) per row, in every band, of noise (T, D) in a path after `derivative` differences.
+def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Array:
+    """Return the mean square (3, K) per row, in every band, of noise (T, D) in a path after 0, 1 and 2 differences.
 
     Bands without rows get nan.
     """
     hz = frequencies(run, highest_hz)
-    size = len(values)
-    power = dct(values * fade(size, run.rate)[:, None], axis=0, norm="ortho")[: len(hz)] ** 2
-    gain = (2 * run.rate * np.sin(np.pi * hz / run.rate)) ** (2 * derivative)
-    out = np.full((len(edges), values.shape[1]), np.nan)
+    tapered = values * fade(len(values), run.rate)[:, None]
+    power = (dct(tapered, axis=0, norm="ortho")[: len(hz)] ** 2).mean(1)
+    gain = (2 * run.rate * np.sin(np.pi * hz / run.rate)) ** 2
+    out = np.full((3, len(edges)), np.nan)
     for band, chosen in enumerate(_bands(hz, edges)):
         if chosen.stop > chosen.start:
-            out[band] = (power[chosen] * gain[chosen, None]).mean(0)
+            out[:, band] = [(power[chosen] * gain[chosen] ** k).mean() for k in range(3)]
     return out
 
 

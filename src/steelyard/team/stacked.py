@@ -12,7 +12,11 @@ from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import channel_at, common_time, mean_rotation
+from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
+
+# Rows that a gap may last and still be filled: far below what the payload can do in that time.
+BRIDGED = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -65,7 +69,7 @@ def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecord
 def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
     time = common_time(recording, log.names)
     rows, count = len(time), len(log.names)
-    turn, place = np.broadcast_to(np.eye(3), (rows, count, 3, 3)).copy(), np.zeros((rows, count, 3))
+    turns, place = [Rotation.identity(rows, 1)] * count, np.zeros((rows, count, 3))
     wrench = np.zeros((rows, count, 6))
     seen, felt = np.zeros((rows, count), np.bool_), np.zeros((rows, count), np.bool_)
     carries = np.ones((rows, count), np.bool_)
@@ -78,15 +82,38 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
             nearest = np.clip(np.searchsorted(track.time, time - 0.5 / max(_rate(track.time), 1e-9)), 0, len(track) - 1)
             carries[:, i] &= track.carrying[nearest]
         if track.has("rotation", "position"):
-            vectors, turned = channel_at(track, "rotation", time)
+            turned, had = _rotation_at(track, time)
+            turns[i] = turned[:, None]
             place[:, i], placed = channel_at(track, "position", time)
-            turn[:, i] = (mean_rotation(track) @ Rotation.exp(vectors)).matrix
-            seen[:, i] = turned & placed
+            seen[:, i] = bridged(had & placed)
         if track.has("force"):
             wrench[:, i, 3:], felt[:, i] = channel_at(track, "force", time)
+            felt[:, i] = bridged(felt[:, i])
             if track.has("torque"):
                 wrench[:, i, :3] = channel_at(track, "torque", time)[0]
-    return Stretch(recording.name, recording.kind, time, Pose(Rotation(turn), place), seen, wrench, felt, carries)
+    return Stretch(
+        recording.name, recording.kind, time, Pose(Rotation.joined(turns, 1), place), seen, wrench, felt, carries
+    )
+
+
+def _rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:
+    good = track.valid["rotation"]
+    if good.all() and len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6):
+        return track.pose.rotation, good
+    vectors, turned = channel_at(track, "rotation", time)
+    return mean_rotation(track) @ Rotation.exp(vectors), turned
+
+
+def bridged(good: Mask) -> Mask:
+    """Return the mask with gaps of up to BRIDGED rows closed: between such neighbours a curve is as good as a row."""
+    if good.all() or not good.any():
+        return good
+    there = np.flatnonzero(good)
+    gap = np.diff(there)
+    out = good.copy()
+    for k in np.flatnonzero((gap > 1) & (gap <= BRIDGED + 1)):
+        out[there[k] : there[k + 1]] = True
+    return out
 
 
 def _rate(time: Array) -> float:
@@ -102,6 +129,7 @@ def all_poses(parts: tuple[Stretch, ...]) -> tuple[Pose, Mask]:
     seen = np.concatenate([p.seen for p in parts])
     if not seen.any():
         raise CannotAnswer("the joint fit from poses needs the pose of every grasp in its robot's home; there is none.")
-    turn = np.concatenate([p.poses.rotation.matrix for p in parts])
+    if len(parts) == 1:
+        return parts[0].poses, seen
     place = np.concatenate([p.poses.position for p in parts])
-    return Pose(Rotation(turn), place), seen
+    return Pose(Rotation.joined([p.poses.rotation for p in parts]), place), seen
