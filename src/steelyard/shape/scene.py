@@ -18,10 +18,11 @@ from steelyard.spatial import Pose
 
 LEAST_VIEWS = 3  # that must agree before something is believed
 WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
-_SAMPLES = 60_000  # points that find the table
-_STRIDE = 2  # of the pixels that are looked at
+_SAMPLES = 30_000  # points that find the table
+_STRIDE = 3  # of the pixels that are averaged
 _NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
 _REACH = 0.6  # of the camera's distance: how far from where the cameras look the object may lie
+_SEEDS = 4  # points that are settled, for each that stays
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _MARGIN = 0.008  # of table kept around the object [m]
 
@@ -36,6 +37,7 @@ class Scene:
     p: Array
     distance: float
     noise: float
+    highest: float = np.inf  # point measured over the object [m]
 
     @property
     def pixel(self) -> float:
@@ -124,15 +126,16 @@ def object_on_table(scene: Scene) -> tuple[Any, Array, float, int]:
     stranger = ndimage.binary_dilation(
         (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(area > 25)), np.ones((3, 3))
     )
-    return mine & ~stranger, low, pitch, others
+    mine &= ~stranger
+    scene.highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
+    return mine, low, pitch, others
 
 
 def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
     cell = _CELL * scene.pixel
     floor = -4 * scene.sigma - 2 * cell
-    highest = float(np.median(scene.p[:, 2]))
-    layers = int((min(highest, _REACH * scene.distance) - floor) / cell) + 1
+    layers = int((min(scene.highest, _REACH * scene.distance) - floor) / cell) + 2
     found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, mask, low, pitch, cell, floor, layers, scene.noise)
     return np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
 
@@ -140,7 +143,7 @@ def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
 def surface_of(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float, points: int) -> tuple[Array, Array]:
     """Return points (N, 3) of the object's surface and normals, settled among the views."""
     order = np.argsort(-patches[:, 6], kind="stable")
-    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, 6 * points, scene.pixel)
+    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _SEEDS * points, scene.pixel)
     xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
     support = images.settled(*scene.images(), xyz, normal, WINDOW, scene.noise, 2)
     least = min(LEAST_VIEWS, len(scene.R))
