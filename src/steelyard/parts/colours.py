@@ -1,8 +1,9 @@
 """Colours of a surface: the light taken out, noise averaged, and the few colours that the object is made of.
 
-A single lamp makes brightness a linear function of the normal, colour = albedo (1 + s . n). Most neighbours have one
-albedo, so s is found from pairs of them without knowing any colour, by a robust fit (Lambert's law to first order:
-Basri and Jacobs 2003, "Lambertian reflectance and linear subspaces", sec. 3).
+However an object is lit from afar, brightness is nearly a quadratic function of the normal, albedo (1 + s . f(n)) with
+the eight harmonics f of first and second order: a lamp lights one side and leaves the other alike dark. Most neighbours
+have one albedo, so s is found from pairs of them without knowing any colour, by a robust fit.
+Source: Basri and Jacobs 2003, "Lambertian reflectance and linear subspaces", sec. 3: nine harmonics hold 99 %.
 """
 
 from __future__ import annotations
@@ -23,7 +24,8 @@ FINEST, COARSEST = 0.03, 0.2
 _STEPS = 3.0  # one colour reaches this many median steps between neighbours
 _LEFT = 0.75  # of the noise: what averaging leaves of it is alike in neighbours, and so not seen between them
 _RARE = 0.01  # a colour has at least this share of the points
-_LAMP_SEEN = 0.05  # weaker shading is below the difference of two colours
+_TURNED = 0.15  # between the normals of a pair, for it to tell of the lamp
+_LAMP_SEEN = 0.1  # weaker shading is below the difference of two colours
 _LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
 _ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
 
@@ -34,7 +36,7 @@ class ColourModes:
 
     label  (V,) the colour 0..M-1 of every point
     rgb    (M, 3) the colours, 0..255, as they are without the lamp
-    lamp   (3,) direction of the lamp times its strength; brightness is 1 + lamp . normal; 0 where none is seen
+    lamp   (8,) weights of the harmonics of the normal; brightness is 1 + lamp . f(normal); 0 where no lamp is seen
     noise  median distance of neighbouring colours, 0..1, before averaging
     """
 
@@ -50,7 +52,7 @@ def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
     lamp = _lamp(colour, skin, near)
     sure = np.ones(len(colour), dtype=bool)
     if lamp.any():
-        colour = colour / (1 + skin.normals @ lamp)[:, None]
+        colour = colour / (1 + _harmonics(skin.normals) @ lamp)[:, None]
         sure = skin.flatness > min(0.95, float(np.median(skin.flatness)))
     raw, near = colour, near[:, :NEIGHBOURS]
     noise = _step(colour, near, sure)
@@ -63,40 +65,55 @@ def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
     return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise)
 
 
+def _harmonics(normals: Array) -> Array:
+    """Return the harmonics (..., 8) of first and second order of unit vectors (..., 3), which are the first three."""
+    x, y, z = np.moveaxis(normals, -1, 0)
+    return np.stack([x, y, z, x * y, x * z, y * z, (x * x - y * y) / 2, (3 * z * z - 1) / 2], axis=-1)
+
+
 def _lamp(colour: Array, skin: Skin, near: Integers) -> Array:
-    """Return the lamp (3,): direction times strength; 0 where the brightness does not follow the normals."""
+    """Return the weights (8,) of the harmonics; 0 where the brightness does not follow the normals.
+
+    The fit is over pairs of neighbours whose normals differ. It must take away a quarter of the usual difference to be
+    believed, and the second order a quarter of what the first leaves.
+    """
     flat = skin.flatness > np.clip(np.median(skin.flatness), 0.9, 0.98)
-    apart = near[:, 3::6]  # some rings away: next neighbours share their triangles, and so their errors
+    apart = near[:, 3::4]  # some rings away: next neighbours share their triangles, and so their errors
     i, j = np.repeat(np.arange(len(near)), apart.shape[1]), apart.ravel()
-    both = flat[i] & flat[j]
-    i, j = i[both], j[both]
-    one, two, n = colour[i], colour[j], skin.normals
-    # (1 + s.n_j) colour_i = (1 + s.n_i) colour_j, of equal albedo; three rows per pair, relative to the brightness.
-    scale = 1 / np.maximum((one + two).ravel(), 4 / 255)[:, None]
-    rows = (one[:, :, None] * n[j][:, None] - two[:, :, None] * n[i][:, None]).reshape(-1, 3) * scale
-    side = (two - one).reshape(-1, 1) * scale
-    turned = np.abs(rows).sum(1) > _LAMP_SEEN
-    if not turned.any() or np.median(np.abs(side[turned])) < _ROUGH / 10:
-        return np.zeros(3)
-    lamp = np.zeros(3)
-    for _ in range(20):
-        off = rows @ lamp - side[:, 0]
-        weight = 1 / (_ROUGH**2 + off**2)
-        weighted = rows * weight[:, None]
-        lamp = np.linalg.solve(weighted.T @ rows + 1e-4 * weight.sum() * np.eye(3), weighted.T @ side[:, 0])
-    strength = float(np.linalg.norm(lamp))
-    if strength < _LAMP_SEEN or not _explains(rows, side[:, 0], lamp):
-        return np.zeros(3)
-    return np.asarray(lamp * min(1.0, _LAMP_MOST / strength))
+    used = flat[i] & flat[j] & (((skin.normals[i] - skin.normals[j]) ** 2).sum(1) > _TURNED**2)
+    i, j = i[used], j[used]
+    light = np.log(np.maximum(colour.mean(1), 4 / 255))
+    side = light[i] - light[j]
+    before = float(np.median(np.abs(side))) if len(side) else 0.0
+    if before < _ROUGH / 4:
+        return np.zeros(8)
+    wave = _harmonics(skin.normals)
+    one_side, left = _fitted(wave[i, :3], wave[j, :3], side)
+    if np.linalg.norm(one_side) < _LAMP_SEEN or left > 0.75 * before:
+        one_side, left = np.zeros(3), before
+    both_sides, rest = _fitted(wave[i], wave[j], side)
+    better = rest < 0.75 * left and left > _ROUGH / 4 and np.linalg.norm(both_sides) > _LAMP_SEEN
+    return both_sides if better else np.concatenate([one_side, np.zeros(5)])
 
 
-def _explains(rows: Array, side: Array, lamp: Array) -> bool:
-    """Whether the lamp takes away a quarter of the usual difference, where normals differ."""
-    turned = np.abs(rows).sum(1) > _LAMP_SEEN
-    if not turned.any():
-        return False
-    before, after = np.median(np.abs(side[turned])), np.median(np.abs((rows @ lamp - side)[turned]))
-    return bool(after < 0.75 * before)
+def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, float]:
+    """Return the weights (K,) that explain differences of log brightness, and the median of what they leave.
+
+    Robust Gauss-Newton steps: pairs of two albedos are outliers, with Cauchy's weights.
+
+    one, two  (E, K) harmonics at either point of a pair
+    """
+    lamp, off = np.zeros(one.shape[1]), side
+    for _ in range(12):
+        first, second = 1 + one @ lamp, 1 + two @ lamp
+        rows = one / first[:, None] - two / second[:, None]
+        off = side - np.log(first) + np.log(second)
+        weighted = rows / (_ROUGH**2 + off**2)[:, None]
+        ridge = 1e-3 * np.trace(weighted.T @ rows) / len(lamp) * np.eye(len(lamp))
+        lamp = lamp + np.linalg.solve(weighted.T @ rows + ridge, weighted.T @ off - ridge @ lamp)
+        dip = -min(float((one @ lamp).min()), float((two @ lamp).min()))
+        lamp *= min(1.0, _LAMP_MOST / max(dip, 1e-12))
+    return lamp, float(np.median(np.abs(off)))
 
 
 def _step(colour: Array, near: Integers, sure: Any) -> float:

@@ -13,8 +13,8 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES, TetMesh
 
 PIECE = 1 / 200  # of the volume: a tenth of the finest part that is looked for
-TINY = 1 / 500  # of the volume: less is no part ...
-TINY_SKIN = 1 / 200  # ... unless it is seen, as foil is: this share of the boundary
+TINY = 1 / 2000  # of the volume: less is no part ...
+TINY_SKIN = 1 / 1000  # ... unless it is seen, as foil is: this share of the boundary
 _CREASE = 0.6  # a turn [rad] that is certainly a crease
 _UNCREASED = 0.05  # of a face's area, what is left of its pull where it ends in creases only
 

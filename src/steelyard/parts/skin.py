@@ -13,7 +13,7 @@ from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross
 
 NEAR = 16
-SMOOTH = 0.5  # weight of a neighbour's normal beside the vertex's own
+SMOOTH = 0.8  # weight of a neighbour's normal beside the vertex's own
 
 
 @dataclass(frozen=True, eq=False)
