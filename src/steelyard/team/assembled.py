@@ -11,19 +11,19 @@ from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import com_jacobian
 from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Pose
 from steelyard.team.body_rows import balance_frame
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 from steelyard.team.payload_doubt import moved_by_gains, moved_by_grasps
 from steelyard.team.payload_fit import SHOWN, PayloadFit
-from steelyard.team.pose_covariance import grasp_covariance
-from steelyard.team.pose_fit import PoseFit
+from steelyard.team.pose_covariance import Spread
 
 
-def assembled(log: TeamLog, fit: PoseFit, payload: PayloadFit, D: Array, late: Mapping[str, float]) -> TeamEstimate:
-    """Return the estimate of a team with standing bases."""
-    grasps = fit.team.grasps
+def assembled(
+    log: TeamLog, grasps: Pose, spread: Spread, payload: PayloadFit, D: Array, late: Mapping[str, float]
+) -> TeamEstimate:
+    """Return the estimate of a team whose grasps (N,) in R are known to within `spread`."""
     balance = balance_frame(grasps)
-    spread = grasp_covariance(fit)
     moved = moved_by_grasps(payload, balance.inverse() @ grasps)
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
     body = InertialParameters(payload.parameters).in_frame(balance)

@@ -25,7 +25,15 @@ def pose_noise(residual: Array, valid: Mask, J: Array, noise: Array) -> Array:
     rows = residual[valid.all(1)].reshape(-1, 6 * count)
     if not len(rows):
         return noise
-    S = rows.T @ rows / len(rows)
+    return noise_of_scatter(rows.T @ rows, float(len(rows)), J, noise)
+
+
+def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Array:
+    """Return the same from the scatter (6 N, 6 N) of residuals, or of measured twists, of which J explains six."""
+    count = len(noise)
+    if not rows:
+        return noise
+    S = scatter / rows
     stack = J.reshape(6 * count, 6)
     variance = noise**2
     for _ in range(ROUNDS):

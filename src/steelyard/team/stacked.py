@@ -82,7 +82,7 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
             nearest = np.clip(np.searchsorted(track.time, time - 0.5 / max(_rate(track.time), 1e-9)), 0, len(track) - 1)
             carries[:, i] &= track.carrying[nearest]
         if track.has("rotation", "position"):
-            turned, had = _rotation_at(track, time)
+            turned, had = rotation_at(track, time)
             turns[i] = turned[:, None]
             place[:, i], placed = channel_at(track, "position", time)
             seen[:, i] = bridged(had & placed)
@@ -96,7 +96,8 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
     )
 
 
-def _rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:
+def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:
+    """Return a track's rotations at `time` (M,), and where they were measured."""
     good = track.valid["rotation"]
     if good.all() and len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6):
         return track.pose.rotation, good

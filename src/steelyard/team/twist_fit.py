@@ -1,0 +1,240 @@
+"""Joint maximum likelihood over all grasps from the scatter of twists, for bases that move.
+
+    y_i(t) = Ad(G_i^-1) V(t) + n_i,   n_i ~ N(0, W_i^-1),
+V the payload's twist in the reference grasp. With J the stack of Ad(G_i^-1), V is eliminated: the likelihood is
+tr(P S), P = W - W J (J^T W J)^-1 J^T W. A step d_i of grasp i in its own axes moves its predicted twist by ad(y_i) d_i,
+linear in y, so that gradient and information of a Gauss-Newton step come from S exactly.
+Source: own; Lynch and Park for ad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.spatial import Pose, Rotation, cross_matrix
+from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
+from steelyard.team.pose_covariance import Spread
+from steelyard.team.pose_fit import NOISE_SETTLED, SETTLED, SHOWN
+from steelyard.team.pose_noise import noise_of_scatter
+from steelyard.team.twist_statistic import TwistScatter
+
+STEPS = 25
+# Turns about the one axis of rotation that are tried where it is the only one; below this share a second axis is none.
+TURNS, ONE_AXIS = 24, 0.1
+
+
+def _ad() -> Array:
+    """Return A (6, 6, 6) with ad(y)[c, a] = A[c, a, k] y_k."""
+    out = np.zeros((6, 6, 6))
+    for k in range(3):
+        turn = cross_matrix(np.eye(3)[k])
+        out[:3, :3, k] = out[3:, 3:, k] = out[3:, :3, 3 + k] = turn
+    return out
+
+
+AD = _ad()
+
+
+@dataclass(frozen=True, eq=False)
+class TwistFit:
+    """The optimum: grasps (N,), noise (N, 2) [rad/s, m/s], spread, and delays (N,) [s] with standard deviations."""
+
+    grasps: Pose
+    noise: Array
+    spread: Spread
+    delays: Array
+    delay_std: Array
+
+
+def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> TwistFit:
+    """Return the joint optimum. Raises CannotAnswer where two robots never spoke together."""
+    merged = data.merged()
+    grasps = first_grasps(merged, reference, names)
+    unknown = np.concatenate([6 * i + np.arange(6) for i in range(data.count) if i != reference])
+    noise = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), np.full((data.count, 2), 1e-2))
+    for _ in range(STEPS):
+        H, g, floor = _normal(merged, grasps, noise)
+        step, inverse, lost = _solved(H, g, floor, unknown)
+        new = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), noise)
+        quiet = np.abs(np.log(new / noise)).max() < NOISE_SETTLED
+        if quiet and float(step @ g[unknown]) < SETTLED:
+            break
+        full = np.zeros(6 * data.count)
+        full[unknown] = step
+        grasps, noise = grasps @ exp(full.reshape(-1, 6)), new
+    factor = np.sqrt(_inflation(data, grasps, noise, H, unknown))
+    size = factor[(unknown % 6) // 3]
+    covariance = inverse @ (H[np.ix_(unknown, unknown)] * np.outer(size, size)) @ inverse
+    spread = np.zeros((6 * data.count, 6 * data.count))
+    spread[np.ix_(unknown, unknown)] = covariance
+    blind = np.zeros((6 * data.count, lost.shape[1]))
+    blind[unknown] = lost
+    turn = adjoint(grasps)
+    turn[:, 3:, :3] = 0.0
+    delays, std = _delays(merged, grasps, noise, reference)
+    return TwistFit(grasps, noise, Spread(spread, blind, std, turn), delays, std)
+
+
+def fused_twist(twist: Array, seen: Array, grasps: Pose, noise: Array) -> tuple[Array, Array]:
+    """Return the payload's twist (T, 6) in R from those of all grasps (T, N, 6), and its covariance for a full row."""
+    J, W = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
+    each = np.einsum("nka,nk,nkb->nab", J, W, J)
+    info = np.einsum("tn,nab->tab", seen.astype(float), each) if not seen.all() else np.array([each.sum(0)])
+    pull = np.einsum("nka,nk,tnk->ta", J, W, twist * seen[..., None])
+    some = seen.any(1) if len(info) > 1 else np.ones(1, np.bool_)
+    inverse = np.linalg.inv(np.where(some[:, None, None], info, np.eye(6)))
+    return np.einsum("tab,tb->ta", np.broadcast_to(inverse, (len(twist), 6, 6)), pull), np.linalg.inv(each.sum(0))
+
+
+def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Pose:
+    """Return the star of pairs with the reference, in closed form from the scatter."""
+    turns, places = [], []
+    for i in range(data.count):
+        if i == reference:
+            turns.append(np.eye(3))
+            places.append(np.zeros(3))
+            continue
+        S = data.pair(reference, i)
+        if not S.any():
+            raise CannotAnswer(
+                f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; "
+                "record them together."
+            )
+        R, p = _pair(S)
+        turns.append(R)
+        places.append(p)
+    return Pose(Rotation(np.stack(turns)), np.stack(places))
+
+
+def _pair(S: Array) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and position (3,) of the second robot's grasp in the first's from their scatter."""
+    w_w, v_v = S[:3, 6:9], S[3:6, 9:12]
+    values, axes = np.linalg.eigh(S[:3, :3])
+    candidates = [_wahba(w_w)]
+    if values[1] < ONE_AXIS**2 * values[2]:
+        candidates += [_wahba(v_v)]
+        for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS):
+            candidates.append(Rotation.exp(angle * axes[:, 2]).matrix @ candidates[0])
+    found = [_position(S, R) for R in candidates]
+    best = int(np.argmin([cost for _, cost in found]))
+    return candidates[best], found[best][0]
+
+
+def _wahba(H: Array) -> Array:
+    u, _, vt = np.linalg.svd(H)
+    u[:, 2] *= np.linalg.det(u @ vt)
+    return np.asarray(u @ vt)
+
+
+def _position(S: Array, R: Array) -> tuple[Array, float]:
+    """Return p that makes v_i - R v_j = -[R w_j] p hold best, and what is left with the misfit of the rotation."""
+    q_q = R @ S[6:9, 6:9] @ R.T
+    # Columns are q = R w_j, rows u = v_i - R v_j.
+    u_q = (S[3:6, 6:9] - R @ S[9:12, 6:9]) @ R.T
+    u_u = S[3:6, 3:6] - S[3:6, 9:12] @ R.T - R @ S[9:12, 3:6] + R @ S[9:12, 9:12] @ R.T
+    A = np.trace(q_q) * np.eye(3) - q_q
+    # -sum [q]^T u = sum q x u, entry by entry.
+    b = np.array([u_q[2, 1] - u_q[1, 2], u_q[0, 2] - u_q[2, 0], u_q[1, 0] - u_q[0, 1]])
+    p = np.linalg.solve(A + (1e-3 * np.trace(A) + 1e-300) * np.eye(3) * 1e-3, b)
+    left = float(np.trace(u_u) - 2 * p @ b + p @ A @ p)
+    turned = float(np.trace(S[:3, :3]) + np.trace(S[6:9, 6:9]) - 2 * np.trace(R @ S[6:9, :3]))
+    return p, left / max(np.trace(S[3:6, 3:6]), 1e-300) + turned / max(np.trace(S[:3, :3]), 1e-300)
+
+
+def _full(merged: TwistScatter) -> tuple[Array, float]:
+    """Return the scatter of rows in which all spoke, or of the pattern with most rows, and how many those are."""
+    best = int(np.argmax(merged.rows * merged.spoke.all(1)))
+    size = 6 * merged.count
+    return merged.scatter[best][:size, :size], float(merged.rows[best] if merged.spoke[best].all() else 0.0)
+
+
+def _projections(spoke: Array, grasps: Pose, noise: Array) -> tuple[Array, Array, Array]:
+    """Return P and Pi (6 N, 6 N) of one pattern, and J A^-1 J^T: what the fitted twists still hold of the noise."""
+    W = (np.repeat(noise**-2.0, 3, axis=1) * spoke[:, None]).ravel()
+    J = adjoint_inverse(grasps).reshape(-1, 6)
+    J = J * np.repeat(spoke, 6)[:, None]
+    held = J @ np.linalg.inv((J * W[:, None]).T @ J) @ J.T
+    return np.diag(W) - W[:, None] * held * W, held * W, held
+
+
+def _normal(merged: TwistScatter, grasps: Pose, noise: Array) -> tuple[Array, Array, Array]:
+    """Return information, gradient of all steps (6 N), and what noise alone would add to the information."""
+    size = 6 * merged.count
+    H, g, floor = np.zeros((size, size)), np.zeros(size), np.zeros((size, size))
+    for S, rows, spoke in zip(merged.scatter, merged.rows, merged.spoke, strict=True):
+        P, fitted, held = _projections(spoke, grasps, noise)
+        y = S[:size, :size]
+        H += _contracted(P, fitted @ y @ fitted.T)
+        floor += _contracted(P, rows * held)
+        g += _scores(P @ y @ fitted.T)
+    return H - floor, g, floor
+
+
+def _scores(mixed: Array) -> Array:
+    """Return sum ad(y_i)^T (P y)_i from sum (P y) (Pi y)^T."""
+    count = len(mixed) // 6
+    blocks = mixed.reshape(count, 6, count, 6)[np.arange(count), :, np.arange(count)]
+    return np.einsum("cak,nck->na", AD, blocks).ravel()
+
+
+def _contracted(P: Array, S: Array) -> Array:
+    """Return sum_t ad(y_i)^T P_ij ad(y_j) for y with scatter S."""
+    count = len(P) // 6
+    p, s = P.reshape(count, 6, count, 6), S.reshape(count, 6, count, 6)
+    out = np.empty((count, 6, count, 6))
+    for i in range(count):
+        half = np.einsum("cak,cjd->akjd", AD, p[i], optimize=True)
+        half = np.einsum("akjd,kjl->ajdl", half, s[i], optimize=True)
+        out[i] = np.einsum("ajdl,dbl->ajb", half, AD, optimize=True)
+    return out.reshape(6 * count, 6 * count)
+
+
+def _solved(H: Array, g: Array, floor: Array, unknown: Array) -> tuple[Array, Array, Array]:
+    """Return the step, the inverse and the lost directions of the unknown steps.
+
+    A direction is lost where its information is less than SHOWN^2 times what noise alone seems to say of it.
+    """
+    H, g, floor = H[np.ix_(unknown, unknown)], g[unknown], floor[np.ix_(unknown, unknown)]
+    root = np.linalg.cholesky(floor + 1e-12 * np.diag(np.diag(floor) + 1e-300))
+    back = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(back @ H @ back.T)
+    basis = back.T @ vectors
+    shown = values > SHOWN**2
+    inverse = (basis[:, shown] / values[shown]) @ basis[:, shown].T
+    return inverse @ g, inverse, basis[:, ~shown]
+
+
+def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown: Array) -> Array:
+    """Return how much larger than for white noise the scores of whole windows scatter, for rotation and position."""
+    size = 6 * data.count
+    windows = np.zeros((int(data.window.max()) + 1, size))
+    for S, spoke, window in zip(data.scatter, data.spoke, data.window, strict=True):
+        P, fitted, _ = _projections(spoke, grasps, noise)
+        windows[window] += _scores(P @ S[:size, :size] @ fitted.T)
+    if len(windows) < 4:
+        return np.ones(2)
+    ratio = (windows**2).sum(0)[unknown] / np.maximum(np.diag(H)[unknown], 1e-300)
+    kind = (unknown % 6) // 3
+    return np.array([max(float(ratio[kind == k].mean()), 1.0) for k in range(2)])
+
+
+def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) -> tuple[Array, Array]:
+    """Return how late every clock is (N,) [s] and its standard deviation, beside known grasps."""
+    count = merged.count
+    size = 6 * count
+    H, g = np.zeros((count, count)), np.zeros(count)
+    for S, spoke in zip(merged.scatter, merged.spoke, strict=True):
+        P, fitted, _ = _projections(spoke, grasps, noise)
+        rate = fitted @ S[size:, size:] @ fitted.T
+        H += (P * rate).reshape(count, 6, count, 6).sum((1, 3))
+        mixed = P @ S[:size, size:] @ fitted.T
+        g -= np.diag(mixed).reshape(count, 6).sum(1)
+    others = np.arange(count) != reference
+    delays, std = np.zeros(count), np.zeros(count)
+    inverse = np.linalg.pinv(H[np.ix_(others, others)], hermitian=True)
+    delays[others], std[others] = inverse @ g[others], np.sqrt(np.maximum(np.diag(inverse), 0))
+    return delays, std

@@ -1,0 +1,74 @@
+"""A team whose bases move: grasps and clocks from twists, and the rows that its payload is weighed by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Pose
+from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.twist_fit import TwistFit, fit_twists, fused_twist
+from steelyard.team.twist_rows import TwistStretch, twist_stretches
+from steelyard.team.twist_statistic import TwistScatter
+
+# Clocks are moved where their step is above this [s] and so many standard deviations.
+PUNCTUAL, DOUBTED = 2e-4, 4.0
+CLOCK_ROUNDS = 6
+
+
+@dataclass(frozen=True, eq=False)
+class TwistTeam:
+    """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s]."""
+
+    parts: tuple[TwistStretch, ...]
+    fit: TwistFit
+    late: Mapping[str, float]
+
+    @classmethod
+    def of(cls, log: TeamLog, clocks: bool) -> TwistTeam:
+        """Return the joint fit; raises CannotAnswer where twists or rows in common are missing."""
+        reference = log.names.index(log.reference)
+        late = dict.fromkeys(log.names, 0.0)
+        for _ in range(CLOCK_ROUNDS):
+            parts = twist_stretches(log, late)
+            fit = fit_twists(TwistScatter.of(parts), reference, log.names)
+            if not clocks or (np.abs(fit.delays) < np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)).all():
+                break
+            late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
+        return cls(parts, fit, late)
+
+    def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
+        """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
+
+        The covariance (6, 6) is that of the fused twist, in the balance frame's axes.
+        """
+        grasps, noise = self.fit.grasps, self.fit.noise
+        frame = balance_frame(grasps)
+        into = adjoint_inverse(frame)
+        out = []
+        for part in self.parts:
+            fused, covariance = fused_twist(part.twist, part.seen, grasps, noise)
+            left = (part.twist - np.einsum("nij,tj->tni", adjoint_inverse(grasps), fused)) * part.seen[..., None]
+            down, level = _down(part, frame.inverse() @ grasps)
+            known = level & (part.seen.any(1) | (part.rows.kind == "still"))
+            out.append((from_twists(part.rows, fused @ into.T, -down, known, highest_hz), left))
+        if not any(_down(part, grasps)[1].any() for part in self.parts):
+            raise CannotAnswer(
+                "somebody must know where gravity points: give a gravity channel of a robot whose base moves, or "
+                "[team] gravity for a level base that stands."
+            )
+        return out, into @ covariance @ into.T
+
+
+def _down(part: TwistStretch, X_BG: Pose) -> tuple[Array, Mask]:
+    """Return gravity (T, 3) in B as the robots that can tell it say on average, and in which rows (T,) one can."""
+    each = np.einsum("nij,tnj->tni", X_BG.rotation.matrix, part.down) * part.level[..., None]
+    count = part.level.sum(1)
+    return each.sum(1) / np.maximum(count, 1)[:, None], np.asarray(count > 0)
