@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import heapq
 import time
 from dataclasses import dataclass, field
 
@@ -49,29 +50,31 @@ class PlainClustering:
                 neighbours[a].add(b)
                 neighbours[b].add(a)
                 self._bound((a, b), max(self.hull[a], self.hull[b]))
-        heap = {edge: self._key(edge) for edge in self.known}
+        heap = [(self._key(edge), edge, exact) for edge, (_, exact) in self.known.items()]
+        heapq.heapify(heap)
         while heap:
-            edge = min(heap, key=heap.__getitem__)
-            if not self.known[edge][1]:
+            key, edge, exact = heapq.heappop(heap)
+            if self.known.get(edge, (0.0, not exact))[1] != exact:
+                continue
+            if not exact:
                 self._make(edge)
-                heap[edge] = self._key(edge)
+                heapq.heappush(heap, (self._key(edge), edge, True))
                 continue
             a, b = edge
             c = count + len(merges)
             merges.append(edge)
-            costs.append(heap[edge])
+            costs.append(key)
             self._join(a, b, c)
             neighbours[c] = (neighbours.pop(a) | neighbours.pop(b)) - {a, b}
-            del heap[edge], self.known[edge]
+            del self.known[edge]
             for k in neighbours[c]:
                 bound = max(self.hull[c], self.hull[k])
                 for old in (a, b):
                     pair = (min(old, k), max(old, k))
                     bound = max(bound, self.known.pop(pair, (0.0, False))[0])
-                    heap.pop(pair, None)
                 neighbours[k] = (neighbours[k] - {a, b}) | {c}
                 self._bound((k, c), bound)
-                heap[k, c] = self._key((k, c))
+                heapq.heappush(heap, (self._key((k, c)), (k, c), self.known[k, c][1]))
         return self._tree(merges, costs)
 
     def _begin(self) -> None:
