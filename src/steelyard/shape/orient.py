@@ -18,7 +18,7 @@ DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15
 _WIDEST, _NARROWEST = 2.0, 0.25  # width of the softened dipoles, first and last, in spacings
 _SAMPLED = 4  # one leaf in so many gives the length of a step
-_SLOPE = 0.12
+SLOPE = 0.12  # of the line between neighbours on one sheet against its plane
 _SIGN_STEPS = 10
 _FREE = 4  # steps before signs are driven to plus or minus one
 _SWEEPS, _KEPT = 4, 0.3
@@ -91,7 +91,7 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, sight: Sight, spacing:
     normal from the field of all.
     """
     tree, order = sight.sources, sight.sources.order
-    plane, link = sheet_planes(xyz, near.index, _SLOPE)
+    plane, link = sheet_planes(xyz, near.index, SLOPE)
     sign = spread(np.sign((plane * first).sum(1)), near.index, link, _SWEEPS, _KEPT)
     discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing)
     for step in range(_SIGN_STEPS):

@@ -34,6 +34,26 @@ def spread(values: Array, index: Integers, link: Array, sweeps: int, kept: float
     return np.asarray(_spread(values, index, link, sweeps, kept))
 
 
+def stacked(xyz: Array, normals: Array, index: Integers, slope: float) -> float:
+    """Return the share of points (N, 3) beside another sheet that looks the same way, closer than their neighbours.
+
+    Between two such sheets of a solid there must be one that looks the other way: one of the two is wrong. Only
+    points on flat pieces count, and only with three such neighbours, as the steps of a body have a few.
+    """
+    link = np.abs(sheet_planes(xyz, index, slope)[1]).sum(1)
+    away = xyz[index] - xyz[:, None]
+    steep = _STEEP * np.linalg.norm(away, axis=2)
+    off = np.abs(np.einsum("nkd,nd->nk", away, normals)) > steep
+    off &= np.abs(np.einsum("nkd,nkd->nk", away, normals[index])) > steep
+    off &= np.einsum("nkd,nd->nk", normals[index], normals) > _ALIKE
+    off &= (link[:, None] > _FLAT) & (link[index] > _FLAT)
+    return float((off.sum(1) >= _FEW).mean())
+
+
+_STEEP = 0.25  # slope of the line to a neighbour on another sheet, at least
+_ALIKE = 0.9  # cosine between normals that look the same way
+_FLAT = 3.0  # links of a point on a flat piece
+_FEW = 3
 _FIRST = 18  # neighbours that give the first plane
 _LEAST = 4.0  # links that a plane needs to be drawn anew
 

@@ -12,7 +12,8 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
-from steelyard.shape.orient import DEPTH, Oriented, oriented
+from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented
+from steelyard.shape.sheets import stacked
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.winding import Sight, Tree
 
@@ -20,7 +21,8 @@ POINTS = 4000
 _NUDGE = 1e-7  # of the diagonal
 _FLAT = 1e-4  # volume of a cell, over that of a box of its edges, below which it is a flat leftover
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
-_BLURRED = 0.335  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
+_BLURRED = 0.36  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
+_CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
 _OPEN = 0.07  # length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
@@ -72,7 +74,10 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
         again = enclose(replace(used, normals=None), points)
         return replace(again, findings=(*findings, Finding.of("normals-flipped", text), *again.findings))
     mesh = TetMesh(used.xyz, tets)
-    return _solid(used, surface, mesh, score, _doubt(mesh.volumes, found, votes), (*findings, *turned))
+    doubt = _doubt(mesh.volumes, found, votes)
+    if doubt > _CLEAR:
+        doubt += stacked(surface.xyz, surface.normals, surface.near.index, SLOPE)
+    return _solid(used, surface, mesh, score, doubt, (*findings, *turned))
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
@@ -141,7 +146,7 @@ def _solid(
         apart = surface.spacing * cloud.diagonal * 1e3
         text = (
             f"Walls are too thin for points {apart:.2g} mm apart to tell them from gaps: "
-            f"their mean winding number inside is blurred to {1 - doubt:.2f}."
+            f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
         )
         findings += (Finding.of("thin-thickened", text),)
     if hole:

@@ -57,9 +57,13 @@ def _sheet(kind: str, rng: np.random.Generator, points: int) -> Sheet:
     else:
         across = rng.uniform(8, 40)
         body, name = ring(across / 2, across / 2 - wall, 0, length), f"tube {length:.0f} across {across:.0f}"
+    return sheet_of(f"{name} wall {wall:.1f}", body, rng, points)
+
+
+def sheet_of(name: str, body: Any, rng: np.random.Generator, points: int) -> Sheet:
+    """Return a solid in millimetres with `points` points spread evenly over its surface."""
     mesh = _mesh(body)
-    xyz = spread_evenly(mesh, rng, points)[0]
-    return Sheet(f"{name} wall {wall:.1f}", mesh, body.volume() * 1e-9, Cloud(xyz))
+    return Sheet(name, mesh, body.volume() * 1e-9, Cloud(spread_evenly(mesh, rng, points)[0]))
 
 
 def _mesh(body: Any) -> TriangleMesh:

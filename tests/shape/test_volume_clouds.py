@@ -1,0 +1,205 @@
+"""Solids from clouds: their volume, what they say where it cannot be known, and what is no solid at all."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from steelyard.errors import BadValue
+from steelyard.evaluate.solids import SAMPLES, score, true_solid, winding_of
+from steelyard.io.object_folders import read_object
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.nesting import winding_number
+from steelyard.shape.volume import Solid, enclose
+from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.sampling import spread_evenly
+from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
+from steelyard.workshop.solids import block, ring
+
+Drawn = tuple[np.ndarray, np.ndarray]
+
+
+def sheet(body: object, points: int = 1500) -> Sheet:
+    return sheet_of("a body", body, np.random.default_rng(0), points)
+
+
+def codes(solid: Solid) -> set[str]:
+    return {finding.code for finding in solid.findings}
+
+
+@pytest.fixture(scope="module")
+def brick() -> Sheet:
+    return sheet(block((0, 60), (0, 40), (0, 30)), 1200)
+
+
+@pytest.fixture(scope="module")
+def brick_normals(brick: Sheet) -> Drawn:
+    return spread_evenly(brick.mesh, np.random.default_rng(1), 1200)[:2]
+
+
+@pytest.mark.parametrize(
+    "body",
+    [
+        block((0, 60), (0, 40), (0, 30)),
+        block((0, 120), (0, 40), (0, 1.5)),
+        channel(100, 12, 15, 2),
+        ring(12, 9, 0, 60),
+        block((0, 60), (0, 60), (0, 20)) - block((20, 40), (20, 40), (-1, 21)),
+    ],
+    ids=["brick", "plate", "channel", "tube", "frame"],
+)
+def test_volumes_of_known_bodies(body: object) -> None:
+    made = sheet(body)
+    solid = enclose(made.cloud)
+    assert solid.mesh.volume == pytest.approx(made.volume, rel=0.1)
+    assert codes(solid) == set()
+    assert score(solid.mesh, true_solid(made.mesh, 20_000)).iou > 0.85
+
+
+def test_the_inside_of_a_round_body_is_full() -> None:
+    normal = np.random.default_rng(0).standard_normal((3000, 3))
+    normal /= np.linalg.norm(normal, axis=1)[:, None]
+    assert enclose(Cloud(0.05 * normal)).mesh.volume == pytest.approx(4 / 3 * np.pi * 0.05**3, rel=0.03)
+
+
+def test_the_volume_does_not_care_about_frame_or_order(brick: Sheet) -> None:
+    xyz = brick.cloud.xyz
+    volume = enclose(brick.cloud).mesh.volume
+    turn = Pose(Rotation.exp(np.array([1.0, 0.3, -0.8])), np.array([0.5, 1.0, -2.0]))
+    assert enclose(Cloud(turn.apply(xyz))).mesh.volume == pytest.approx(volume, rel=0.01)
+    mixed = xyz[np.random.default_rng(2).permutation(len(xyz))]
+    assert enclose(Cloud(mixed)).mesh.volume == pytest.approx(volume, rel=0.01)
+
+
+def test_the_same_cloud_gives_the_same_solid(brick: Sheet) -> None:
+    first, second = enclose(brick.cloud), enclose(brick.cloud)
+    assert np.array_equal(first.mesh.tets, second.mesh.tets)
+    assert np.array_equal(first.sure, second.sure)
+
+
+def test_colours_labels_and_normals_follow_the_points(brick: Sheet) -> None:
+    xyz = np.concatenate([brick.cloud.xyz, brick.cloud.xyz[:50]])
+    rgb = np.arange(3 * len(xyz), dtype=np.uint8).reshape(-1, 3)
+    solid = enclose(Cloud(xyz, rgb, np.arange(len(xyz))))
+    assert len(solid.cloud) == len(solid.mesh.vertices) == 1200
+    assert np.array_equal(solid.cloud.xyz, solid.mesh.vertices)
+    assert np.array_equal(solid.cloud.rgb, rgb[:1200])
+    assert solid.cloud.normals is not None
+
+
+def test_a_tube_thinner_than_half_the_spacing_is_doubted() -> None:
+    made = sheet(ring(15, 13.6, 0, 150), 1200)
+    solid = enclose(made.cloud)
+    assert abs(solid.mesh.volume / made.volume - 1) > 0.15
+    assert codes(solid) >= {"thin-thickened"}
+    assert solid.volume_std > 0.3
+
+
+def test_half_a_millimetre_of_noise_is_borne(brick: Sheet) -> None:
+    noise = 5e-4 * np.random.default_rng(3).standard_normal(brick.cloud.xyz.shape)
+    solid = enclose(Cloud(brick.cloud.xyz + noise))
+    assert solid.mesh.volume == pytest.approx(brick.volume, rel=0.05)
+    assert "thin-thickened" not in codes(solid)
+
+
+def test_an_underside_that_nobody_saw_is_said(brick: Sheet) -> None:
+    xyz = brick.cloud.xyz
+    solid = enclose(Cloud(xyz[xyz[:, 2] > 1e-4]))
+    assert codes(solid) == {"surface-open"}
+    assert solid.volume_std > 0.1
+
+
+@pytest.mark.parametrize(("turned", "said"), [(0, set()), (1200, {"normals-flipped"}), (500, {"normals-flipped"})])
+def test_normals_that_come_with_the_cloud_are_used_unless_they_are_wrong(
+    brick: Sheet, brick_normals: Drawn, turned: int, said: set[str]
+) -> None:
+    xyz, normal = brick_normals
+    given = np.where(np.arange(len(xyz))[:, None] < turned, -normal, normal)
+    solid = enclose(Cloud(xyz, normals=given))
+    assert codes(solid) == said
+    assert solid.mesh.volume == pytest.approx(brick.volume, rel=0.05)
+
+
+def test_millimetres_are_read_as_such(brick: Sheet) -> None:
+    long = enclose(Cloud(100 * 1e3 * brick.cloud.xyz / 100))
+    assert codes(long) == {"cloud-in-mm"}
+    assert long.mesh.volume == pytest.approx(brick.volume, rel=0.05)
+
+
+def test_of_two_objects_the_larger_is_kept(brick: Sheet) -> None:
+    other = brick.cloud.xyz[:400] * 0.5 + (0.3, 0, 0)
+    solid = enclose(Cloud(np.concatenate([other, brick.cloud.xyz])))
+    assert codes(solid) == {"several-objects"}
+    assert solid.mesh.volume == pytest.approx(brick.volume, rel=0.05)
+
+
+def test_many_points_are_thinned(brick: Sheet) -> None:
+    xyz = spread_evenly(brick.mesh, np.random.default_rng(5), 60_000)[0]
+    solid = enclose(Cloud(xyz), points=1500)
+    assert codes(solid) == {"cloud-thinned"}
+    assert 1000 < len(solid.cloud) < 1800
+    assert solid.mesh.volume == pytest.approx(brick.volume, rel=0.05)
+
+
+GRID = np.stack(np.meshgrid(*[np.linspace(0, 0.1, 8)] * 2), -1).reshape(-1, 2)
+
+
+@pytest.mark.parametrize(
+    ("xyz", "words"),
+    [
+        (np.random.default_rng(0).uniform(0, 0.1, (12, 3)), "at least 20 different points; got 12"),
+        (np.zeros((50, 3)), "at least 20 different points; got 1"),
+        (np.outer(np.linspace(0, 0.1, 64), [1.0, 2.0, 3.0]), "lie on a line"),
+        (np.column_stack([GRID, GRID @ [0.5, 0.2]]), "lie in a plane"),
+    ],
+    ids=["few", "one", "line", "plane"],
+)
+def test_what_encloses_nothing(xyz: np.ndarray, words: str) -> None:
+    with pytest.raises(BadValue, match=words):
+        enclose(Cloud(xyz))
+
+
+def test_numbers_that_are_none_are_bad_input(brick: Sheet) -> None:
+    xyz = brick.cloud.xyz.copy()
+    xyz[7, 1] = np.nan
+    with pytest.raises(BadValue, match="points"):
+        Cloud(xyz)
+
+
+def test_sheets_have_exact_volumes_and_even_points() -> None:
+    made = sheets(6, seed=3, points=200)
+    assert [name.name.split()[0] for name in made] == ["channel", "plate", "tube"] * 2
+    for one in made:
+        assert one.volume == pytest.approx(true_solid(one.mesh, 10).volume, rel=1e-9)
+        assert len(one.cloud) == 200
+    assert np.array_equal(made[4].cloud.xyz, sheets(6, seed=3, points=200)[4].cloud.xyz)
+    assert sheet(channel(100, 10, 20, 2)).volume == pytest.approx((14 * 20 - 10 * 18) * 100e-9)
+
+
+def test_winding_by_crossings_is_that_by_solid_angles() -> None:
+    made = sheet(ring(12, 9, 0, 60), 100)
+    points = np.random.default_rng(6).uniform(-0.015, 0.06, (200, 3))
+    found = winding_of(made.mesh.corners, points)
+    assert found.tolist() == [round(winding_number(made.mesh.corners, point)) for point in points]
+
+
+def test_a_solid_scored_against_itself(brick: Sheet) -> None:
+    truth = true_solid(brick.mesh, 20_000)
+    assert np.array_equal(truth.inside, ((truth.points > 0) & (truth.points < (0.06, 0.04, 0.03))).all(1))
+    found = score(enclose(brick.cloud).mesh, truth)
+    assert found.iou > 0.9
+    assert found.volume_ratio == pytest.approx(1, abs=0.05)
+    assert SAMPLES == 150_000
+
+
+@pytest.mark.parametrize("name", ["ruler", "pliers"])
+def test_published_clouds(name: str, data_dir: Path) -> None:
+    known = read_object(data_dir / "workshop-tools" / name, motion=False)
+    assert known.cloud is not None
+    solid = enclose(Cloud(known.cloud.xyz))
+    found = score(solid.mesh, true_solid(known, 20_000))
+    assert found.volume_ratio == pytest.approx(1, abs=0.1)
+    assert found.iou > 0.9
+    assert codes(solid) == set()
