@@ -43,7 +43,7 @@ def read_colour(path: Path) -> Colours:
 def _opened(path: Path) -> Any:
     pillow = _pillow()
     try:
-        image = pillow.open(path, formats=("PNG",))
+        image = pillow.open(io.BytesIO(path.read_bytes()), formats=("PNG",))
     except FileNotFoundError:
         raise BadFile(f"{path}: this image is missing.") from None
     except (OSError, ValueError, SyntaxError):

@@ -23,6 +23,7 @@ _STRIDE = 3  # of the pixels that are averaged
 _NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
 _REACH = 0.6  # of the camera's distance: how far from where the cameras look the object may lie
 _SEEDS = 4  # points that are settled, for each that stays
+_CAP = 0.02  # of the camera's distance: heights beyond it count alike where the object is sought
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _MARGIN = 0.008  # of table kept around the object [m]
 
@@ -109,12 +110,13 @@ def object_on_table(scene: Scene) -> tuple[Any, Array, float, int]:
     half = int(_REACH * scene.distance / pitch)
     low = np.full(2, -half * pitch)
     size = 2 * half
-    sums = images.height_map(*scene.images(), _STRIDE, low, pitch, 6 * scene.sigma, size, size)
+    cap = max(6 * scene.sigma, _CAP * scene.distance)
+    sums = images.height_map(*scene.images(), _STRIDE, low, pitch, cap, size, size)
     count, mean = sums[..., 0], sums[..., 1] / np.maximum(sums[..., 0], 1)
     watched = count >= 0.25 * np.median(count[count > 0])
     spread = float(np.subtract(*np.percentile(mean[watched], (75, 25)))) / 1.35
     level = float(np.median(mean[watched]))
-    up = watched & (mean > level + max(5 * spread, 0.3 * scene.sigma))
+    up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
     label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
     if not found:
         raise CannotAnswer("no object was found on the table: nothing stands out of it where the cameras look.")

@@ -113,8 +113,8 @@ def _raise_to_feet(
 
 
 def _lowest_sight(scene: Scene) -> float:
-    """Return the slope of the lowest sight lines to the object, a tenth of the views being lower."""
-    return float(np.percentile(scene.p[:, 2] / np.linalg.norm(scene.p[:, :2], axis=1), 10))
+    """Return the slope of the low sight lines to the object, a quarter of the views being lower."""
+    return float(np.percentile(scene.p[:, 2] / np.linalg.norm(scene.p[:, :2], axis=1), 25))
 
 
 def _empty_to(scene: Scene, foot: Array, table_seen: Any, top: Array, step: float, near: Array) -> Array:

@@ -1,0 +1,103 @@
+"""Clouds: written and read again, PCD in all three kinds, wrong files named."""
+
+from __future__ import annotations
+
+import struct
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from steelyard.errors import BadFile
+from steelyard.io.cloud_files import read_cloud, write_cloud
+from steelyard.shape.cloud import Cloud
+
+RNG = np.random.default_rng(0)
+NORMALS = RNG.normal(size=(50, 3)).astype(np.float32)
+CLOUD = Cloud(RNG.normal(size=(50, 3)), RNG.integers(0, 256, (50, 3)), RNG.integers(0, 4, 50), NORMALS)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".npz"])
+def test_a_written_cloud_is_read_again(tmp_path: Path, suffix: str) -> None:
+    path = tmp_path / f"cloud{suffix}"
+    write_cloud(CLOUD, path)
+    read = read_cloud(path)
+    for name in ("xyz", "rgb", "label", "normals"):
+        assert np.array_equal(getattr(read, name), getattr(CLOUD, name))
+    assert [file.name for file in tmp_path.iterdir()] == [path.name]
+
+
+def pcd(kind: str) -> bytes:
+    packed = CLOUD.rgb.astype(np.uint32) @ np.array([65536, 256, 1], np.uint32)  # type: ignore[union-attr]
+    table = np.zeros(50, [("x", "<f4"), ("y", "<f4"), ("z", "<f4"), ("rgb", "<u4")])
+    for k, axis in enumerate("xyz"):
+        table[axis] = CLOUD.xyz[:, k]
+    table["rgb"] = packed
+    head = (
+        "# .PCD v0.7\nVERSION 0.7\nFIELDS x y z rgb\nSIZE 4 4 4 4\nTYPE F F F U\nCOUNT 1 1 1 1\n"
+        f"WIDTH 50\nHEIGHT 1\nVIEWPOINT 0 0 0 1 0 0 0\nPOINTS 50\nDATA {kind}\n"
+    ).encode()
+    if kind == "ascii":
+        return (
+            head
+            + "\n".join(
+                f"{r['x']!r:} {r['y']!r} {r['z']!r} {r['rgb']}".replace("np.float32(", "").replace(")", "")
+                for r in table
+            ).encode()
+        )
+    if kind == "binary":
+        return head + table.tobytes()
+    columns = b"".join(table[name].tobytes() for name in table.dtype.names or ())
+    runs = [columns[i : i + 32] for i in range(0, len(columns), 32)]
+    packed_bytes = b"".join(bytes([len(run) - 1]) + run for run in runs)
+    return head + struct.pack("<II", len(packed_bytes), len(columns)) + packed_bytes
+
+
+@pytest.mark.parametrize("kind", ["ascii", "binary", "binary_compressed"])
+def test_pcd(tmp_path: Path, kind: str) -> None:
+    path = tmp_path / "cloud.pcd"
+    path.write_bytes(pcd(kind))
+    read = read_cloud(path)
+    assert read.xyz == pytest.approx(CLOUD.xyz, abs=1e-6)
+    assert np.array_equal(read.rgb, CLOUD.rgb)
+
+
+def test_runs_that_repeat_are_undone() -> None:
+    from steelyard.io.pcd_files import _inflate
+
+    out = np.zeros(11, np.uint8)
+    # two plain bytes "ab", then nine bytes copied from two back
+    assert _inflate(np.array([1, 97, 98, 0b111_00000, 0, 1], np.uint8), out) == 11
+    assert out.tobytes() == b"abababababa"
+
+
+@pytest.mark.parametrize(
+    ("name", "content", "message"),
+    [
+        ("a.pcd", b"x", "expected a PCD file"),
+        ("a.pcd", pcd("binary")[:-9], "ends before its 50 points"),
+        ("a.pcd", pcd("binary_compressed")[:-9], "ends before its 50 points"),
+        ("a.pcd", pcd("ascii").replace(b"FIELDS x y", b"FIELDS x"), "that fit each other"),
+        ("a.pcd", pcd("binary").replace(b"FIELDS x y", b"FIELDS x w"), '"y" is missing'),
+        ("a.ply", b"x", "expected a PLY file"),
+        ("a.npz", b"x", "expected an NPZ file"),
+        ("a.xyz", b"1 2 3", "is no cloud"),
+    ],
+)
+def test_wrong_clouds(tmp_path: Path, name: str, content: bytes, message: str) -> None:
+    path = tmp_path / name
+    path.write_bytes(content)
+    with pytest.raises(BadFile, match=message):
+        read_cloud(path)
+
+
+def test_holes_of_an_organised_cloud_are_left_out(tmp_path: Path) -> None:
+    xyz = CLOUD.xyz.copy()
+    xyz[::2] = np.nan
+    np.savez(tmp_path / "a.npz", xyz=xyz, rgb=CLOUD.rgb)
+    assert np.array_equal(read_cloud(tmp_path / "a.npz").xyz, CLOUD.xyz[1::2])
+    xyz[1, 0] = np.nan
+    xyz[1, 1] = 0
+    np.savez(tmp_path / "b.npz", xyz=xyz)
+    with pytest.raises(BadFile, match="must be finite"):
+        read_cloud(tmp_path / "b.npz")

@@ -1,0 +1,168 @@
+"""Scans of boxes on a table: the cloud lies on the box, poses are mended, what is wrong is said."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import manifold3d
+import numpy as np
+import pytest
+
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.shape.carving import carved
+from steelyard.shape.mesh import TriangleMesh
+from steelyard.shape.scan import fuse
+from steelyard.shape.thinning import spread
+from steelyard.shape.views import Intrinsics, Views
+from steelyard.shape.volume import enclose
+from steelyard.simulate.camera import disturbed
+from steelyard.simulate.scanning import Scanned, resting_pose, scan_mesh
+from steelyard.spatial import Pose
+
+SMALL = Intrinsics(320, 240, 307.5, 307.5, 160.0, 120.0)
+LIES = Pose.identity()
+
+
+def mesh_of(*solids: manifold3d.Manifold) -> TriangleMesh:
+    mesh = manifold3d.Manifold.batch_boolean(list(solids), manifold3d.OpType.Add).to_mesh64()
+    count = len(mesh.tri_verts)
+    return TriangleMesh(
+        mesh.vert_properties[:, :3],
+        mesh.tri_verts,
+        np.zeros(count),
+        np.tile(np.array([200, 40, 40], np.uint8), (count, 1)),
+    )
+
+
+def block(x: tuple[float, float], y: tuple[float, float], z: tuple[float, float]) -> manifold3d.Manifold:
+    low, high = np.array([x, y, z]).T
+    return manifold3d.Manifold.cube(high - low).translate(low)
+
+
+def scanned(mesh: TriangleMesh, **choices: object) -> Scanned:
+    return scan_mesh(mesh, 1, count=45, intrinsics=SMALL, X_WO=LIES, **choices)  # type: ignore[arg-type]
+
+
+BOX = mesh_of(block((-0.05, 0.05), (-0.03, 0.03), (0, 0.03)))
+BRIDGE = mesh_of(
+    block((-0.06, 0.06), (-0.015, 0.015), (0.02, 0.03)),
+    block((-0.06, -0.045), (-0.015, 0.015), (0, 0.03)),
+    block((0.045, 0.06), (-0.015, 0.015), (0, 0.03)),
+)
+
+
+@pytest.fixture(scope="module")
+def box() -> Scanned:
+    return scanned(BOX)
+
+
+def off_box(xyz: np.ndarray) -> np.ndarray:
+    """Signed distance to the box's surface, outside positive."""
+    q = np.abs(xyz - [0, 0, 0.015]) - [0.05, 0.03, 0.015]
+    return np.linalg.norm(np.maximum(q, 0), axis=1) + np.minimum(q.max(1), 0)
+
+
+def test_the_cloud_lies_on_the_box_and_its_normals_leave_it(box: Scanned) -> None:
+    scan = fuse(box.views)
+    off = off_box(scan.cloud.xyz)
+    assert np.abs(np.median(off)) < 1e-4
+    assert np.sqrt(np.mean(off**2)) < 5e-4
+    assert scan.table.normal == pytest.approx([0, 0, 1], abs=2e-3)
+    assert abs(scan.table.offset) < 5e-4
+    assert scan.cloud.normals is not None
+    assert scan.cloud.rgb is not None
+    assert (off_box(scan.cloud.xyz + 0.004 * scan.cloud.normals) > 0).mean() > 0.97
+    assert (scan.cloud.rgb[:, 0] > scan.cloud.rgb[:, 1] + 50).mean() > 0.95
+    assert (scan.findings, scan.moved_m) == ((), None)
+
+
+def test_the_same_views_give_the_same_cloud(box: Scanned) -> None:
+    a, b = fuse(box.views), fuse(box.views)
+    assert np.array_equal(a.cloud.xyz, b.cloud.xyz)
+
+
+@pytest.mark.parametrize("mesh", [BOX, BRIDGE], ids=["box", "bridge"])
+def test_volume_is_right_and_a_bridge_is_not_filled(mesh: TriangleMesh) -> None:
+    scan = fuse(scanned(mesh).views)
+    a, b, c = np.moveaxis(mesh.corners, 1, 0)
+    true = np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6
+    assert 0.93 < carved(enclose(scan.cloud), scan.empty).mesh.volume / true < 1.1
+
+
+def test_what_is_empty_is_outside(box: Scanned) -> None:
+    scan = fuse(box.views)
+    inside = np.random.default_rng(0).uniform([-0.047, -0.027, 0.002], [0.047, 0.027, 0.027], (500, 3))
+    up = np.array([0, 0, 0.04])
+    assert scan.empty(inside).mean() < 0.02
+    assert scan.empty(inside + up).all()
+    assert scan.empty(inside - up).all()
+
+
+def test_poses_slightly_off_are_mended(box: Scanned) -> None:
+    wrong = box.views.posed(disturbed(box.views.X_WC, 1.5, 0.4, np.random.default_rng(0)))
+    scan = fuse(wrong)
+    assert scan.moved_m is not None
+    assert scan.disagree < 1.6
+    assert np.sqrt(np.mean((np.ptp(scan.cloud.xyz, axis=0)[2] - 0.03) ** 2)) < 1.5e-3
+
+
+def test_views_of_a_wrong_scale_are_named(box: Scanned) -> None:
+    wrong = replace(box.views, depth_unit=0.00125)
+    try:
+        found = [finding.code for finding in fuse(wrong).findings]
+    except CannotAnswer:
+        return
+    assert "views-disagree" in found
+
+
+def test_the_larger_of_two_objects_is_kept_and_said() -> None:
+    two = mesh_of(block((-0.05, 0.0), (-0.03, 0.03), (0, 0.03)), block((0.05, 0.07), (-0.01, 0.01), (0, 0.02)))
+    scan = fuse(scanned(two).views)
+    assert [finding.code for finding in scan.findings] == ["several-objects"]
+    assert scan.cloud.xyz[:, 0].max() < 0.005
+
+
+def test_an_empty_table_is_said() -> None:
+    buried = mesh_of(block((-0.05, 0.05), (-0.03, 0.03), (-0.02, -0.01)))
+    with pytest.raises(CannotAnswer, match="no object was found on the table"):
+        fuse(scanned(buried).views)
+
+
+def test_a_mesh_rests_on_its_widest_side() -> None:
+    placed = BRIDGE.in_frame(resting_pose(BRIDGE, 0.3))
+    assert placed.bounds[0, 2] == pytest.approx(0, abs=1e-9)
+    assert placed.bounds[1, 2] == pytest.approx(0.03, abs=1e-9)
+
+
+def test_spread_points_keep_their_distance_but_on_both_sides_of_a_sheet() -> None:
+    rng = np.random.default_rng(0)
+    xyz = np.column_stack([rng.uniform(0, 1, (2000, 2)), np.zeros(2000)])
+    up = np.tile([0.0, 0, 1], (2000, 1))
+    kept = spread(xyz, up, np.arange(2000), 0.1)
+    gap = np.linalg.norm(xyz[kept][:, None] - xyz[kept][None], axis=2) + np.eye(len(kept))
+    assert gap.min() >= 0.1
+    assert (np.linalg.norm(xyz[:, None] - xyz[kept][None], axis=2).min(1) < 0.1).all()
+    both = np.concatenate([up, -up])
+    assert len(spread(np.concatenate([xyz, xyz]), both, np.arange(4000), 0.1)) == 2 * len(kept)
+
+
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [
+        ({"depth_unit": 1.0}, "puts the scene .* m away"),
+        ({"depth": np.zeros((2, 240, 320), np.uint16)}, "holds a measured depth"),
+        ({"depth": np.zeros((2, 10, 10), np.uint16)}, "must have shape"),
+    ],
+)
+def test_impossible_views(change: dict[str, object], message: str) -> None:
+    good = {
+        "depth": np.full((2, 240, 320), 400, np.uint16), "rgb": None, "intrinsics": SMALL, "X_WC": Pose.identity(2),
+    }  # fmt: skip
+    with pytest.raises(BadValue, match=message):
+        Views(**{**good, **change})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("wrong", [{"fx": 0.0}, {"fy": -1.0}, {"cx": 400.0}, {"cy": -20.0}, {"fx": float("nan")}])
+def test_impossible_lenses(wrong: dict[str, float]) -> None:
+    with pytest.raises(BadValue, match="the camera's"):
+        replace(SMALL, **wrong)
