@@ -36,6 +36,18 @@ def channel(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Arr
         raise BadValue(f"{spec.where}: {error}") from None
 
 
+def channel_with_gaps(spec: QuantitySpec, columns: Sequence[Array], gravity: Array) -> Array:
+    """Return a quantity like `channel`, with NaN in rows that miss a number; raises BadValue where all do."""
+    _require_one_length(spec, columns)
+    values = np.stack(columns, -1)
+    good = np.asarray(np.isfinite(values).all(-1))
+    if good.all() or not good.any():
+        return channel(spec, columns, gravity)
+    out = np.array(channel(spec, list(np.where(good[:, None], values, values[good.argmax()]).T), gravity))
+    out[~good] = np.nan
+    return check.frozen(out)
+
+
 def require_finite(values: Array, where: str) -> None:
     """Raise BadValue saying how many rows of (N, k) or (N,) hold NaN or infinity, and which."""
     good = np.isfinite(values)

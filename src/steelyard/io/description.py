@@ -64,10 +64,11 @@ class Description:
 
 def read_description(path: Path) -> Description:
     """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
-    return parse_description(_load_toml(path), path.name)
+    return parse_description(load_toml(path), path.name)
 
 
-def _load_toml(path: Path) -> dict[str, Any]:
+def load_toml(path: Path) -> dict[str, Any]:
+    """Return the tables of a description; raises BadFile or BadDescription."""
     size = path.stat().st_size
     if size > _LARGEST_DESCRIPTION:
         raise BadFile(f"{path}: a log description is a small TOML text; this file has {size} bytes.")
@@ -92,11 +93,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         )
     log = _section(top, "log")
     log.only("gravity", "wrench", "tool")
-    gravity = log.numbers("gravity", 3) if "gravity" in log else default_gravity()
-    if not gravity.any():
-        raise log.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
-    if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
-        raise log.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
+    gravity = parse_gravity(log) if "gravity" in log else default_gravity()
     placed = parse_object_pose(_section(top, "object"))
     return Description(
         streams=_streams(top),
@@ -106,6 +103,16 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         tool=log.text("tool"),
         placed=placed,
     )
+
+
+def parse_gravity(entry: Entry) -> Array:
+    """Return `gravity` (3,) [m/s^2]; raises BadDescription where nothing on Earth is as heavy or as light."""
+    gravity = entry.numbers("gravity", 3)
+    if not gravity.any():
+        raise entry.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
+    if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
+        raise entry.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
+    return gravity
 
 
 def _short(values: Array) -> str:

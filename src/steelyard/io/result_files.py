@@ -107,10 +107,15 @@ def write_result(estimate: Estimate, path: Path | str) -> None:
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text file by way of a temporary one beside it; raises BadFile where that is not possible."""
+    """Write a text file, complete or not at all; raises BadFile."""
+    write_bytes(path, text.encode())
+
+
+def write_bytes(path: Path, content: bytes) -> None:
+    """Write a file by way of a temporary one beside it; raises BadFile where that is not possible."""
     temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
     try:
-        temporary.write_text(text, encoding="utf-8")
+        temporary.write_bytes(content)
         temporary.replace(path)
     except OSError as error:
         raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None

@@ -28,7 +28,9 @@ FRAMED = (
 # [s] between clocks with different origins; [m] from S to anything that is fixed to it.
 _LONGEST_DELAY, _FURTHEST = 1e10, 10.0
 _JOINT = ("joint_position", "joint_torque")
-_KEYS = ("path", "topic", "kind", "time", "delay", "mount", *QUANTITIES, *_JOINT)
+# What a robot of a team may tell beside QUANTITIES: the joints of an Omnid, and whether it holds the payload.
+ROBOT: dict[str, int] = {"joint_position": 6, "joint_torque": 3, "carrying": 1}
+_KEYS = ("path", "topic", "kind", "time", "delay", "mount", *QUANTITIES)
 
 
 @dataclass(frozen=True)
@@ -41,6 +43,11 @@ class QuantitySpec:
     where: str
     form: str | None = None
     frame: str = "S"
+
+    @property
+    def count(self) -> int:
+        """How many columns the quantity has."""
+        return FORMS[self.form] if self.form else (QUANTITIES | ROBOT)[self.name]
 
 
 @dataclass(frozen=True)
@@ -73,16 +80,17 @@ class StreamSpec:
         object.__setattr__(self, "names", frozenset(q.name for q in self.quantities) | zero)
 
 
-def parse_stream(entry: Entry) -> StreamSpec:
-    """Check one [[stream]] table; raises BadDescription."""
-    entry.only(*_KEYS)
+def parse_stream(entry: Entry, robot: bool = False) -> StreamSpec:
+    """Check one [[stream]] table, which in a team's `robot` may also hold what ROBOT names; raises BadDescription."""
+    entry.only(*_KEYS, *(ROBOT if robot else _JOINT))
     entry.require("path", 'path = "log.csv"')
     path = str(entry.text("path"))
     entry = Entry(entry.values, f'{entry.where} ("{path}")')
-    _refuse_joints(entry)
+    if not robot:
+        _refuse_joints(entry)
     zero = entry.values.get("torque") == "zero"
     quantities = tuple(
-        _quantity(entry, name) for name in QUANTITIES if name in entry and not (zero and name == "torque")
+        _quantity(entry, name) for name in (*QUANTITIES, *ROBOT) if name in entry and not (zero and name == "torque")
     )
     if not quantities:
         raise entry.error('no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }')
@@ -122,7 +130,7 @@ def _quantity(stream: Entry, name: str) -> QuantitySpec:
     units = list(UNITS[name])
     unit = entry.choice("unit", units, units[0])
     frame = entry.choice("frame", ("S", "W"), "S") if framed else "W" if name == "position" else "S"
-    return QuantitySpec(name, _columns(entry, QUANTITIES[name]), unit, entry.where, frame=frame)
+    return QuantitySpec(name, _columns(entry, (QUANTITIES | ROBOT)[name]), unit, entry.where, frame=frame)
 
 
 def _rotation(entry: Entry) -> QuantitySpec:

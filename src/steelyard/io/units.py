@@ -26,6 +26,9 @@ UNITS: dict[str, dict[str, float]] = {
     "angular_acceleration": {"rad/s^2": 1.0},
     "specific_force": {"m/s^2": 1.0, "g": STANDARD_GRAVITY},
     "gravity": {"m/s^2": 1.0},
+    "joint_position": ANGLE,
+    "joint_torque": {"N*m": 1.0, "N*mm": 1e-3},
+    "carrying": {"1": 1.0},
 }
 
 _EARTH = (9.76, 9.84)

@@ -103,7 +103,7 @@ def channel_at(track: Track, name: str, time: Array) -> tuple[Array, Mask]:
     if len(known) < 2:
         return np.zeros((len(time), 3)), np.zeros(len(time), np.bool_)
     step = float(np.median(np.diff(track.time)))
-    return _between(known, values[good], time), good if same else _near_samples(known, time, step)
+    return between(known, values[good], time), good if same else near_samples(known, time, step)
 
 
 def _vectors(track: Track, name: str) -> Array:
@@ -112,7 +112,7 @@ def _vectors(track: Track, name: str) -> Array:
     return (mean_rotation(track).inverse() @ Rotation(track.channels["rotation"])).log()
 
 
-def _between(known: Array, values: Array, time: Array) -> Array:
+def between(known: Array, values: Array, time: Array) -> Array:
     """Return values at `time`: cubic where samples are near, monotone where they are not; ends held."""
     from scipy.interpolate import CubicSpline, PchipInterpolator
 
@@ -123,7 +123,7 @@ def _between(known: Array, values: Array, time: Array) -> Array:
     return np.asarray(PchipInterpolator(known, values)(inside))
 
 
-def _near_samples(known: Array, time: Array, step: float) -> Mask:
+def near_samples(known: Array, time: Array, step: float) -> Mask:
     """Return which of `time` lie between two samples that are near each other."""
     after = np.clip(np.searchsorted(known, time - 1e-6), 0, len(known) - 1)
     before = np.clip(np.searchsorted(known, time + 1e-6, "right") - 1, 0, len(known) - 1)

@@ -1,0 +1,111 @@
+"""The streams of a description opened and read: columns, channels in SI, seconds on one origin, names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadDescription, BadFile, BadValue
+from steelyard.io.channels import channel, channel_with_gaps, require_one_length
+from steelyard.io.clocks import Clock, common_origin, require_likely_step, steady
+from steelyard.io.stream_entries import QuantitySpec, StreamSpec
+from steelyard.io.tables import Table, choose_columns, find_file, open_table
+from steelyard.io.units import TIME
+
+Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
+
+
+def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> list[Table]:
+    """Return the table of every stream; a file named twice is opened once."""
+    opened: dict[str, Table] = {}
+    for spec in specs:
+        if spec.topic is not None:
+            raise BadFile(
+                f'{spec.where}: "topic" belongs to bags, which are not supported yet. Export the topic to CSV.'
+            )
+        if spec.path not in opened:
+            opened[spec.path] = open_table(find_file(spec.path, folder, data))
+    return [opened[spec.path] for spec in specs]
+
+
+def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cells]:
+    """Return the cells of every stream; each file is read once, whatever number of streams share it."""
+    wanted: dict[Path, set[int]] = {}
+    exact: dict[Path, set[int]] = {}
+    for spec, table in zip(specs, tables, strict=True):
+        stamps = _time_column(spec, table)
+        chosen = [n for quantity in spec.quantities for n in _numbers(quantity, table)]
+        wanted.setdefault(table.path, set()).update(chosen, stamps)
+        exact.setdefault(table.path, set()).update(stamps)
+    cells: dict[Path, Cells] = {}
+    for table in tables:
+        if table.path not in cells:
+            cells[table.path] = table.read(sorted(wanted[table.path]), sorted(exact[table.path]))
+    return [cells[table.path] for table in tables]
+
+
+def _numbers(spec: QuantitySpec, table: Table) -> tuple[int, ...]:
+    return choose_columns(table.header, spec.columns, spec.count, spec.where)
+
+
+def _time_column(spec: StreamSpec, table: Table) -> tuple[int, ...]:
+    if spec.time is None or spec.time.column is None:
+        return ()
+    return choose_columns(table.header, (spec.time.column,), 1, spec.time.where)
+
+
+def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, gaps: bool = False) -> dict[str, Array]:
+    """Return quantity -> channel in SI; with `gaps`, rows that hold NaN pass as NaN, else they are an error."""
+    out: dict[str, Array] = {}
+    for quantity in spec.quantities:
+        columns = [cells[n].astype(np.float64, copy=False) for n in _numbers(quantity, table)]
+        values = (channel_with_gaps if gaps else channel)(quantity, columns, gravity)
+        out[quantity.name] = values
+        if quantity.name in ("force", "torque") and len(values) > 1 and not np.nan_to_num(values).any():
+            passive = ' or say torque = "zero" if the wrist passes no moment' if quantity.name == "torque" else ""
+            raise BadValue(
+                f"{spec.where}: {quantity.name} is zero in every row. Give the columns that hold it{passive}."
+            )
+    if spec.zero_torque:
+        if "force" not in out:
+            raise BadDescription(f'{spec.where}: torque = "zero" belongs in the stream that holds "force".')
+        out["torque"] = check.frozen(np.zeros_like(out["force"]))
+    lengths = {name: len(values) for name, values in out.items()}
+    stamps = [len(cells[n]) for n in _time_column(spec, table)]
+    require_one_length(lengths | ({"time": stamps[0]} if stamps else {}), spec.where)
+    if not next(iter(lengths.values())):
+        raise BadValue(f"{spec.where}: the log is empty: it has no rows. Record again, or correct the path.")
+    return out
+
+
+def seconds_of(
+    specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Cells], rows: Sequence[int]
+) -> list[Array | None]:
+    """Return seconds after one common origin; a stream with only a rate starts with the earliest clock."""
+    clocks: dict[int, Clock] = {}
+    for i, (spec, table, mine) in enumerate(zip(specs, tables, cells, strict=True)):
+        for number in _time_column(spec, table):
+            if spec.time is not None:
+                clocks[i] = Clock(mine[number], TIME[spec.time.unit], spec.time.where)
+    origin = common_origin(list(clocks.values()))
+    seconds: list[Array | None] = [clocks[i].seconds_after(origin) if i in clocks else None for i in range(len(specs))]
+    start = min((float(s[0]) for s in seconds if s is not None), default=0.0)
+    for i, spec in enumerate(specs):
+        if spec.time is not None and spec.time.column is None:
+            require_likely_step(1 / spec.time.rate, spec.time.where)
+            seconds[i] = steady(spec.time.rate, rows[i], start)
+    return seconds
+
+
+def stream_names(specs: Sequence[StreamSpec]) -> list[str]:
+    """Return one name per stream: its path, with #2, #3 .. behind it where a file serves several streams."""
+    names: list[str] = []
+    for i, spec in enumerate(specs):
+        before = sum(other.path == spec.path for other in specs[:i])
+        names.append(f"{spec.path}#{before + 1}" if before else spec.path)
+    return names

@@ -1,0 +1,207 @@
+"""A team description and its data files become a TeamLog."""
+
+from __future__ import annotations
+
+from collections.abc import Container, Iterator, Mapping, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
+from steelyard.io.description import default_gravity
+from steelyard.io.stream_entries import StreamSpec
+from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
+from steelyard.io.tables import Table, find_file
+from steelyard.io.team_description import RecordingSpec, RobotSpec, TeamDescription, read_team_description
+from steelyard.logs.recording import Stream
+from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
+from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
+from steelyard.logs.team_track import Track
+from steelyard.robots.omnid import Omnid
+
+# Readings may pass a stop by play and by the zero of an encoder; by more than this [rad] they are other columns.
+_BEYOND = np.deg2rad(25.0)
+
+
+def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
+    """Read the log of a team.
+
+    path  a team description (.toml)
+    data  folder in which relative paths are sought first; then $STEELYARD_DATA, then beside the description
+
+    Recordings of several robots that have one name belong together; those without a name do by kind and order: the
+    second "still" of one robot with the second "still" of the others. Rows that miss a number are masked.
+    Raises BadFile, BadDescription or BadValue: what was expected, what was found, where, and what to do.
+    """
+    path, folder = Path(path), None if data is None else Path(data)
+    try:
+        if not path.exists():
+            path = find_file(str(path), Path.cwd(), folder)
+        if path.suffix.lower() != ".toml":
+            raise BadFile(
+                f"{path}: a team is described by a TOML text; found {path.suffix or 'a file without a suffix'}."
+            )
+        return _team(read_team_description(path), path, folder)
+    except OSError as error:
+        raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
+
+
+def _team(said: TeamDescription, path: Path, data: Path | None) -> TeamLog:
+    meetings = _meetings(said, path.name)
+    with_streams = [(robot, own) for meeting in meetings for robot, own in meeting.members if not own.away]
+    specs = [stream for _, own in with_streams for stream in own.streams]
+    tables = open_tables(specs, path.parent, data)
+    opened = {s.where: (t, c) for s, t, c in zip(specs, tables, read_cells(specs, tables), strict=True)}
+    robots = [TeamRobot(robot.name, robot.gravity, robot.base) for robot in said.robots]
+    recordings = [_recording(meeting, opened, path.name) for meeting in meetings]
+    with _at(path.name):
+        return TeamLog(tuple(robots), tuple(recordings), said.reference)
+
+
+@contextmanager
+def _at(where: str) -> Iterator[None]:
+    """Say in the errors of what is made inside where it was described."""
+    try:
+        yield
+    except BadInput as error:
+        raise type(error)(f"{where}: {error}") from None
+
+
+@dataclass(frozen=True, eq=False)
+class _Meeting:
+    """What the robots did at the same time."""
+
+    name: str
+    members: tuple[tuple[RobotSpec, RecordingSpec], ...]
+
+
+def _meetings(said: TeamDescription, where: str) -> list[_Meeting]:
+    """Return the recordings that belong together, in the order in which they are first told."""
+    found: dict[tuple[Kind, int] | str, list[tuple[RobotSpec, RecordingSpec]]] = {}
+    for robot in said.robots:
+        count = dict.fromkeys(KINDS, 0)
+        for own in robot.recordings:
+            if own.name is None:
+                count[own.kind] += 1
+            key = (own.kind, count[own.kind]) if own.name is None else own.name
+            members = found.setdefault(key, [])
+            if any(other is robot for other, _ in members):
+                raise BadDescription(f'{own.where}: the robot has another recording named "{own.name}". Rename one.')
+            if members and members[0][1].kind != own.kind:
+                raise BadDescription(
+                    f'{own.where}: recording "{own.name}" is "{own.kind}" here and "{members[0][1].kind}" for '
+                    f'"{members[0][0].name}". Give both one kind.'
+                )
+            members.append((robot, own))
+    _require_equal_counts(said, where)
+    return [
+        _Meeting(key if isinstance(key, str) else _numbered(key, found), tuple(members))
+        for key, members in found.items()
+        if not all(own.away for _, own in members)
+    ]
+
+
+def _numbered(key: tuple[Kind, int], all_keys: Container[object]) -> str:
+    """Return the name of a recording that has none: its kind, with its number where there are several."""
+    kind, number = key
+    return f"{kind} {number}" if (kind, 2) in all_keys else kind
+
+
+def _require_equal_counts(said: TeamDescription, where: str) -> None:
+    """Raise BadDescription where order cannot say which recordings belong together."""
+    for kind in KINDS:
+        counts = {r.name: sum(own.kind == kind and own.name is None for own in r.recordings) for r in said.robots}
+        different = {n: c for n, c in counts.items() if c}
+        if len(set(different.values())) > 1:
+            shown = ", ".join(f'"{name}" {count}' for name, count in different.items())
+            raise BadDescription(
+                f"{where}: recordings without a name are matched by kind and order, but the robots have different "
+                f'numbers of "{kind}" ones: {shown}. Give each a name, the same for all robots that took part.'
+            )
+
+
+def _recording(meeting: _Meeting, opened: Mapping[str, tuple[Table, Cells]], where: str) -> TeamRecording:
+    """Return what all robots measured at one time, each on its own clock, all from one origin."""
+    specs = [spec for _, own in meeting.members for spec in own.streams]
+    tables, cells = [opened[spec.where][0] for spec in specs], [opened[spec.where][1] for spec in specs]
+    gravity = [robot.gravity for robot, own in meeting.members for _ in own.streams]
+    channels = [
+        channels_of(spec, table, mine, default_gravity() if down is None else down, gaps=True)
+        for spec, table, mine, down in zip(specs, tables, cells, gravity, strict=True)
+    ]
+    seconds = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels])
+    named = zip(stream_names(specs), specs, channels, seconds, strict=True)
+    streams = {spec.where: _stream(name, spec, values, time) for name, spec, values, time in named}
+    tracks = {
+        robot.name: _track(robot, own, [streams[spec.where] for spec in own.streams])
+        for robot, own in meeting.members
+        if not own.away
+    }
+    away = frozenset(robot.name for robot, own in meeting.members if own.away)
+    with _at(where):
+        return TeamRecording(meeting.members[0][1].kind, tracks, meeting.name, away)
+
+
+def _stream(name: str, spec: StreamSpec, channels: Mapping[str, Array], time: Array | None) -> Stream:
+    kept = {n: values for n, values in channels.items() if not (n == "torque" and spec.zero_torque)}
+    frames = {q.name: "W" for q in spec.quantities if q.frame == "W"}
+    return Stream(name, kept, time, frames, spec.delay, spec.mount)
+
+
+def _track(robot: RobotSpec, own: RecordingSpec, streams: Sequence[Stream]) -> Track:
+    """Return one robot's samples in SI on one clock: poses, wrench on the payload, what else it measured."""
+    with _at(own.where):
+        time, channels = on_one_clock(streams)
+        carrying = _carrying(streams, time)
+        channels.pop("carrying", None)
+        if robot.omnid:
+            channels = _kinematics(channels)
+        channels = in_grasp_axes(streams, channels)
+        for name in ("force", "torque"):
+            if name in channels:
+                channels[name] = robot.wrench_sign * channels[name]
+        return Track.of(time, carrying, **channels)
+
+
+def _carrying(streams: Sequence[Stream], time: Array) -> np.ndarray[Any, np.dtype[np.bool_]] | None:
+    """Return whether the robot held the payload, as its nearest sample says; None where nothing says."""
+    for stream in streams:
+        if "carrying" in stream.channels and stream.time is not None:
+            said = stream.channels["carrying"][:, 0]
+            known = np.isfinite(said)
+            if not np.isin(said[known], (0.0, 1.0)).all():
+                raise BadValue('"carrying" must be 1 where the robot holds the payload and 0 where it does not.')
+            stamps = stream.time[known] - (stream.delay or 0.0)
+            nearest = np.searchsorted((stamps[1:] + stamps[:-1]) / 2, time)
+            return np.asarray(said[known][nearest] == 1)
+    return None
+
+
+def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
+    """Return the channels with joints turned into the pose and the force of an Omnid's grasp."""
+    if "joint_position" not in channels:
+        return dict(channels)
+    out = {name: values for name, values in channels.items() if not name.startswith("joint_")}
+    joints = channels["joint_position"]
+    good = np.isfinite(joints).all(1)
+    robot = Omnid()
+    _require_likely(robot, joints[good])
+    pose = robot.pose(joints[good])
+    out["rotation"], out["position"] = np.full((len(joints), 3, 3), np.nan), np.full((len(joints), 3), np.nan)
+    out["rotation"][good], out["position"][good] = pose.rotation.matrix, pose.position
+    if "joint_torque" in channels:
+        both = good & np.isfinite(channels["joint_torque"]).all(1)
+        out["force"] = np.full((len(joints), 3), np.nan)
+        out["force"][both] = robot.wrench(joints[both], channels["joint_torque"][both]).force
+    return out
+
+
+def _require_likely(robot: Omnid, joints: Array) -> None:
+    """Raise BadValue where joint angles (T, 6) [rad] are those of no Omnid, so that columns or units are others."""
+    low, high = robot.arm_limits
+    x, y, z = (stop + _BEYOND for stop in robot.gimbal_stops)
+    replace(robot, arm_limits=(low - _BEYOND, high + _BEYOND), gimbal_stops=(x, y, z)).require_within(joints)

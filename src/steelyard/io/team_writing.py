@@ -1,0 +1,157 @@
+"""A TeamLog written as CSV files with their description: what the robots' own logs would look like."""
+
+from __future__ import annotations
+
+import gzip
+import json
+import re
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Protocol
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadValue
+from steelyard.io.result_files import write_bytes, write_text
+from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
+from steelyard.logs.team_track import Track
+from steelyard.spatial import Rotation
+
+# Quantity -> columns, what its description says beside them, digits after the point.
+_COLUMNS: dict[str, tuple[tuple[str, ...], str, int]] = {
+    "rotation": (("qw", "qx", "qy", "qz"), 'form = "quaternion-wxyz"', 9),
+    "position": (("x", "y", "z"), 'unit = "m"', 8),
+    "angular_velocity": (("wx", "wy", "wz"), 'unit = "rad/s"', 8),
+    "linear_velocity": (("vx", "vy", "vz"), 'unit = "m/s"', 8),
+    "angular_acceleration": (("alx", "aly", "alz"), 'unit = "rad/s^2"', 7),
+    "linear_acceleration": (("ax", "ay", "az"), 'unit = "m/s^2"', 7),
+    "specific_force": (("sx", "sy", "sz"), 'unit = "m/s^2"', 7),
+    "gravity": (("gx", "gy", "gz"), 'unit = "m/s^2"', 7),
+    "force": (("fx", "fy", "fz"), 'unit = "N"', 6),
+    "torque": (("tx", "ty", "tz"), 'unit = "N*m"', 6),
+    "joint_position": (("q1", "q2", "q3", "q4", "q5", "q6"), 'unit = "rad"', 6),
+    "joint_torque": (("tau1", "tau2", "tau3"), 'unit = "N*m"', 5),
+    "carrying": (("holds",), 'unit = "1"', 0),
+}
+_BY_JOINTS = ("rotation", "position", "force")
+
+
+class JointReadings(Protocol):
+    """Joint angles (T, 6) [rad] and spring torques (T, 3) [N m] of one Omnid at the rows of its track."""
+
+    @property
+    def angles(self) -> Array:
+        """Joint angles (T, 6) [rad]."""
+
+    @property
+    def torques(self) -> Array:
+        """Spring torques (T, 3) [N m]."""
+
+
+def write_team(
+    log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings]] = (), *, packed: bool = False
+) -> Path:
+    """Write the description to `path` and one CSV per robot and recording into the folder of that name beside it.
+
+    joints  by recording and robot: written in place of the poses and forces that they give
+    packed  gzip the tables
+
+    Returns `path`. Raises BadFile where the folder cannot be written, BadValue for a six-axis robot with joints.
+    """
+    folder = path.with_suffix("")
+    try:
+        folder.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
+    level = {_gravity(robot) for robot in log.robots}
+    text = [f"[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
+    text[0] += _gravity(log.robots[0]) if len(level) == 1 else ""
+    for robot in log.robots:
+        by_joints = any(robot.name in each for each in joints)
+        text.append(_robot(robot, by_joints) + (_gravity(robot) if len(level) > 1 else ""))
+        for k, recording in enumerate(log.recordings):
+            if robot.name in recording.away:
+                text.append(_recording(recording) + "  away = true   # it holds nothing then\n")
+            if robot.name not in recording.tracks:
+                continue
+            name = re.sub(r"[^\w.-]+", "-", f"{robot.name}-{recording.name}") + (".csv.gz" if packed else ".csv")
+            columns = _columns(recording.tracks[robot.name], joints[k].get(robot.name) if by_joints else None)
+            text.append(_recording(recording) + _stream(f"{folder.name}/{name}", columns))
+            _write_table(folder / name, recording.tracks[robot.name].time, columns, packed)
+    write_text(path, "\n".join(text))
+    return path
+
+
+def _robot(robot: TeamRobot, by_joints: bool) -> str:
+    lines = ["[[robot]]", f"name = {json.dumps(robot.name)}"]
+    if by_joints:
+        lines.append('model = "omnid"')
+    if robot.base != "still":
+        lines.append(f'base = "{robot.base}"')
+    return "\n".join(lines) + "\n"
+
+
+def _gravity(robot: TeamRobot) -> str:
+    said = '"unknown"' if robot.gravity is None else "[" + ", ".join(f"{g:.9g}" for g in robot.gravity) + "]"
+    return f"gravity = {said}   # in the home frame, m/s^2\n"
+
+
+def _recording(recording: TeamRecording) -> str:
+    return f'  [[robot.recording]]\n  kind = "{recording.kind}"\n  name = {json.dumps(recording.name)}\n'
+
+
+def _columns(track: Track, joints: JointReadings | None) -> dict[str, Array]:
+    """Return what is written, NaN where it was not measured."""
+    out: dict[str, Array] = {}
+    if joints is not None:
+        if "torque" in track.channels:
+            raise BadValue("spring torques tell no moment: a six-axis robot is written with poses, not with joints.")
+        out["joint_position"] = _with_gaps(joints.angles, track, "rotation")
+        out["joint_torque"] = _with_gaps(joints.torques, track, "force")
+    for name, values in track.channels.items():
+        if joints is None or name not in _BY_JOINTS:
+            given = Rotation(values).quaternion_wxyz() if name == "rotation" else values
+            out[name] = _with_gaps(given, track, name)
+    if track.carrying is not None:
+        out["carrying"] = track.carrying[:, None].astype(np.float64)
+    return out
+
+
+def _with_gaps(values: Array, track: Track, channel: str) -> Array:
+    return np.where(track.valid[channel][:, None], values, np.nan)
+
+
+def _stream(path: str, columns: Mapping[str, Array]) -> str:
+    lines = [
+        "    [[robot.recording.stream]]",
+        f"    path = {json.dumps(path)}",
+        '    time = { columns = ["t"], unit = "s" }',
+    ]
+    for name in columns:
+        names, said, _ = _COLUMNS[name]
+        lines.append(f"    {name} = {{ columns = {json.dumps(names)}, {said} }}")
+    if "force" in columns and "torque" not in columns:
+        lines.append('    torque = "zero"   # a passive gimbal')
+    return "\n".join(lines) + "\n"
+
+
+def _write_table(path: Path, time: Array, columns: Mapping[str, Array], packed: bool) -> None:
+    names, parts = ["t"], [_cells(time[:, None], 6)]
+    for name, values in columns.items():
+        names += _COLUMNS[name][0]
+        parts.append(_cells(values, _COLUMNS[name][2]))
+    rows = [",".join(names), *(",".join(cells) for cells in np.concatenate(parts, axis=1).tolist())]
+    text = ("\n".join(rows) + "\n").encode()
+    # Without a stamp, so that the same log gives the same file.
+    write_bytes(path, gzip.compress(text, 9, mtime=0) if packed else text)
+
+
+def _cells(values: Array, digits: int) -> np.ndarray[tuple[int, ...], np.dtype[np.str_]]:
+    """Return numbers as text, without zeros at their end."""
+    return np.array([[_short(v, digits) for v in row] for row in values.tolist()])
+
+
+def _short(value: float, digits: int) -> str:
+    text = f"{value:.{digits}f}"
+    return text.rstrip("0").rstrip(".") if "." in text else text
