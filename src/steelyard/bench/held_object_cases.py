@@ -231,7 +231,7 @@ def _ours(case: Case) -> PartMasses | PartCuts:
     """Return our estimator: with the parts given, or over the cuts of what was seen."""
     if case.seen is None:
         return PartMasses(case.parts, bias="none")
-    return PartCuts(case.seen.cuts, bias="none", shape_error=case.seen.error)
+    return PartCuts(case.seen.cuts, case.seen.prior, bias="none", shape_error=case.seen.error)
 
 
 def _inside(case: Case) -> Array:

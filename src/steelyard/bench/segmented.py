@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.evaluate.segments import score_segments, surface_gap
 from steelyard.identify.shape_error import ShapeError
 from steelyard.parts.clustering import cluster
@@ -30,7 +31,7 @@ class Segmented:
     """What the cloud of an object gives, labels unseen.
 
     parts   in S, as shape and colour alone say
-    cuts    in S, among which a log may choose
+    cuts    in S, among which a log may choose, with the log weight `prior` of each beforehand
     error   how wrong the shape may be
     paper   in S, by the paper's route: ball pivoting, thickening, its clustering from supervoxels, four parts
     scores  "ours" and "paper-route" -> volume ratio, impurity, GCE, Hausdorff, parts
@@ -38,6 +39,7 @@ class Segmented:
 
     parts: Parts
     cuts: tuple[Parts, ...]
+    prior: Array
     error: ShapeError
     paper: Parts
     scores: dict[str, dict[str, Any]]
@@ -51,10 +53,11 @@ def segmented(known: KnownObject) -> Segmented:
     tree = cluster(thick, pieces_of_points(thick, cloud, supervoxels(cloud)))
     labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
     paper = Parts(np.arange(labels.max() + 1), thick.moments(labels, int(labels.max()) + 1))
-    made = shape.segmentation
+    made, cuts = shape.segmentation, shape.cuts()
     return Segmented(
         parts=shape.parts.in_frame(known.X_SO),
-        cuts=tuple(cut.in_frame(known.X_SO) for cut in shape.cuts()[1]),
+        cuts=tuple(cut.in_frame(known.X_SO) for cut in cuts.parts),
+        prior=cuts.prior,
         error=shape.error,
         paper=paper.in_frame(known.X_SO),
         scores={

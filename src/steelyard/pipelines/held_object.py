@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
@@ -34,6 +35,8 @@ if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
+# Cuts of the object into parts, seen from S, the log weight of each beforehand, and how wrong they may be.
+Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
 # Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
@@ -163,27 +166,33 @@ def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
     return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))
 
 
-def _shape(parts: Parts | Shape, recording: Recording) -> tuple[tuple[Parts, ...], ShapeError]:
-    """Return the cuts into parts in the sensor's frame and how wrong they may be there."""
+def _shape(parts: Parts | Shape, recording: Recording) -> Placed:
+    """Return cuts into parts in the sensor's frame, the weight that each has beforehand, and how wrong they may be."""
     if recording.object_pose is None:
         raise BadValue(
             "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
         )
     grasp_m, grasp_rad = recording.object_pose_std or (0.0, 0.0)
-    cuts, error = ((parts,), MEASURED) if isinstance(parts, Parts) else (parts.cuts()[1], parts.error)
-    placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts)
-    return placed, replace(error, grasp_m=grasp_m, grasp_rad=grasp_rad)
+    grasp = {"grasp_m": grasp_m, "grasp_rad": grasp_rad}
+    if isinstance(parts, Parts):
+        return (parts.in_frame(recording.object_pose),), None, replace(MEASURED, **grasp)
+    cuts = parts.cuts()
+    placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts.parts)
+    return placed, cuts.prior, replace(parts.error, **grasp)
 
 
 def _estimator(
-    options: Options, log: MotionLog, bias: Bias, shape: tuple[tuple[Parts, ...], ShapeError] | None = None
+    options: Options,
+    log: MotionLog,
+    bias: Bias,
+    shape: tuple[tuple[Parts, ...], Array | None, ShapeError] | None = None,
 ) -> tuple[NoiseAware | LeastSquares | Geodesic | PartCuts, tuple[str, ...]]:
     """Return the estimator and what there is to say about the choice."""
     if shape is not None and options.method == "auto":
-        cuts, error = shape
+        cuts, weights, error = shape
         given = f"is given in {len(cuts[0])} parts" if len(cuts) == 1 else f"was scanned, in {len(cuts)} cuts"
         why = f"method: auto chose part-masses, because the shape {given}"
-        return PartCuts(cuts, bias=bias, shape_error=error), (why,)
+        return PartCuts(cuts, weights, bias, shape_error=error), (why,)
     if options.method == "least-squares":
         return LeastSquares(bias=bias), ()
     if options.method == "geodesic":

@@ -7,6 +7,9 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numpy as np
+
+from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.parts.parts import Parts
@@ -18,6 +21,9 @@ from steelyard.shape.volume import Solid, enclose
 
 # A finer cut than this is not offered to a log: ten numbers cannot tell so many masses.
 MOST_PARTS = 16
+# Description length ranks the numbers of parts and is no measured frequency: it counts half against the forces, and
+# never rules out what they ask for.
+TRUST, LEAST_SURE = 0.5, 1e-3
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,19 +58,28 @@ class Shape:
             inertia_share=max(MEASURED.inertia_share, self.solid.volume_std),
         )
 
-    def cuts(self) -> tuple[tuple[int, ...], tuple[Parts, ...]]:
-        """Return numbers of parts that a log may choose from, and the parts of each cut.
+    def cuts(self) -> Cuts:
+        """Return the cuts that a log may choose from: about the number shape and colour chose, and half of it.
 
-        About the number that shape and colour chose, and half of it: which seams are between materials is what the
-        forces know better.
+        Which seams are between materials is what the forces know better.
         """
-        if self.segmentation.cuts is None:
-            return (len(self.segmentation),), (self.segmentation.parts,)
-        chosen = len(self.segmentation)
-        most = min(MOST_PARTS, len(self.segmentation.cuts.length))
+        made = self.segmentation
+        if made.cuts is None:
+            return Cuts((len(made),), (made.parts,), np.zeros(1))
+        chosen, most = len(made), min(MOST_PARTS, len(made.cuts.length))
         wanted = {max(1, chosen // 2), chosen - 1, chosen, chosen + 1}
         numbers = tuple(sorted({min(k, most) for k in wanted if k >= 1}))
-        return numbers, tuple(self.segmentation.cut(k).parts for k in numbers)
+        sure = np.maximum(made.sureness[[k - 1 for k in numbers]], LEAST_SURE)
+        return Cuts(numbers, tuple(made.cut(k).parts for k in numbers), TRUST * np.log(sure))
+
+
+@dataclass(frozen=True, eq=False)
+class Cuts:
+    """Cuts of one shape: numbers of parts, the parts of each, and the log weight (K,) that shape and colour give it."""
+
+    numbers: tuple[int, ...]
+    parts: tuple[Parts, ...]
+    prior: Array
 
 
 def shape_of(seen: Views | Scan | Cloud, parts: int | None = None) -> Shape:

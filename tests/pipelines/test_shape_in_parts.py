@@ -1,0 +1,79 @@
+"""From a cloud to an estimate: the shape in parts, and the log that chooses among its cuts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+from steelyard.errors import BadValue
+from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
+from steelyard.shape.cloud import Cloud
+from steelyard.simulate import hammer
+from steelyard.workshop.sampling import surface_cloud
+
+
+@pytest.fixture(scope="module")
+def made() -> hammer.Example:
+    return hammer.recording(0)
+
+
+@pytest.fixture(scope="module")
+def cloud(made: hammer.Example) -> Cloud:
+    seen = surface_cloud(made.tool)
+    return Cloud(seen.xyz, seen.rgb)
+
+
+@pytest.fixture(scope="module")
+def shape(cloud: Cloud) -> Shape:
+    return shape_of(cloud)
+
+
+def test_a_cloud_becomes_the_solid_in_parts(made: hammer.Example, shape: Shape) -> None:
+    assert shape.solid.mesh.volume == pytest.approx(made.tool.parts.volume.sum(), rel=0.1)
+    assert shape.parts.volume.sum() == pytest.approx(shape.solid.mesh.volume, rel=1e-9)
+    assert 2 <= len(shape.parts) <= 2 * len(made.tool.parts)
+
+
+def test_every_cut_is_the_whole_solid(shape: Shape) -> None:
+    found = shape.cuts()
+    numbers, cuts = found.numbers, found.parts
+    assert found.prior.max() <= 0
+    assert numbers[int(np.argmax(found.prior))] == len(shape.parts)
+    assert numbers == tuple(sorted(set(numbers)))
+    assert len(shape.parts) in numbers
+    assert max(numbers) <= MOST_PARTS
+    whole = shape.parts.moments.sum(0)
+    for number, cut in zip(numbers, cuts, strict=True):
+        assert len(cut) == number
+        np.testing.assert_allclose(cut.moments.sum(0), whole, rtol=1e-9, atol=1e-12 * abs(whole).max())
+
+
+def test_the_scan_gives_the_inertia_that_slow_motion_does_not(made: hammer.Example, shape: Shape) -> None:
+    true = made.truth.inertia_com
+    seen = sy.identify(made.recording, scan=shape)
+    blind = sy.identify(made.recording)
+    assert float(seen.mass) == pytest.approx(float(made.truth.mass), rel=2e-3)
+
+    upper = np.triu_indices(3)
+    off = np.abs(seen.parameters.inertia_com - true)[upper]
+    assert (off < 3 * seen.std[4:]).all()
+    assert off.max() < 0.1 * np.trace(true)
+    assert np.linalg.norm(seen.std[4:]) < 0.7 * np.linalg.norm(blind.std[4:])
+    assert any("part" in note for note in seen.notes)
+
+
+def test_a_known_number_of_parts_is_kept(cloud: Cloud) -> None:
+    assert len(shape_of(cloud, parts=2).parts) == 2
+
+
+def test_parts_and_scan_are_not_both_given(made: hammer.Example, shape: Shape) -> None:
+    with pytest.raises(BadValue, match="give one of them"):
+        sy.identify(made.recording, scan=shape, parts=made.tool.parts)
+
+
+def test_a_scan_needs_its_place_in_the_sensor(made: hammer.Example, shape: Shape) -> None:
+    with pytest.raises(BadValue, match="pose_in_sensor"):
+        sy.identify(replace(made.recording, object_pose=None), scan=shape)
