@@ -113,7 +113,7 @@ def _runs(good: Mask, part: Stretch, still: bool, highest_hz: float) -> list[sli
 
 def _inside(rows: slice, rate: float, highest_hz: float) -> slice:
     """Return the rows without the ends, where the filter has only one side: as many as transform quickly."""
-    cut = int(np.ceil(END_CYCLES * rate / highest_hz / PATH_FILTER)) + 2
+    cut = int(np.ceil(END_CYCLES * rate / highest_hz / PATH_FILTER)) + 4
     length = prev_fast_len(rows.stop - rows.start - 2 * cut, real=True)
     return slice(rows.start + cut, rows.start + cut + length)
 
@@ -125,12 +125,21 @@ def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz
     if cutoff_hz < 0.45 * rate:
         path = lowpass(path, cutoff_hz, rate)
     turn, place = middle @ Rotation.exp(path[:, :3]), path[:, 3:]
-    omega, alpha, second = np.zeros((3, len(place), 3))
-    omega[1:-1] = (turn[:-2].inverse() @ turn[2:]).log() * (rate / 2)
-    half = (turn[:-1].inverse() @ turn[1:]).log() * rate
-    alpha[1:-1] = (half[1:] - half[:-1]) * rate
-    second[1:-1] = (place[2:] - 2 * place[1:-1] + place[:-2]) * rate**2
-    return features(omega, alpha, turn.inverse().apply(second - gravity))
+    omega = np.zeros((len(place), 3))
+    near = (turn[1:-3].inverse() @ turn[3:-1]).log()
+    far = (turn[:-4].inverse() @ turn[4:]).log()
+    omega[2:-2] = (8 * near - far) * (rate / 12)
+    second = np.zeros_like(place)
+    inner = 16 * (place[1:-3] + place[3:-1]) - 30 * place[2:-2] - place[:-4] - place[4:]
+    second[2:-2] = inner * (rate**2 / 12)
+    return features(omega, _slope(omega, rate), turn.inverse().apply(second - gravity))
+
+
+def _slope(values: Array, rate: float) -> Array:
+    """Return the derivative (T, D) by fourth-order central differences, zero at the ends."""
+    out = np.zeros_like(values)
+    out[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) * (rate / 12)
+    return out
 
 
 def features(omega: Array, alpha: Array, supported: Array) -> Array:
@@ -156,8 +165,7 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
         smooth = twist[rows]
         if PATH_FILTER * highest_hz < 0.45 * part.rate:
             smooth = lowpass(smooth, PATH_FILTER * highest_hz, part.rate)
-        rise = np.zeros_like(smooth)
-        rise[1:-1] = (smooth[2:] - smooth[:-2]) * (part.rate / 2)
+        rise = _slope(smooth, part.rate)
         lifted = rise[:, 3:] + cross(smooth[:, :3], smooth[:, 3:]) + supported[rows]
         motion = features(smooth[:, :3], rise[:, :3], lifted)
         inside = _inside(rows, part.rate, highest_hz)

@@ -213,6 +213,7 @@ def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> G
     if thin.any() and not thin.all():
         seen[thin] = seen[~thin].mean(0)
     size = np.maximum((D[:, np.arange(D.shape[1]) % 6 >= 3] ** 2).mean(1), 1e-12)
+    seen = np.maximum(seen, (ROUNDING * abs(phi[0]) * 9.81) ** 2 * size)
     least = np.maximum(0.02 * seen, (ROUNDING * abs(phi[0]) * 9.81) ** 2 * size)
     # Where the path errs less than was thought, its noise shrinks with it.
     share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))

@@ -16,8 +16,8 @@ from steelyard.check import Array
 from steelyard.identify.regressor import basis, motion_map
 from steelyard.team.spectra import Spectra
 
-# Noise is never judged smaller than this share of what the payload weighs: where data are exact, rounding is not noise.
-ROUNDING = 1e-10
+# Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
+ROUNDING = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
