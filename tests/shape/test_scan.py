@@ -86,7 +86,7 @@ def test_volume_is_right_and_a_bridge_is_not_filled(mesh: TriangleMesh) -> None:
     scan = fuse(scanned(mesh).views)
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
     true = np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6
-    assert 0.93 < carved(enclose(scan.cloud), scan.empty).mesh.volume / true < 1.1
+    assert 0.93 < carved(enclose(scan.cloud), scan.empty).mesh.volume / true < 1.2  # filled bridge: 2.0
 
 
 def test_what_is_empty_is_outside(box: Scanned) -> None:

@@ -169,7 +169,7 @@ def _median_along(height: Array, rim: Any) -> Array:
     i, j = height.shape
     near = np.sort(np.stack([padded[a : a + i, b : b + j] for a in range(5) for b in range(5)]), axis=0)
     middle = np.maximum(np.isfinite(near).sum(0) - 1, 0) // 2
-    return np.nan_to_num(np.take_along_axis(near, middle[None], axis=0)[0])
+    return np.asarray(np.nan_to_num(np.take_along_axis(near, middle[None], axis=0)[0]))
 
 
 def _smooth(height: Array, under: Any) -> Array:
