@@ -1,45 +1,62 @@
 """Parts whose density changes within: freed part by part where homogeneous parts cannot give the wrench.
 
-phi = sum_k m_k b_k(u_k), the profile of part k tilted by u_k ~ N(0, T), masses with one common density. About a tilt
-the model is linear, phi = B m + J (u' - u): the tilts are then an error of the shape with covariance J T J^T, and the
-masses, the tilts and the evidence follow in closed form. Steps are kept where they make masses and tilts likelier.
-Which parts are free, and how much, is averaged by evidence.
-Source: own; Gauss-Newton on the tilts with the masses projected out, evidence by Laplace.
+phi = sum_k m_k b_k(u_k), the profile of part k tilted by u_k ~ N(0, T), masses with one common density. Masses and
+tilts are fitted together, the evidence is Laplace's (`part_tilts`). Which parts are worth a fit is told by a score that
+fits nothing; which of those are free, and how much, is averaged by evidence.
+Source: own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify import density_priors
+from steelyard.identify import density_priors, part_tilts
 from steelyard.identify.effective import Effective
 from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.part_models import Masses
-from steelyard.identify.part_profiles import Profile
+from steelyard.identify.part_profiles import FEATURES, Profile
+from steelyard.inertia import forms
 from steelyard.parts.parts import Parts
 
 # Standard deviations of the linear tilt; products of positions count half.
 LADDER = (0.1, 0.3, 1.0)
 MIDDLE, CONTENDER = 0.3, 7.0
 QUADRATIC = 0.5
+# The square of a coordinate in a box has this standard deviation, in units of its variance.
+BOX = 0.8**0.5
+# Parts that cannot raise the log evidence by this are not looked at.
+LEAST_GAIN = 1.0
 # How many parts of real tools are not homogeneous.
 COMMON = 0.1
-ROUNDS, HALVINGS, SETTLED, LONGEST = 40, 12, 1e-3, 0.7
 # Models this much less likely than the best do not count.
 UNLIKELY = float(np.log(1e-2))
 
 
 @dataclass(frozen=True, eq=False)
-class Model:
-    """One choice of which parts are free: the rows of the parts, and the variance (F,) of their tilts."""
+class Fit:
+    """The mode of one model: which parts are free and how far, how far densities of parts differ.
+
+    free         rows of the parts that are not homogeneous
+    width        standard deviation of their linear tilts
+    level        row of the spread of densities in `density_priors.LADDER`
+    y, tilts     log densities (P,), tilts (f, F)
+    J, hessian   d phi / d(y, tilts) (10, q), and (q, q) without what masses bend the cost by, `curve` (P,)
+    evidence     log evidence, the chance of the model counted
+    """
 
     free: tuple[int, ...]
-    variance: Array
-    log_chance: float
+    width: float
+    level: int
+    y: Array
+    tilts: Array
+    phi: Array
+    J: Array
+    hessian: Array
+    curve: Array
+    evidence: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,7 +66,7 @@ class Freed:
     vector, covariance   the ten parameters (10,) and (10, 10)
     masses               of the parts
     evidence             log evidence, the chance of the model counted
-    free, variance       as in the model
+    free                 rows of the parts that are not homogeneous
     tilts                (P, F), zero where a part is homogeneous
     """
 
@@ -58,132 +75,190 @@ class Freed:
     masses: Masses
     evidence: float
     free: tuple[int, ...]
-    variance: Array
     tilts: Array
 
 
-def freed(data: Effective, parts: Parts, profiles: list[Profile], enough: float) -> list[Freed]:
-    """Return the likely models of which parts are not homogeneous, most likely first.
+@dataclass(frozen=True, eq=False)
+class Search:
+    """What all models of one log share: the data, the parts, and the profiles made so far."""
+
+    data: Effective
+    parts: Parts
+    profiles: dict[int, Profile]
+
+    @classmethod
+    def of(cls, data: Effective, parts: Parts) -> Search:
+        """Return the search on what a log says; profiles are made when needed."""
+        return cls(data, parts, {})
+
+    def even(self) -> list[Fit]:
+        """Return the fits of homogeneous parts, one for each spread of densities."""
+        start = np.full(len(self.parts), density_priors.CENTRE)
+        return self.fits((), start, np.zeros((0, FEATURES)), MIDDLE, np.inf)
+
+    def fits(
+        self, free: tuple[int, ...], y: Array, tilts: Array, width: float, contender: float = CONTENDER
+    ) -> list[Fit]:
+        """Return the fits of one set of free parts over the spreads of densities, from the widest as far as likely."""
+        P, wide = len(self.parts), density_priors.WIDTH**2
+        variance = np.tile(_widths(width) ** 2, len(free))
+        chance = len(free) * np.log(COMMON) + (P - len(free)) * np.log(1 - COMMON)
+        chance -= np.log(len(density_priors.LADDER)) + (np.log(len(LADDER)) if free else 0.0)
+        points = _stacked([self.profile(k) for k in free])
+        data = (self.data.information, self.data.pull, self.parts.per_mass, self.parts.volume)
+        out: list[Fit] = []
+        tilts = tilts.ravel()
+        for level in range(len(density_priors.LADDER) - 1, -1, -1):
+            near = density_priors.LADDER[level] ** 2
+            precision = np.eye(P) / near - wide / (near * (near + P * wide))
+            y, tilts, cost, curve, hessian, J, phi = part_tilts.fitted(
+                *data, precision, density_priors.CENTRE, np.array(free, np.int64), variance, *points, y, tilts
+            )
+            evidence = part_tilts.evidence_of(cost, hessian, curve, near, wide, P, variance) + chance
+            out.append(
+                Fit(free, width, level, y, tilts.reshape(len(free), FEATURES), phi, J, hessian, curve, float(evidence))
+            )
+            if evidence < max(fit.evidence for fit in out) - contender:
+                break
+        return out
+
+    def worth(self, fits: list[Fit], base: tuple[int, ...] = ()) -> list[int]:
+        """Return the rows of the parts that may explain what `fits` leave, by score: nothing is fitted.
+
+        The tilt of a part is taken as linear about zero. A part whose tilt of one standard deviation the data see with
+        chi-square A takes at most A X / 2 off the misfit X, so that most small parts need no points inside.
+        """
+        likely = _likely(fits)
+        masses = self._masses(likely[0])
+        bound = 0.5 * _seen_tilts(self.data, self.parts, masses) * self.data.misfit(likely[0].phi)
+        rows = [k for k in range(len(masses)) if k not in base and bound[k] > LEAST_GAIN]
+        if not rows:
+            return []
+        slopes = np.stack([self.profile(k).tilted(np.zeros(FEATURES))[1] for k in rows])
+        widths = np.stack([_widths(width) for width in LADDER])
+        data = (self.data.information, self.data.pull)
+        rise = []
+        for fit in likely:
+            state = (fit.phi, fit.J, fit.hessian, self._masses(fit)[rows])
+            rise.append(part_tilts.scores(*data, *state, slopes, widths) + fit.evidence)
+        log_chance = np.log(COMMON / (1 - COMMON)) - np.log(len(LADDER))
+        odds = np.logaddexp.reduce(np.concatenate(rise), 0) + log_chance - total(likely)
+        return [k for k, found in zip(rows, odds, strict=True) if found > 0]
+
+    def profile(self, part: int) -> Profile:
+        """Return the profile of a part, made when first needed."""
+        if part not in self.profiles:
+            self.profiles[part] = Profile.of(self.parts, part)
+        return self.profiles[part]
+
+    def answer(self, fit: Fit) -> Freed:
+        """Return the answer of a fit."""
+        masses, P = self._masses(fit), len(self.parts)
+        full = fit.hessian.copy()
+        full[range(P), range(P)] += fit.curve
+        inverse = inverse_scaled(full)
+        covariance = fit.J @ inverse @ fit.J.T
+        tilts = np.zeros((P, fit.tilts.shape[1]))
+        tilts[list(fit.free)] = fit.tilts
+        spread = np.outer(masses, masses) * inverse[:P, :P]
+        return Freed(fit.phi, 0.5 * (covariance + covariance.T), Masses(masses, spread), fit.evidence, fit.free, tilts)
+
+    def _masses(self, fit: Fit) -> Array:
+        return np.asarray(self.parts.volume * np.exp(fit.y))
+
+
+def freed(search: Search, fits: list[Fit], enough: float) -> list[Fit]:
+    """Return the likely fits with parts that are not homogeneous, most likely first; `fits` those of even parts.
 
     Parts are freed one by one, the best first, as long as the evidence rises and the misfit is above `enough`. Sets are
     compared at the middle of the ladder, and only those that could win are tried on all of it.
     """
-    tried: list[Freed] = []
+    tried: list[Fit] = []
     best = -np.inf
-    base: tuple[int, ...] = ()
-    while len(base) < len(parts):
-        sets = [tuple(sorted((*base, k))) for k in range(len(parts)) if k not in base]
-        now = [_fit(data, parts, profiles, _model(free, MIDDLE, parts, profiles)) for free in sets]
-        limit = max(found.evidence for found in now) - CONTENDER
-        likely = [found.free for found in now if found.evidence > limit]
-        others = [width for width in LADDER if width != MIDDLE]
-        now += [_fit(data, parts, profiles, _model(free, w, parts, profiles)) for free in likely for w in others]
-        tried += now
-        top = max(now, key=lambda found: found.evidence)
-        if top.evidence < best or data.misfit(top.vector) < enough:
+    base = max(fits, key=_evidence)
+    while rows := search.worth(fits, base.free):
+        now = {k: search.fits(*_with(base, k), MIDDLE) for k in rows}
+        limit = max(total(found) for found in now.values()) - CONTENDER
+        for k, found in list(now.items()):
+            if total(found) > limit:
+                top = max(found, key=_evidence)
+                for width in LADDER:
+                    if width != MIDDLE:
+                        now[k] = now[k] + search.fits(top.free, top.y, top.tilts, width)
+        tried += [fit for found in now.values() for fit in found]
+        fits = max(now.values(), key=total)
+        base = max(fits, key=_evidence)
+        if total(fits) < best or search.data.misfit(base.phi) < enough:
             break
-        best, base = top.evidence, top.free
-    tried.sort(key=lambda found: -found.evidence)
-    return [found for found in tried if found.evidence > tried[0].evidence + UNLIKELY]
+        best = total(fits)
+    tried.sort(key=lambda fit: -fit.evidence)
+    return [fit for fit in tried if fit.evidence > tried[0].evidence + UNLIKELY]
 
 
-def even(data: Effective, parts: Parts) -> float:
-    """Return the log evidence of homogeneous parts, to compare with that of freed ones."""
-    _, evidence, _ = _common(data, parts, np.full(len(parts), density_priors.CENTRE))
-    best = inverse_scaled(data.information) @ data.pull
-    return evidence - 0.5 * float(best @ data.pull) + len(parts) * float(np.log(1 - COMMON))
+def _with(fit: Fit, part: int) -> tuple[tuple[int, ...], Array, Array]:
+    """Return the free parts of a fit with one more, and where to start: log densities and tilts."""
+    free = tuple(sorted((*fit.free, part)))
+    return free, fit.y, np.insert(fit.tilts, free.index(part), 0.0, axis=0)
 
 
-def _model(free: tuple[int, ...], width: float, parts: Parts, profiles: list[Profile]) -> Model:
-    """Return the model with the parts `free` and linear tilts of that standard deviation."""
-    size = profiles[0].features.shape[1]
-    linear = np.repeat([1.0, QUADRATIC**2], [3, size - 3])
-    chance = len(free) * np.log(COMMON) + (len(parts) - len(free)) * np.log(1 - COMMON) - np.log(len(LADDER))
-    return Model(free, np.tile(width**2 * linear, len(free)), float(chance))
+def _evidence(fit: Fit) -> float:
+    return fit.evidence
 
 
-def _fit(data: Effective, parts: Parts, profiles: list[Profile], model: Model) -> Freed:
-    """Return the answer of one model."""
-    rows, variance = list(model.free), model.variance
-    tilts = np.zeros((len(parts), profiles[0].features.shape[1]))
-    now, slope = _tilted(parts, profiles, tilts, rows)
-    masses, likely, _ = _common(data, now, np.full(len(parts), density_priors.CENTRE))
-    for _ in range(ROUNDS):
-        step = _linear(data, now, slope(masses), tilts[rows].ravel(), variance, masses)[0]
-        step *= min(1.0, LONGEST / max(float(np.abs(step).max()), 1e-9))
-        gained = 0.0
-        for _ in range(HALVINGS):
-            if np.abs(step).max() < SETTLED:
-                break
-            trial = tilts.copy()
-            trial[rows] += step.reshape(len(rows), -1)
-            there, turned = _tilted(parts, profiles, trial, rows)
-            found, value, _ = _common(data, there, _logs(masses, parts))
-            value -= 0.5 * float((trial[rows].ravel() ** 2 / variance).sum())
-            if value > likely:
-                gained = value - likely
-                tilts, now, slope, masses, likely = trial, there, turned, found, value
-                break
-            step = 0.5 * step
-        if gained < SETTLED:
-            break
-    _, evidence, spread, covariance = _linear(data, now, slope(masses), tilts[rows].ravel(), variance, masses)
-    return Freed(
-        now.whole(masses).vector, covariance, Masses(masses, spread), evidence + model.log_chance, model.free, variance,
-        tilts,
-    )  # fmt: skip
+def _likely(fits: list[Fit]) -> list[Fit]:
+    """Return the likelier ones of the fits, the best first."""
+    ordered = sorted(fits, key=lambda fit: -fit.evidence)
+    return [fit for fit in ordered if fit.evidence > ordered[0].evidence + UNLIKELY]
 
 
-def _linear(
-    data: Effective, now: Parts, slope: Array, tilts: Array, variance: Array, masses: Array
-) -> tuple[Array, float, Array, Array]:
-    """Return what the model linear about tilts (F,) says: the step (F,) from there, the log evidence, and the
-    covariances of the masses (P, P) and of the ten parameters (10, 10). `slope` (10, F) is d phi / d tilts.
-    """
-    shifted = replace(data, pull=data.pull + data.information @ (slope @ tilts))
-    error = (slope * variance) @ slope.T
-    seen = shifted.blurred(error)
-    found, evidence, spread = _common(seen, now, _logs(masses, now))
-    _, logdet = np.linalg.slogdet(np.eye(10) + data.information @ error)
-    best = inverse_scaled(seen.information) @ seen.pull
-    evidence -= 0.5 * float(logdet + best @ seen.pull)
-    B = now.per_mass
-    step = variance * (slope.T @ (seen.pull - seen.information @ (B @ found))) - tilts
-    gain = error @ seen.information
-    rest = (np.eye(10) - gain) @ B
-    covariance = rest @ spread @ rest.T + error - gain @ error
-    return step, evidence, spread, 0.5 * (covariance + covariance.T)
+def _seen_tilts(data: Effective, parts: Parts, masses: Array) -> Array:
+    """Return the chi-square (P,) by which the data see tilts of one standard deviation of each part, taken as a box."""
+    B = parts.per_mass.T
+    centre = B[:, 1:4]
+    second = forms.pseudo_inertia(B)[:, :3, :3]
+    values, axes = np.linalg.eigh(second - centre[:, :, None] * centre[:, None, :])
+    edges = np.sqrt(np.maximum(values, 0.0))[:, None, :] * axes
+    moved = np.zeros((len(B), FEATURES, 10))
+    for i in range(3):
+        e = edges[:, :, i]
+        moved[:, i, 1:4] = e
+        moved[:, i, 4:] = forms.upper(
+            _as_inertia(centre[:, :, None] * e[:, None, :] + e[:, :, None] * centre[:, None, :])
+        )
+    for n, (i, j) in enumerate(forms.UPPER):
+        e, f = edges[:, :, i], edges[:, :, j]
+        size = BOX if i == j else 2.0
+        moved[:, 3 + n, 4:] = forms.upper(
+            _as_inertia(0.5 * size * (e[:, :, None] * f[:, None, :] + f[:, :, None] * e[:, None, :]))
+        )
+    moved *= masses[:, None, None] * _widths(1.0)[None, :, None]
+    return np.asarray(np.einsum("pfi,ij,pfj->p", moved, data.information, moved))
 
 
-def _logs(masses: Array, parts: Parts) -> Array:
-    """Return the log densities (P,) of masses."""
-    return np.asarray(np.log(np.maximum(masses / parts.volume, 1e-3)))
+def _as_inertia(second: Array) -> Array:
+    """Return the inertia (P, 3, 3) of second moments."""
+    return np.asarray(np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second)
 
 
-def _common(data: Effective, parts: Parts, start: Array) -> tuple[Array, float, Array]:
-    """Return masses (P,) averaged over the spreads of one common density, log evidence and covariance (P, P)."""
-    B = parts.per_mass
-    A, b = B.T @ data.information @ B, B.T @ data.pull
-    masses, evidence, spread = density_priors.common_density(A, b, parts.volume, start)
-    weight = np.exp(evidence - evidence.max())
-    total = float(evidence.max() + np.log(weight.sum()))
-    weight /= weight.sum()
-    mean = weight @ masses
-    off = masses - mean
-    return mean, total, np.einsum("n,nij->ij", weight, spread) + np.einsum("n,ni,nj->ij", weight, off, off)
+def total(fits: list[Fit]) -> float:
+    """Return the log of the summed evidence."""
+    return float(np.logaddexp.reduce([fit.evidence for fit in fits]))
 
 
-def _tilted(
-    parts: Parts, profiles: list[Profile], tilts: Array, rows: list[int]
-) -> tuple[Parts, Callable[[Array], Array]]:
-    """Return the parts with the moments of their tilted densities, volumes kept, and masses (P,) -> d phi / d tilts."""
-    moments, slopes = parts.moments.copy(), []
-    for k in rows:
-        b, slope = profiles[k].tilted(tilts[k])
-        moments[k] = parts.volume[k] * b
-        slopes.append(slope)
+def _widths(width: float) -> Array:
+    """Return the standard deviations (9,) of linear tilts and of products of positions."""
+    return np.asarray(width * np.repeat([1.0, QUADRATIC], [3, 6]))
 
-    def slope_at(masses: Array) -> Array:
-        return np.concatenate([masses[k] * slope for k, slope in zip(rows, slopes, strict=True)], 1)
 
-    return Parts(parts.label, moments, parts.rgb), slope_at
+def _stacked(profiles: list[Profile]) -> tuple[Array, Array, Array]:
+    """Return weight (f, N), features (f, N, F) and per_mass (f, N, 10), points of no weight added where fewer."""
+    N = max((len(p.weight) for p in profiles), default=0)
+    weight, features, per_mass = (
+        np.zeros((len(profiles), N)),
+        np.zeros((len(profiles), N, 9)),
+        np.zeros((len(profiles), N, 10)),
+    )
+    for k, p in enumerate(profiles):
+        n = len(p.weight)
+        weight[k, :n], features[k, :n], per_mass[k, :n] = p.weight, p.features, p.per_mass
+    return weight, features, per_mass

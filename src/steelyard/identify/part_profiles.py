@@ -13,15 +13,16 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.identify import part_tilts
 from steelyard.inertia import InertialParameters, forms
 from steelyard.parts.parts import Parts
 
 POINTS = 150
+# Tilts: three of position and six of its products.
+FEATURES = 9
 # Points this few, or this much out of shape, do not stand for a part.
 FEWEST_POINTS, OUT_OF_SHAPE = 20, 4.0
 _PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
-# A tilt beyond this puts the whole part into one point.
-STEEPEST = 30.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,15 +57,11 @@ class Profile:
 
     def tilted(self, tilt: Array) -> tuple[Array, Array]:
         """Return b (10,) per kilogram at a tilt u (F,), and db/du (10, F)."""
-        weight = self.weights(tilt)
-        b = weight @ self.per_mass
-        mean = weight @ self.features
-        slope = (self.per_mass - b).T @ (weight[:, None] * (self.features - mean))
-        return b, slope
+        return part_tilts.tilted(self.weight, self.features, self.per_mass, tilt)
 
     def weights(self, tilt: Array) -> Array:
         """Return the share (N,) of the mass at each point."""
-        power = np.clip(self.features @ tilt, -STEEPEST, STEEPEST)
+        power = np.clip(self.features @ tilt, -part_tilts.STEEPEST, part_tilts.STEEPEST)
         weight = self.weight * np.exp(power - power.max())
         return np.asarray(weight / weight.sum())
 
@@ -89,6 +86,9 @@ def _inside(parts: Parts, part: int, centre: Array, axes: Array, size: Array) ->
     if parts.interior is None:
         return _box()
     points, volume = parts.interior.points(part, POINTS)
+    # Thin parts get a point for every line that meets them.
+    step = max(1, len(points) // POINTS)
+    points, volume = points[::step], volume[::step]
     if len(points) < FEWEST_POINTS:
         return _box()
     place, weight = (points - centre) @ axes / size, volume / volume.sum()

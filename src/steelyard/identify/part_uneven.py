@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.effective import Effective
 from steelyard.identify.part_findings import misfit_limit
-from steelyard.identify.part_gradients import Freed, even, freed
+from steelyard.identify.part_gradients import Freed, Search, freed, total
 from steelyard.identify.part_models import Masses
 from steelyard.identify.part_profiles import Profile
 from steelyard.parts.parts import Parts
@@ -17,7 +17,7 @@ from steelyard.parts.parts import Parts
 # Worth a look: a chi-square that right, homogeneous parts exceed once in so many logs.
 SUSPICIOUS = 1e-2
 # Freed parts must be so many times likelier than homogeneous ones, what is common among tools counted.
-ODDS = 1000.0
+ODDS = 10.0
 # A part is named where it is freed with at least this probability, and as sure where with that.
 NAMED, SURE = 0.2, 0.9
 
@@ -39,17 +39,18 @@ def suspicious(data: Effective, vector: Array, parts: Parts) -> bool:
 
 def uneven(data: Effective, parts: Parts) -> Uneven | None:
     """Return the answer averaged over freed parts, None where homogeneous ones are likely enough or nothing fits."""
-    profiles = [Profile.of(parts, k) for k in range(len(parts))]
-    models = freed(data, parts, profiles, misfit_limit(data, len(parts), SUSPICIOUS))
-    evidence = np.array([model.evidence for model in models])
-    weight = np.exp(evidence - evidence.max())
-    odds = float(evidence.max() + np.log(weight.sum())) - even(data, parts)
-    weight /= weight.sum()
+    search = Search.of(data, parts)
+    homogeneous = search.even()
+    fits = freed(search, homogeneous, misfit_limit(data, len(parts), SUSPICIOUS))
+    if not fits or total(fits) - total(homogeneous) < np.log(ODDS):
+        return None
+    models = [search.answer(fit) for fit in fits]
+    weight = np.exp(np.array([model.evidence for model in models]) - total(fits))
     vector, covariance = _average(weight, [m.vector for m in models], [m.covariance for m in models])
-    if odds < np.log(ODDS) or data.misfit(vector) > misfit_limit(data, 1):
+    if data.misfit(vector) > misfit_limit(data, 1):
         return None
     masses = Masses(*_average(weight, [m.masses.mean for m in models], [m.masses.covariance for m in models]))
-    return Uneven(vector, covariance, masses, _message(parts, profiles, models, weight))
+    return Uneven(vector, covariance, masses, _message(parts, search, models, weight))
 
 
 def _average(weight: Array, means: list[Array], covariances: list[Array]) -> tuple[Array, Array]:
@@ -59,7 +60,7 @@ def _average(weight: Array, means: list[Array], covariances: list[Array]) -> tup
     return mean, np.einsum("k,kij->ij", weight, np.stack(covariances)) + np.einsum("k,ki,kj->ij", weight, off, off)
 
 
-def _message(parts: Parts, profiles: list[Profile], models: list[Freed], weight: Array) -> str:
+def _message(parts: Parts, search: Search, models: list[Freed], weight: Array) -> str:
     """Return which parts are not homogeneous, and how."""
     chance = np.array([sum(w for m, w in zip(models, weight, strict=True) if k in m.free) for k in range(len(parts))])
     named = [k for k in np.argsort(-chance, kind="stable") if chance[k] > NAMED] or [int(chance.argmax())]
@@ -69,7 +70,7 @@ def _message(parts: Parts, profiles: list[Profile], models: list[Freed], weight:
     else:
         who = "Part " + " or ".join(f"{parts.label[k]} ({100 * chance[k]:.0f} %)" for k in named)
         who += " is not of one density"
-    falls = [_fall(profiles[k], _shift(k, profiles[k], models, weight)) for k in named]
+    falls = [_fall(search.profile(k), _shift(k, search.profile(k), models, weight)) for k in named]
     how = [f"part {parts.label[k]}: {text}" for k, text in zip(named, falls, strict=True)]
     return f"{who}; {'; '.join(how)}."
 

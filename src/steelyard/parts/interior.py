@@ -15,7 +15,7 @@ from steelyard.spatial import Pose
 
 @dataclass(frozen=True, eq=False)
 class Interior:
-    """The inside of P parts, filled with points only when asked.
+    """The inside of P parts, filled with points only when asked, and once.
 
     mesh      closed surfaces in their own frame M
     surfaces  (P,) labels of the surfaces around each part, voids among them
@@ -25,12 +25,16 @@ class Interior:
     mesh: TriangleMesh
     surfaces: tuple[tuple[int, ...], ...]
     X_AM: Pose = field(default_factory=Pose.identity)
+    # Points in M that were asked for: they do not depend on the frame of the parts.
+    filled: dict[tuple[int, int], tuple[Array, Array]] = field(default_factory=dict, repr=False)
 
     def points(self, part: int, count: int) -> tuple[Array, Array]:
         """Return about `count` points (K, 3) in part number `part` (its row) in A [m], and the volume (K,) of each."""
-        chosen = np.isin(self.mesh.part, self.surfaces[part])
-        surface = TriangleMesh(self.mesh.vertices, self.mesh.triangles[chosen], self.mesh.part[chosen])
-        points, volume = inside(surface, count)
+        if (part, count) not in self.filled:
+            chosen = np.isin(self.mesh.part, self.surfaces[part])
+            surface = TriangleMesh(self.mesh.vertices, self.mesh.triangles[chosen], self.mesh.part[chosen])
+            self.filled[part, count] = inside(surface, count)
+        points, volume = self.filled[part, count]
         return self.X_AM.apply(points), volume
 
     def in_frame(self, X_BA: Pose) -> Interior:
@@ -39,4 +43,5 @@ class Interior:
 
     def merged(self, groups: Sequence[Sequence[int]]) -> Interior:
         """Return the inside of parts joined: each group is a list of rows."""
-        return replace(self, surfaces=tuple(tuple(k for row in g for k in self.surfaces[row]) for g in groups))
+        joined = tuple(tuple(k for row in g for k in self.surfaces[row]) for g in groups)
+        return replace(self, surfaces=joined, filled={})
