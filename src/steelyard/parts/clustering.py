@@ -215,6 +215,7 @@ def _merge_all(
     end = ends.copy()
     known = np.empty(edges)
     exact = np.zeros(edges, np.bool_)
+    spot, held = np.zeros(edges, np.int64), np.zeros(edges, np.int64)  # where the pool has its vertices, how many
     alive = np.ones(edges, np.bool_)
     key, tie = np.empty(edges), np.empty(edges)
     head = np.full(nodes, -1, np.int32)
@@ -232,7 +233,6 @@ def _merge_all(
     latest = np.full(nodes, -1, np.int32)  # the edge to this cluster met last, and the merge that met it
     latest_merge = np.full(nodes, -1, np.int32)
     gone = np.zeros(nodes, np.bool_)
-    evaluated, kept = -1, 0
     across = False
     made = 0
     while made < n - 1:
@@ -246,28 +246,26 @@ def _merge_all(
             continue
         e = heap[0]
         a, b = end[e, 0], end[e, 1]
-        if not exact[e] or evaluated != e:
+        if not exact[e]:
             stamp += 1
             count = _union(pool, offset, length, a, b, mark, stamp, rows)
             if count == 5:
-                h, kept = _five_points(xyz, rows), 5
-                for i in range(5):
-                    vertex[i, 2] = rows[i]
+                known[e], kept = _five_points(xyz, rows), 5
+                vertex[:5, 2] = rows[:5]
             else:
-                h, kept = hull_volume(xyz, rows, count, tolerance, work)
+                known[e], kept = hull_volume(xyz, rows, count, tolerance, work)
                 hulls += 1
                 points += count
-            evaluated = e
-            if kept < 0:
-                faults += 1
-                h, kept = known[e], count
-                for i in range(count):
-                    vertex[i, 2] = rows[i]
-            if not exact[e]:
-                known[e], exact[e] = h, True
-                key[e] = _key(h, True, volume[a], volume[b], tets[a], tets[b], whole, size)
-                heaped = settle(heap, place, key, tie, heaped, e)
-                continue
+                if kept < 0:
+                    faults += 1
+                    kept = 0
+            pool = _stored(pool, filled, vertex, kept)
+            spot[e], held[e] = filled, kept
+            filled += kept
+            exact[e] = True
+            key[e] = _key(known[e], True, volume[a], volume[b], tets[a], tets[b], whole, size)
+            heaped = settle(heap, place, key, tie, heaped, e)
+            continue
 
         # Join a and b.
         c = n + made
@@ -278,9 +276,7 @@ def _merge_all(
             cost[made] = 1 + known[e] - volume[a] - volume[b] if key[e] > 0 else -1.0 / (key[e] * all_tets * all_tets)
         volume[c], hull[c], tets[c] = volume[a] + volume[b], known[e], tets[a] + tets[b]
         group[c] = group[a] if group[a] == group[b] else -1
-        pool = _stored(pool, filled, vertex, kept)
-        offset[c], length[c] = filled, kept
-        filled += kept
+        offset[c], length[c] = spot[e], held[e]
         gone[a] = gone[b] = True
         alive[e] = False
         heaped = remove(heap, place, key, tie, heaped, e)
