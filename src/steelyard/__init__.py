@@ -16,12 +16,15 @@ __version__ = "0.1.0"
 
 _HOME = {
     "identify": "steelyard.api",
+    "identify_team": "steelyard.api",
     "read_recording": "steelyard.io",
+    "read_team": "steelyard.io",
     "write_result": "steelyard.io",
     "read_result": "steelyard.io",
     "Recording": "steelyard.logs.recording",
     "MotionLog": "steelyard.logs.log",
     "Noise": "steelyard.logs.log",
+    "TeamLog": "steelyard.logs.team_log",
     "Moments": "steelyard.logs.moments",
     "InertialParameters": "steelyard.inertia",
     "solids": "steelyard.inertia",
@@ -31,6 +34,7 @@ _HOME = {
     "Twist": "steelyard.spatial",
     "Acceleration": "steelyard.spatial",
     "Estimate": "steelyard.identify.estimate",
+    "TeamEstimate": "steelyard.team",
     "Finding": "steelyard.findings",
     "NoiseAware": "steelyard.identify.noise_aware",
     "LeastSquares": "steelyard.identify.least_squares",
@@ -45,6 +49,7 @@ __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
     from steelyard.api import identify as identify
+    from steelyard.api import identify_team as identify_team
     from steelyard.errors import BadInput as BadInput
     from steelyard.errors import CannotAnswer as CannotAnswer
     from steelyard.errors import SteelyardError as SteelyardError
@@ -57,17 +62,20 @@ if TYPE_CHECKING:
     from steelyard.inertia import solids as solids
     from steelyard.io import read_recording as read_recording
     from steelyard.io import read_result as read_result
+    from steelyard.io import read_team as read_team
     from steelyard.io import write_result as write_result
     from steelyard.logs.log import MotionLog as MotionLog
     from steelyard.logs.log import Noise as Noise
     from steelyard.logs.moments import Moments as Moments
     from steelyard.logs.recording import Recording as Recording
+    from steelyard.logs.team_log import TeamLog as TeamLog
     from steelyard.pipelines.held_object import Options as Options
     from steelyard.spatial import Acceleration as Acceleration
     from steelyard.spatial import Pose as Pose
     from steelyard.spatial import Rotation as Rotation
     from steelyard.spatial import Twist as Twist
     from steelyard.spatial import Wrench as Wrench
+    from steelyard.team import TeamEstimate as TeamEstimate
 
 
 def __getattr__(name: str) -> Any:

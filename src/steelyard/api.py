@@ -13,12 +13,15 @@ from steelyard.identify.noise_aware import NoiseAware
 from steelyard.io import read_recording, read_result
 from steelyard.io.object_pose import ObjectPose, read_object_pose
 from steelyard.io.ply_files import read_mesh
+from steelyard.io.team_files import read_team
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
+from steelyard.logs.team_log import TeamLog
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.parts import Parts
-from steelyard.pipelines import held_object
+from steelyard.pipelines import held_object, shared_payload
 from steelyard.spatial import Pose
+from steelyard.team.estimate import TeamEstimate
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -64,6 +67,21 @@ def identify(
     if parts is not None and scan is not None:
         raise BadValue("parts and a scan both say what the object looks like; give one of them.")
     return held_object.identify(recording, options, known, _parts(parts) if scan is None else shape_of(scan))
+
+
+def identify_team(
+    log: str | Path | TeamLog, method: shared_payload.Method = "joint", *, data: str | Path | None = None
+) -> TeamEstimate:
+    """Return where every robot of a team holds the payload, and its mass, centre of mass and inertia.
+
+    log     a team description (.toml) or a TeamLog
+    method  "joint" or "paper"
+    data    folder that relative paths in the description start from
+
+    The answer is in the grasp frame of the reference robot. Raises BadInput where the files make no sense, CannotAnswer
+    where they do not determine it.
+    """
+    return shared_payload.identify_team(log if isinstance(log, TeamLog) else read_team(log, data), method)
 
 
 def _parts(parts: str | Path | Parts | None) -> Parts | None:

@@ -45,7 +45,17 @@ REMEDIES: dict[str, str] = {
     "part-not-homogeneous": "Split the part where its material changes, or check the shape and the grasp pose.",
     "materials-tied": "Move faster, add poses, or shorten the list of materials.",
     "materials-impossible": "Add the missing material to the list, or check the shape and its units.",
+    "grasp-direction-lost": "Turn the payload about a second axis as well, or move it along the missing direction.",
+    "clock-offset": "Nothing to do: the offsets were taken out. Synchronise the robots' clocks to be rid of them.",
+    "grasp-slipped": "Clamp this grasp tighter; record again if you need its pose after the slip.",
+    "robot-left": "Nothing to do if the robot was meant to let go; its rows after that were left out.",
+    "robot-joined": "Nothing to do if the robot was meant to join; its rows before that were left out.",
+    "robot-excluded": "Check this robot's encoders, kinematics and columns, or leave it out of the team.",
+    "common-gain-unseen": "Weigh a known mass with the team once; a gain error that all robots share looks like mass.",
+    "payload-jointed": "Lock the hinge, or identify each body by itself.",
+    "payload-not-rigid": "Stiffen the payload or its grasps, or move slower.",
     "tool-included": "Give --tool (a result or a tool-only log) if you want the object alone.",
+    "rows-missing": "Check the robot's network and logger if they were not meant to be missing; they were left out.",
 }
 
 

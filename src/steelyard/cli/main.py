@@ -16,6 +16,7 @@ VERBS: dict[str, tuple[str, str]] = {
         "steelyard.cli.identify:identify",
         "Log -> mass, centre of mass, inertia, error bars, findings.",
     ),
+    "team": ("steelyard.cli.team:team", "Logs of several robots with one payload -> grasps, mass, CoM, inertia."),
     "scan": ("steelyard.cli.scan:scan", "Posed RGB-D views -> one coloured cloud of the object."),
     "segment": ("steelyard.cli.segment:segment", "Cloud or views -> closed volume in homogeneous parts."),
     "compare": ("steelyard.cli.compare:compare", "Two results: the same object or not, with a p-value."),

@@ -10,6 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
 
+LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
 INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
@@ -57,8 +58,9 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
     body = estimate.parameters
     values = np.concatenate([[body.mass], body.com, body.inertia_com[np.triu_indices(3)]])
     names = ["mass", "com x", "com y", "com z", *INERTIA]
-    scales = np.repeat([1.0, 1e3, 1e6], [1, 3, 6])
-    units = ["kg"] + ["mm"] * 3 + ["kg mm²"] * 6
+    large = bool(np.abs(values[4:]).max() >= LARGE_INERTIA)
+    scales = np.repeat([1.0, 1e3, 1.0 if large else 1e6], [1, 3, 6])
+    units = ["kg"] + ["mm"] * 3 + ["kg m²" if large else "kg mm²"] * 6
     rows = []
     for k, name in enumerate(names):
         if k >= 4 and not estimate.identified[4:].all():

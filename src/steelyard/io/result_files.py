@@ -15,6 +15,8 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia import forms
+from steelyard.io.team_results import team_entries
+from steelyard.team.estimate import TeamEstimate
 
 
 def result_dict(estimate: Estimate) -> dict[str, Any]:
@@ -22,7 +24,8 @@ def result_dict(estimate: Estimate) -> dict[str, Any]:
 
     `inertia_com_kgm2` is about the centre of mass in the axes of `frame`, None where the data do not fix it;
     `parameters` (10,) and `covariance` (10, 10) are m, h, I about the origin of `frame`; `bias_covariance` (6, 6) and
-    `cross_covariance` (10, 6), torque first, let a later run share the bias.
+    `cross_covariance` (10, 6), torque first, let a later run share the bias. A team's result adds grasps, clock offsets
+    and principal frames.
     """
     torque_bias, force_bias = np.split(estimate.wrench_bias, 2)
     torque_std, force_std = np.split(estimate.wrench_bias_std, 2)
@@ -48,6 +51,8 @@ def result_dict(estimate: Estimate) -> dict[str, Any]:
         "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in estimate.findings],
         "notes": list(estimate.notes),
     }
+    if isinstance(estimate, TeamEstimate):
+        values |= team_entries(estimate)
     return {key: _plain(value) for key, value in values.items()}
 
 

@@ -14,6 +14,7 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
+from steelyard.io.team_results import team_of
 
 _LARGEST = 64_000_000
 _WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
@@ -23,13 +24,15 @@ def read_result(path: Path | str) -> Estimate:
     """Return a result; raises BadFile.
 
     Only `mass_kg`, `com_m` and `inertia_com_kgm2` are needed, so that a data sheet can be typed as a result: it is then
-    exact, with everything identified. Where a result has no inertia (null), its best guess is in the parameters.
+    exact, with everything identified. Where a result has no inertia (null), its best guess is in the parameters. A file
+    with grasps comes back as a TeamEstimate.
     """
     path = Path(path)
     values = _load_json(path)
-    if values.get("frame", "S") != "S":
+    team = "grasps" in values
+    if not team and values.get("frame", "S") != "S":
         raise BadFile(f'{path}: a result must be given in the sensor frame "S"; found "{values["frame"]}".')
-    return Estimate(
+    found = Estimate(
         _body(path, values),
         _matrix(path, values, "covariance", (10, 10)),
         str(values.get("method", "given")),
@@ -42,7 +45,9 @@ def read_result(path: Path | str) -> Estimate:
         findings=_findings(path, values),
         parts=parts_of(path, values),
         notes=notes_of(path, values),
+        frame=str(values.get("frame", "S")),
     )
+    return team_of(path, values, found) if team else found
 
 
 def _matrix(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:

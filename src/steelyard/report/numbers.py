@@ -8,6 +8,7 @@ from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters, forms
 from steelyard.report.markup import Html, tag
+from steelyard.spatial import Rotation
 
 _THIN = "\u202f"
 
@@ -57,6 +58,14 @@ def inertia_unit(moment: float) -> tuple[float, str]:
 def people(body: InertialParameters) -> Array:
     """Return mass [kg], com [m], inertia about it xx xy xz yy yz zz [kg m^2] (10,)."""
     return np.concatenate([[float(body.mass)], body.com, forms.upper(body.inertia_com)])
+
+
+def rpy_deg(rotation: Rotation) -> Array:
+    """Return roll, pitch, yaw (3,) [deg] of one rotation: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+    m = rotation.matrix
+    return np.rad2deg(
+        [np.arctan2(m[2, 1], m[2, 2]), np.arctan2(-m[2, 0], np.hypot(m[2, 1], m[2, 2])), np.arctan2(m[1, 0], m[0, 0])]
+    )
 
 
 def principal(estimate: Estimate) -> tuple[Array, Array, Array]:

@@ -1,0 +1,79 @@
+"""A TeamEstimate as a table for people."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import click
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.cli.table import columns, decimals, estimate_table, plus_minus
+from steelyard.report.numbers import principal, rpy_deg
+from steelyard.spatial import Pose
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The truth of a simulated team: mass, com, inertia about it (10,), poses X_RG by name, clock offsets [s]."""
+
+    people: Array
+    grasps: dict[str, Pose]
+    late_s: dict[str, float]
+
+
+def team_table(estimate: TeamEstimate, title: str, known: Known | None = None) -> str:
+    """Return the table: the payload with ±, where every robot holds it, clocks, evidence, findings with remedies."""
+    whole = estimate_table(estimate, title, None if known is None else known.people)
+    head, gap, rest = whole.partition("\n\n")
+    blocks = [head, *_principal_lines(estimate), "", *_grasp_lines(estimate, known)]
+    return "\n".join(blocks) + gap + rest
+
+
+def _principal_lines(estimate: TeamEstimate) -> list[str]:
+    """Return the principal moments."""
+    if estimate.inertia_com is None:
+        return []
+    moments, std, _ = principal(estimate)
+    rows = [(f"J{k + 1}", plus_minus(float(moments[k]), float(std[k]), "kg m²")) for k in range(3)]
+    return ["", "  principal moments of inertia", columns([(f"  {name}", said) for name, said in rows])]
+
+
+def _grasp_lines(estimate: TeamEstimate, known: Known | None) -> list[str]:
+    """Return one row per robot: place and rotation of its grasp in the reference's, and how late its clock is."""
+    heads = ["", "x", "y", "z", "roll, pitch, yaw", "clock late by"]
+    if known is not None:
+        heads += ["off by"]
+    rows = [tuple(heads)]
+    for name, grasp in estimate.grasps.items():
+        own = name == estimate.reference
+        cells = [name, *(["reference", "", "", ""] if own else _pose_cells(grasp)), _clock(estimate, name)]
+        if known is not None:
+            cells.append("" if own else _off(grasp, known.grasps[name]))
+        rows.append(tuple(cells))
+    if not estimate.clock_offsets_s:
+        place = heads.index("clock late by")
+        rows = [row[:place] + row[place + 1 :] for row in rows]
+    return [click.style("  grasps, from the reference", bold=True), columns(rows)]
+
+
+def _pose_cells(grasp: GraspEstimate) -> list[str]:
+    place = [plus_minus(1e3 * p, 1e3 * s, "mm") for p, s in zip(grasp.pose.position, grasp.std_m, strict=True)]
+    std = float(grasp.std_deg.max())
+    angles = ", ".join(f"{a:.{decimals(std)}f}" for a in rpy_deg(grasp.pose.rotation))
+    return [*place, f"({angles}) ± {std:.{decimals(std)}f}°"]
+
+
+def _clock(estimate: TeamEstimate, name: str) -> str:
+    late = estimate.clock_offsets_s.get(name)
+    if late is None or name == estimate.reference:
+        return ""
+    return plus_minus(1e3 * late, 1e3 * estimate.clock_offset_std_s.get(name, float("nan")), "ms")
+
+
+def _off(grasp: GraspEstimate, truth: Pose) -> str:
+    """Return distance and angle from the true grasp."""
+    gap = 1e3 * float(np.linalg.norm(grasp.pose.position - truth.position))
+    turn = float(np.rad2deg((truth.rotation.inverse() @ grasp.pose.rotation).angle()))
+    return f"{gap:.2f} mm, {turn:.3f}°"
