@@ -27,6 +27,7 @@ _RARE = 0.01  # a colour has at least this share of the points
 _TURNED = 0.15  # between the normals of a pair, for it to tell of the lamp
 _LAMP_SEEN = 0.1  # weaker shading is below the difference of two colours
 _LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
+_SHADE = 0.08  # of the brightness: what is left of the light once the lamp is taken out
 _ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
 
 
@@ -46,19 +47,26 @@ class ColourModes:
     noise: float
 
 
-def colour_modes(rgb: Colours, skin: Skin) -> ColourModes:
-    """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255."""
+def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None) -> ColourModes:
+    """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255.
+
+    normals  (V, 3) outward at the vertices, where they are known better than the triangles tell
+    """
     colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near
-    lamp = _lamp(colour, skin, near)
+    facing, flatness = skin.normals, skin.flatness
+    if normals is not None:
+        facing, flatness = normals, np.einsum("id,ikd->ik", normals, normals[near[:, :NEIGHBOURS]]).mean(1)
+    lamp = _lamp(colour, facing, flatness, near)
     sure = np.ones(len(colour), dtype=bool)
     if lamp.any():
-        colour = colour / (1 + _harmonics(skin.normals) @ lamp)[:, None]
-        sure = skin.flatness > min(0.95, float(np.median(skin.flatness)))
+        colour = colour / (1 + _harmonics(facing) @ lamp)[:, None]
+        sure = flatness > min(0.95, float(np.median(flatness)))
     raw, near = colour, near[:, :NEIGHBOURS]
     noise = _step(colour, near, sure)
     if noise > FINEST / _STEPS:
         colour = _averaged(colour, near, noise)
-    reach = float(np.clip(max(_STEPS * _step(colour, near, sure), _LEFT * noise), FINEST, COARSEST))
+    shade = _SHADE * float(np.median(np.linalg.norm(colour, axis=1))) if lamp.any() else 0.0
+    reach = float(np.clip(max(_STEPS * _step(colour, near, sure), _LEFT * noise, shade), FINEST, COARSEST))
     modes = _modes(colour, near, sure, reach)
     label = _assigned(colour, near, sure, modes, reach)
     label, modes = _without_blends(label, modes, near, raw, max(FINEST, 2 * noise))
@@ -71,28 +79,29 @@ def _harmonics(normals: Array) -> Array:
     return np.stack([x, y, z, x * y, x * z, y * z, (x * x - y * y) / 2, (3 * z * z - 1) / 2], axis=-1)
 
 
-def _lamp(colour: Array, skin: Skin, near: Integers) -> Array:
+def _lamp(colour: Array, normals: Array, flatness: Array, near: Integers) -> Array:
     """Return the weights (8,) of the harmonics; 0 where the brightness does not follow the normals.
 
     The fit is over pairs of neighbours whose normals differ. It must take away a quarter of the usual difference to be
-    believed, and the second order a quarter of what the first leaves.
+    believed. Where there is a lamp by the first order, the second need only be better: no lamp lights both sides.
     """
-    flat = skin.flatness > np.clip(np.median(skin.flatness), 0.9, 0.98)
+    flat = flatness > np.clip(np.median(flatness), 0.9, 0.98)
     apart = near[:, 3::4]  # some rings away: next neighbours share their triangles, and so their errors
     i, j = np.repeat(np.arange(len(near)), apart.shape[1]), apart.ravel()
-    used = flat[i] & flat[j] & (((skin.normals[i] - skin.normals[j]) ** 2).sum(1) > _TURNED**2)
+    used = flat[i] & flat[j] & (((normals[i] - normals[j]) ** 2).sum(1) > _TURNED**2)
     i, j = i[used], j[used]
     light = np.log(np.maximum(colour.mean(1), 4 / 255))
     side = light[i] - light[j]
     before = float(np.median(np.abs(side))) if len(side) else 0.0
     if before < _ROUGH / 4:
         return np.zeros(8)
-    wave = _harmonics(skin.normals)
+    wave = _harmonics(normals)
     one_side, left = _fitted(wave[i, :3], wave[j, :3], side)
-    if np.linalg.norm(one_side) < _LAMP_SEEN or left > 0.75 * before:
+    seen = bool(np.linalg.norm(one_side) >= _LAMP_SEEN and left <= 0.75 * before)
+    if not seen:
         one_side, left = np.zeros(3), before
     both_sides, rest = _fitted(wave[i], wave[j], side)
-    better = rest < 0.75 * left and left > _ROUGH / 4 and np.linalg.norm(both_sides) > _LAMP_SEEN
+    better = rest < (1.0 if seen else 0.75) * left and left > _ROUGH / 4 and np.linalg.norm(both_sides) > _LAMP_SEEN
     return both_sides if better else np.concatenate([one_side, np.zeros(5)])
 
 

@@ -151,7 +151,8 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     skin = skin_of(mesh)
     colour = np.zeros(len(mesh.vertices), dtype=np.int64)
     if cloud.rgb is not None:
-        colour = without_prints(colour_modes(_vertex_colours(cloud, mesh), skin).label, skin)
+        colours = colour_modes(_vertex_colours(cloud, mesh), skin, _vertex_normals(cloud, mesh))
+        colour = without_prints(colours.label, skin)
     pairs, corners = inner_faces(mesh)
     a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
     areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
@@ -193,6 +194,12 @@ def by_volume(labels: Any, mesh: TetMesh) -> Integers:
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.lexsort((first, -np.bincount(inverse, mesh.volumes)))] = np.arange(len(first))
     return np.asarray(rank[inverse])
+
+
+def _vertex_normals(cloud: Cloud, mesh: TetMesh) -> Array | None:
+    """Return the normals (V, 3) of the cloud where its points are the vertices."""
+    same = cloud.xyz.shape == mesh.vertices.shape and np.array_equal(cloud.xyz, mesh.vertices)
+    return cloud.normals if same else None
 
 
 def _vertex_colours(cloud: Cloud, mesh: TetMesh) -> Colours:

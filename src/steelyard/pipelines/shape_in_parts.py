@@ -14,6 +14,7 @@ from steelyard.findings import Finding
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.parts.parts import Parts
 from steelyard.parts.segment import Segmentation, segment
+from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.views import Views
@@ -91,5 +92,5 @@ def shape_of(seen: Views | Scan | Cloud, parts: int | None = None) -> Shape:
     """
     if isinstance(seen, Views):
         seen = fuse(seen)
-    solid = enclose(seen.cloud if isinstance(seen, Scan) else seen)
+    solid = carved(enclose(seen.cloud), seen.empty) if isinstance(seen, Scan) else enclose(seen)
     return Shape(solid, segment(solid.cloud, solid, parts=parts), seen if isinstance(seen, Scan) else None)
