@@ -46,7 +46,12 @@ def part_coverage_table(result: dict[str, Any]) -> str:
 def materials_table(result: dict[str, Any]) -> str:
     """Return how often the right density was picked, a line per object, and what was picked instead."""
     rows = {**result["objects"], "all": result["overall"]}
-    lines = block(f"noise {result['noise']}, {len(result['seeds'])} seeds", rows, _PICKS)
+    overall = result["overall"]
+    claim = (
+        f"every part of at least 5 % of the mass has the right density in {overall['all_right']} of {overall['runs']} "
+        f"runs ({overall['all_right_runs_pct']:.1f} %)"
+    )
+    lines = [claim, "", *block(f"noise {result['noise']}, {len(result['seeds'])} seeds", rows, _PICKS)]
     wrong = [
         f"  {name} part {part['label']} ({part['mass_pct']:.0f} %), {part['true']}: {_listed(part['picked'])}"
         for name, entry in result["objects"].items()

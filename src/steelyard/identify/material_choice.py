@@ -17,23 +17,27 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.density_priors import canonical, log_det, mode, partition_prior
 from steelyard.identify.linear import inverse_scaled
-from steelyard.logs.log import Integers
+from steelyard.logs.log import Integers, Mask
 from steelyard.parts.material import Material
 
 # Up to this many choices all are tried.
 EXHAUSTIVE = 3000
 MOST, SWEEPS = 4000, 6
-# A material is not ruled out for a part above this share of the evidence.
-POSSIBLE = 0.05
+# A material is not ruled out for a part above this share of the evidence, or where it fits as well as the likeliest
+# choice to within this chi-square: what only the prior for few materials prefers is not known from the log.
+POSSIBLE, AS_GOOD = 0.05, 1.0
 
 
 @dataclass(frozen=True, eq=False)
 class Choices:
-    """N choices looked at: masses (N, P), log evidence (N,), covariances (N, P, P), material numbers (N, P)."""
+    """N choices looked at: masses (N, P), log evidence (N,), covariances (N, P, P), chi-square (N,) of log and
+    tolerances up to a constant, material numbers (N, P).
+    """
 
     masses: Array
     evidence: Array
     spread: Array
+    chi_square: Array
     chosen: Integers
 
     def shares(self, materials: int) -> Array:
@@ -44,6 +48,14 @@ class Choices:
         for k in range(materials):
             out[:, k] = weight @ (self.chosen == k)
         return out
+
+    def possible(self, materials: int) -> Mask:
+        """Say which materials (P, materials) are not ruled out for which part."""
+        out = self.shares(materials) > POSSIBLE
+        good = self.chosen[self.chi_square < self.chi_square[self.evidence.argmax()] + AS_GOOD]
+        for k in range(materials):
+            out[:, k] |= (good == k).any(0)
+        return np.asarray(out)
 
 
 def choose(A: Array, b: Array, volume: Array, materials: Sequence[Material], free: Array) -> Choices:
@@ -61,15 +73,15 @@ def choose(A: Array, b: Array, volume: Array, materials: Sequence[Material], fre
     density = np.log(np.maximum(free, 1e-9) / volume)
     near = np.abs((density[:, None] - centre) / tolerance).argmin(1)
     starts = np.stack([near, *(np.full(P, k) for k in range(K))])
-    masses, evidence, spread, chosen, count = _search(A, b, volume, centre, tolerance, starts)
-    return Choices(masses[:count], evidence[:count], spread[:count], chosen[:count])
+    masses, evidence, spread, square, chosen, count = _search(A, b, volume, centre, tolerance, starts)
+    return Choices(masses[:count], evidence[:count], spread[:count], square[:count], chosen[:count])
 
 
 @numba.njit(cache=True)
 def _one(
     A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, chosen: Integers
-) -> tuple[Array, float, Array]:
-    """Return masses (P,), log evidence and covariance (P, P) of one choice."""
+) -> tuple[Array, float, Array, float]:
+    """Return masses (P,), log evidence, covariance (P, P) and chi-square of one choice."""
     P = len(volume)
     at, precision, prior = np.empty(P), np.zeros((P, P)), 0.0
     for k in range(P):
@@ -82,29 +94,29 @@ def _one(
     evidence = -cost - 0.5 * (prior + log_det(hessian)) + partition_prior(group, groups)
     for taken in range(groups):
         evidence -= np.log(float(max(len(centre) - taken, 1)))
-    return masses, evidence, np.outer(masses, masses) * inverse_scaled(hessian)
+    return masses, evidence, np.outer(masses, masses) * inverse_scaled(hessian), 2 * cost
 
 
 @numba.njit(cache=True)
 def _all(
     A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, tried: Integers
-) -> tuple[Array, Array, Array]:
-    """Return masses, log evidence and covariance of every choice."""
+) -> tuple[Array, Array, Array, Array]:
+    """Return masses, log evidence, covariance and chi-square of every choice."""
     N, P = tried.shape
-    masses, evidence, spread = np.zeros((N, P)), np.zeros(N), np.zeros((N, P, P))
+    masses, evidence, spread, square = np.zeros((N, P)), np.zeros(N), np.zeros((N, P, P)), np.zeros(N)
     for i in range(N):
-        masses[i], evidence[i], spread[i] = _one(A, b, volume, centre, tolerance, tried[i])
-    return masses, evidence, spread
+        masses[i], evidence[i], spread[i], square[i] = _one(A, b, volume, centre, tolerance, tried[i])
+    return masses, evidence, spread, square
 
 
 @numba.njit(cache=True)
 def _search(
     A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, starts: Integers
-) -> tuple[Array, Array, Array, Integers, int]:
+) -> tuple[Array, Array, Array, Array, Integers, int]:
     """Return what was tried from the starts (S, P): one part, all parts of one material, or two exchanged."""
     P, K = len(volume), len(centre)
     masses, evidence, spread = np.zeros((MOST, P)), np.full(MOST, -np.inf), np.zeros((MOST, P, P))
-    known, count = np.full((MOST, P), -1), 0
+    square, known, count = np.full(MOST, np.inf), np.full((MOST, P), -1), 0
     for s in range(len(starts)):
         current, best = starts[s].copy(), -np.inf
         for _sweep in range(SWEEPS):
@@ -126,12 +138,13 @@ def _search(
                             break
                     if place < 0:
                         if count == MOST:
-                            return masses, evidence, spread, known, count
+                            return masses, evidence, spread, square, known, count
                         place, count = count, count + 1
                         known[place] = trial
-                        masses[place], evidence[place], spread[place] = _one(A, b, volume, centre, tolerance, trial)
+                        found = _one(A, b, volume, centre, tolerance, trial)
+                        masses[place], evidence[place], spread[place], square[place] = found
                     if evidence[place] > best + 1e-9:
                         best, current, improved = evidence[place], trial.copy(), True
             if not improved:
                 break
-    return masses, evidence, spread, known, count
+    return masses, evidence, spread, square, known, count

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.material_choice import POSSIBLE, Choices
+from steelyard.identify.material_choice import Choices
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
 
@@ -62,8 +62,10 @@ def misfit_limit(data: Effective, parts: int, chance: float = MISFIT_CHANCE) -> 
 def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:
     """Return the finding on parts with next to no mass."""
     zero = [p.label for p in estimate.parts if p.mass < ZERO_SHARE * estimate.mass]
+    if not zero:
+        return []
     share = float(parts.volume[np.isin(parts.label, zero)].sum() / parts.volume.sum())
-    if not zero or share < ZERO_SHARE:
+    if share < ZERO_SHARE:
         return []
     names = ", ".join(map(str, zero))
     return [
@@ -77,9 +79,9 @@ def named_materials(count: int, choices: Choices | None, materials: Sequence[Mat
     """Return the name of each part's material, with a question mark where another one is possible."""
     if choices is None:
         return [None] * count
-    shares = choices.shares(len(materials))
-    best = shares.argmax(1)
-    return [materials[b].name + ("" if shares[k, b] > 1 - POSSIBLE else "?") for k, b in enumerate(best)]
+    best = choices.shares(len(materials)).argmax(1)
+    tied = choices.possible(len(materials)).sum(1) > 1
+    return [materials[b].name + ("?" if more else "") for b, more in zip(best, tied, strict=True)]
 
 
 def _material_findings(
@@ -94,10 +96,10 @@ def _material_findings(
         return [Finding.of("materials-impossible", text)]
     shares = choices.shares(len(materials))
     ties = []
-    for row, part in zip(shares, estimate.parts, strict=True):
-        possible = [f"{materials[k].name} ({100 * row[k]:.0f} %)" for k in np.argsort(-row) if row[k] > POSSIBLE]
-        if len(possible) > 1:
-            ties.append(f"part {part.label}: " + " or ".join(possible[:3]))
+    for row, can, part in zip(shares, choices.possible(len(materials)), estimate.parts, strict=True):
+        named = [f"{materials[k].name} ({100 * row[k]:.0f} %)" for k in np.argsort(-row, kind="stable") if can[k]]
+        if len(named) > 1:
+            ties.append(f"part {part.label}: " + " or ".join(named))
     if ties:
         out.append(Finding.of("materials-tied", f"The data leave the material open of {'; '.join(ties)}."))
     return out

@@ -25,10 +25,17 @@ from steelyard.identify.fit import Bias
 from steelyard.identify.linear import inverse_scaled, reweighted
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
-from steelyard.identify.part_models import Masses, averaged_masses, free_masses, log_evidence, material_masses
+from steelyard.identify.part_models import (
+    Masses,
+    averaged_masses,
+    free_masses,
+    free_mean,
+    log_evidence,
+    material_masses,
+)
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.problem import Problem
-from steelyard.identify.shape_error import MEASURED, ShapeError
+from steelyard.identify.shape_error import EXACT, MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
@@ -117,7 +124,9 @@ class PartMasses:
         data = Effective.of(problem, linear, score)
         body = InertialParameters(linear[:10])
         for _ in range(RENEWALS - 1):
-            body = self.parts.whole(self._masses(data, body, self.parts).mean)
+            free = self.density == "free" and not self.materials
+            mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
+            body = self.parts.whole(mean)
             data = Effective.of(problem, data.linear_at(body.vector), score)
         masses = self._masses(data, body, self.parts)
         first = self._estimate(problem, data, masses)
@@ -174,24 +183,48 @@ class PartMasses:
         """Return the masses of the parts by the chosen model.
 
         A list of materials is sharp enough for a shape error of a tenth of a millimetre to decide between two of them,
-        so that the log is blurred by it; a smooth average over densities is better off without.
+        so that the log is blurred by it; a smooth average over densities is better off without, unless the shape is a
+        scan: then masses would bend to put right what the shape has wrong.
         """
+        if self.materials or self._doubtful:
+            data = data.blurred(self.shape_error.covariance(self._sane(body)))
         if self.materials:
-            return material_masses(data.blurred(self.shape_error.covariance(body)), parts, self.materials)
+            return material_masses(data, parts, self.materials)
         return (averaged_masses if self.density == "averaged" else free_masses)(data, parts)
+
+    @property
+    def _doubtful(self) -> bool:
+        """Whether the shape may be worse than a measured mesh."""
+        return self.shape_error.com_m > MEASURED.com_m
 
     def _estimate(self, problem: Problem, data: Effective, masses: Masses) -> Estimate:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
 
-        phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with the shape (e = 0): letting a log
-        move it lost more in the thin axes than it won in the others.
+        phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with a measured shape (e = 0): letting a
+        log move it lost more in the thin axes than it won in the others. The centre of mass of a scan moves as far as
+        the log says.
         """
         B = self.parts.per_mass
         body = self.parts.whole(masses.mean)
         moved = self._moved(data, body)
         error = self.shape_error.covariance(body)
+        if self._doubtful:
+            body, error = self._recentred(data, body, error)
         covariance = B @ masses.covariance @ B.T + error + moved.T @ moved
         return self._built(problem, data, masses, body, covariance)
+
+    def _recentred(self, data: Effective, body: InertialParameters, error: Array) -> tuple[InertialParameters, Array]:
+        """Return the body with its centre of mass where shape and log together see it, and what is left of the error.
+
+        Inertia about the centre of mass stays that of the shape. The mean of e given the rest r = phi_hat - B m is
+        G_c (F^-1 + G)^-1 r, G_c the part of G that moves the centre.
+        """
+        centre = replace(EXACT, com_m=self.shape_error.com_m).covariance(body)
+        seen = data.blurred(error)
+        step = centre @ (seen.pull - seen.information @ body.vector)
+        com = body.com + step[1:4] / float(body.mass)
+        found = InertialParameters.from_com(float(body.mass), com, body.inertia_com)
+        return found, error - centre @ seen.information @ centre
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array
