@@ -1,4 +1,4 @@
-"""`steelyard demo`."""
+"""`steelyard demo [held-object|team]`."""
 
 from __future__ import annotations
 
@@ -24,16 +24,31 @@ SEED = 0
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.argument("story", type=click.Choice(["held-object", "team"]), default="held-object")
 @click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the made noise.")
 @click.option(
     "-o", "--output", type=click.Path(path_type=Path), default=Path("report.html"), show_default=True,
     help="The page to write.",
 )  # fmt: skip
 @click.option(
-    "--keep", type=click.Path(path_type=Path), metavar="DIR", help="Keep log, cloud, parts and result in this folder."
+    "--keep", type=click.Path(path_type=Path), metavar="DIR", help="Keep the made files and the result in this folder."
 )
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def demo(seed: int, output: Path, keep: Path | None, as_json: bool) -> None:
+def demo(story: str, seed: int, output: Path, keep: Path | None, as_json: bool) -> None:
+    """A whole story on made data, against the truth.
+
+    held-object: scan a hammer, cut the scan into parts, identify it from a log. team: three robots carry one payload;
+    from their joint angles and spring torques, where do they hold it and what is it?
+    """
+    if story == "team":
+        from steelyard.cli.demo_team import demo_team
+
+        demo_team(seed, output, keep, as_json)
+    else:
+        _held_object(seed, output, keep, as_json)
+
+
+def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> None:
     """Scan a made hammer, cut the scan into parts, identify it from a made log, and compare with the truth."""
     say_if_compiling()
     from steelyard import api

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.cli.table import columns
+from steelyard.cli.table import LARGE_INERTIA, columns
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters, forms
 
@@ -18,12 +18,15 @@ _UNITS = {"mass": "mass_kg", "CoM": "com_m", "inertia": "inertia_com_kgm2"}
 
 def versus_table(answers: Mapping[str, Estimate], truth: InertialParameters) -> str:
     """Return one row per answer: length of the error of mass, CoM and inertia about it, with the ± that it states."""
-    rows = [("error (its own ±)", *(f"{name}, {unit}" for name, _, _, unit in _GROUPS), "rigid body")]
+    groups = _GROUPS
+    if float(np.abs(truth.inertia_com).max()) >= LARGE_INERTIA:
+        groups = (*_GROUPS[:2], ("inertia", slice(4, 10), 1.0, "kg m²"))
+    rows = [("error (its own ±)", *(f"{name}, {unit}" for name, _, _, unit in groups), "rigid body")]
     for name, estimate in answers.items():
         found = _errors(estimate, truth)
         cells = (
             f"{scale * error:.2g} ({scale * std:.2g})"
-            for (error, std), (*_, scale, _) in zip(found, _GROUPS, strict=True)
+            for (error, std), (*_, scale, _) in zip(found, groups, strict=True)
         )
         rows.append((name, *cells, "yes" if estimate.parameters.validity().consistent else "no"))
     return columns(rows)

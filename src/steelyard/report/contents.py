@@ -14,6 +14,7 @@ from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.report.scene import Scene
+from steelyard.spatial import Pose
 
 
 @dataclass(frozen=True, eq=False)
@@ -46,10 +47,16 @@ class Residuals:
 
 @dataclass(frozen=True, eq=False)
 class Truth:
-    """What the object really is: the whole in S, and where they are known the masses [kg] and names of its parts."""
+    """What the object really is.
+
+    body    the whole, in S
+    masses  of its parts [kg], where they are known
+    grasps  of a team: X_RG by robot
+    """
 
     body: InertialParameters
     masses: Mapping[int, float] = field(default_factory=dict)
+    grasps: Mapping[str, Pose] = field(default_factory=dict)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +70,7 @@ class Report:
     truth       where it is known
     names       label of a part -> its name
     provenance  name -> value: command, seed, files
+    says        label of a body without a mass -> a line about it
     """
 
     title: str
@@ -73,6 +81,7 @@ class Report:
     truth: Truth | None = None
     names: Mapping[int, str] = field(default_factory=dict)
     provenance: Mapping[str, str] = field(default_factory=dict)
+    says: Mapping[int, str] = field(default_factory=dict)
 
     def name_of(self, label: int) -> str:
         """Return the name of a part."""

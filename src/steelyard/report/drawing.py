@@ -20,7 +20,9 @@ from steelyard.report.palette import density_colours, hexadecimal, part_colour
 from steelyard.report.scene import Body, Scene
 from steelyard.report.surfaces import corner_normals
 from steelyard.shape.mesh import Integers
+from steelyard.team.estimate import TeamEstimate
 
+PAYLOAD, UNSEEN = 0, (158, 168, 176)  # a team's ring through the grasps, and its colour
 _CHI2_95 = 7.815  # three degrees of freedom
 _VISIBLE = 0.05  # of the diagonal: how large the ellipsoid of the centre of mass is drawn at least
 _VERTEX = np.dtype([("xyz", "<u2", 4), ("normal", "i1", 4), ("rgb", "u1", 4)])
@@ -35,10 +37,13 @@ class Frame:
     view: Array
 
     @classmethod
-    def around(cls, vertices: Array) -> Frame:
-        """Return the box of vertices, seen with their longest direction across and their thinnest towards the eye."""
+    def of(cls, scene: Scene) -> Frame:
+        """Return the box of the scene, seen as it asks, or by its shape: thinnest direction towards the eye."""
+        vertices = np.concatenate([body.vertices for body in placed(scene)])
         low = vertices.min(0)
         size = float(np.ptp(vertices, axis=0).max())
+        if scene.view is not None:
+            return cls(low, size, scene.view)
         gap = vertices - vertices.mean(0)
         axes = np.linalg.eigh(gap.T @ gap)[1][:, ::-1].T
         axes = axes * np.sign(axes[np.arange(3), np.abs(axes).argmax(1)])[:, None]
@@ -57,13 +62,15 @@ def colours_of(report: Report) -> dict[int, tuple[int, int, int]]:
     labels = {part.label for part in report.estimate.parts}
     if report.scene is not None:
         labels |= {body.label for body in report.scene.bodies}
-    return {label: part_colour(number) for number, label in enumerate(sorted(labels))}
+    colours = {label: part_colour(number) for number, label in enumerate(sorted(labels))}
+    # What nobody has seen is drawn in no colour of its own.
+    return colours | {PAYLOAD: UNSEEN} if isinstance(report.estimate, TeamEstimate) else colours
 
 
 def drawing(report: Report, scene: Scene) -> dict[str, Any]:
     """Return everything the script needs, as plain values."""
     bodies = placed(scene)
-    frame = Frame.around(np.concatenate([b.vertices for b in bodies]))
+    frame = Frame.of(scene)
     known = {part.label: part for part in report.estimate.parts}
     told = [known[b.label] for b in bodies if b.label in known]
     density = dict(zip([p.label for p in told], density_colours(np.array([p.density for p in told])), strict=True))
@@ -122,13 +129,30 @@ def _marks(estimate: Estimate, scene: Scene, frame: Frame) -> dict[str, Any]:
     marks: dict[str, Any] = {
         "com": _plain(com),
         "spread": {"axes": _plain((axes * half * larger).T), "larger": larger},
-        "sensor": {"at": [0.0, 0.0, 0.0], "axes": np.eye(3).tolist()},
     }
+    if isinstance(estimate, TeamEstimate):
+        marks |= {"grasps": _grasps(estimate, frame), "open": True}
+    else:
+        marks["sensor"] = {"at": [0.0, 0.0, 0.0], "axes": np.eye(3).tolist()}
     if estimate.inertia_com is not None and estimate.parameters.validity().consistent:
         moments, _, ways = principal(estimate)
         squares = 5 * (moments.sum() / 2 - moments) / estimate.mass  # an even ellipsoid: I_x = m (b^2 + c^2) / 5
         marks["ellipsoid"] = _plain((ways * np.sqrt(np.maximum(squares, 0))).T)
     return marks
+
+
+def _grasps(estimate: TeamEstimate, frame: Frame) -> dict[str, Any]:
+    """Return axes and 95 % ellipsoid of every grasp, all magnified alike."""
+    spreads = []
+    for grasp in estimate.grasps.values():
+        values, axes = np.linalg.eigh(grasp.covariance[3:, 3:])
+        spreads.append((axes * np.sqrt(_CHI2_95 * np.maximum(values, 0))).T)
+    larger = _magnified(float(np.linalg.norm(spreads, axis=-1).max()), frame.size)
+    rows = [
+        {"at": _plain(grasp.pose.position), "axes": _plain(grasp.pose.rotation.matrix.T), "spread": _plain(s * larger)}
+        for grasp, s in zip(estimate.grasps.values(), spreads, strict=True)
+    ]
+    return {"rows": rows, "larger": larger}
 
 
 def _magnified(half: float, size: float) -> int:

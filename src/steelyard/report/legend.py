@@ -13,6 +13,7 @@ from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar
 from steelyard.report.projection import picture
 from steelyard.report.scene import Scene
+from steelyard.team.estimate import TeamEstimate
 
 MOST_PARTS = 200
 _HOW = (
@@ -48,13 +49,15 @@ def _controls(report: Report, scene: Scene, known: bool) -> Html:
     painted = np.concatenate([body.rgb for body in scene.bodies])
     seen = report.estimate
     modes = {"parts": "Parts"}
-    if (painted != painted[0]).any():
+    if (painted != painted[0]).any() and not isinstance(seen, TeamEstimate):
         modes["true"] = "Own colours"
     if seen.parts:
         modes["dense"] = "Density"
     shows = {"chips": "Labels"}
     if known:
-        shows = {"com": "Centre of mass", "sensor": "Sensor frame", **shows}
+        team = isinstance(seen, TeamEstimate)
+        frames = {"grasps": "Grasp frames"} if team else {"sensor": "Sensor frame"}
+        shows = {"com": "Centre of mass", **frames, **shows}
         if seen.inertia_com is not None:
             shows["ellipsoid"] = "Inertia ellipsoid"
     if scene.points is not None:
@@ -63,7 +66,7 @@ def _controls(report: Report, scene: Scene, known: bool) -> Html:
     reset = tag("button", "Reset", type="button", data_do="reset")
     return tag(
         "div",
-        _buttons("Colour by", "data_mode", modes),
+        _buttons("Colour by", "data_mode", modes) if len(modes) > 1 or not isinstance(seen, TeamEstimate) else "",
         _buttons("Show", "data_show", shows),
         tag("div", pull, _slider("cut", "Cut open"), reset, class_="group sliders"),
         tag("p", _HOW, id="how", class_="how"),
@@ -96,7 +99,10 @@ def _legend(report: Report) -> Html:
     rows += [_bare(report, label, colours[label]) for label in drawn if label not in weighed][:MOST_PARTS]
     more = len(parts) - MOST_PARTS
     rest = tag("p", f"and {more} lighter parts", class_="aside") if more > 0 else ""
-    heading = tag("h2", f"{len(rows)} part{'s' if len(rows) > 1 else ''}") if report.scene is not None else ""
+    count = f"{len(rows)} part{'s' if len(rows) > 1 else ''}"
+    if isinstance(report.estimate, TeamEstimate):
+        count = f"One payload, {len(report.estimate.grasps)} robots"
+    heading = tag("h2", count) if report.scene is not None else ""
     return tag("aside", heading, tag("ul", *rows, class_="legend"), rest, _density_note(parts), aria_label="Parts")
 
 
@@ -126,6 +132,7 @@ def _bare(report: Report, label: int, colour: tuple[int, int, int]) -> Html:
     name = report.name_of(label)
     return tag(
         "li", tag("label", _switch(label, name, True), _swatch(colour), tag("span", name, class_="name")),
+        tag("p", report.says[label], class_="aside") if label in report.says else "",
         data_label=label,
     )  # fmt: skip
 

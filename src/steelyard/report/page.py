@@ -13,7 +13,7 @@ from string import Template
 
 from steelyard import check
 from steelyard.errors import BadFile
-from steelyard.report import sections
+from steelyard.report import sections, team_sections
 from steelyard.report.contents import Report
 from steelyard.report.drawing import drawing
 from steelyard.report.legend import viewer
@@ -45,6 +45,7 @@ def render(report: Report, version: str | None = None) -> str:
     body = joined(
         sections.headline(report),
         viewer(report),
+        team_sections.grasps(report),
         sections.comparison(report),
         sections.residuals(report),
         sections.findings(report),

@@ -29,7 +29,7 @@ def turned_view(frame: Frame) -> Array:
 def picture(scene: Scene, colours: dict[int, tuple[int, int, int]], com: Array | None) -> Html:
     """Return the parts as an SVG: triangles from far to near, lit from above left; the centre of mass as a mark."""
     bodies = placed(scene)
-    frame = Frame.around(np.concatenate([b.vertices for b in bodies]))
+    frame = Frame.of(scene)
     view = turned_view(frame)
     total = sum(len(b.triangles) for b in bodies)
     faces, fills = [], []

@@ -47,11 +47,14 @@ class Scene:
     bodies  the parts, in frame O
     points  the cloud they were made of, in O
     X_SO    pose of O in the sensor frame; None where it is not known: then only the shape is drawn
+    view    rows right, up, toward (3, 3) of the first look; None = the longest direction across, the thinnest towards
+            the eye
     """
 
     bodies: tuple[Body, ...]
     points: Cloud | None = None
     X_SO: Pose | None = None
+    view: Array | None = None
 
     def __post_init__(self) -> None:
         if not self.bodies:

@@ -9,7 +9,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import fixed, general, inertia_unit, mass_unit, measured, people, principal
+from steelyard.report.numbers import decimals, fixed, general, inertia_unit, mass_unit, measured, people, principal
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, residual_plot
 
@@ -28,9 +28,16 @@ def headline(report: Report) -> Html:
     seen, truth = report.estimate, report.truth
     true = None if truth is None else people(truth.body)
     factor, unit = mass_unit(seen.mass)
+    value = measured(factor * seen.mass, factor * float(seen.std[0]), unit)
     mass = _card(
         "Mass",
-        tag("p", measured(factor * seen.mass, factor * float(seen.std[0]), unit), class_="big"),
+        tag(
+            "p",
+            value,
+            class_="big long"
+            if len(str(round(factor * seen.mass))) + decimals(factor * float(seen.std[0])) > 5
+            else "big",
+        ),
         interval(seen.mass, float(seen.std[0]), None if true is None else float(true[0])),
         _stack(report),
         tag("p", _share_of(float(seen.std[0]), seen.mass), class_="aside"),
@@ -39,8 +46,12 @@ def headline(report: Report) -> Html:
         _row(axis, 1e3 * seen.com[k], 1e3 * float(seen.std[1 + k]), "mm", None if true is None else 1e3 * true[1 + k])
         for k, axis in enumerate("xyz")
     ]
-    com = _card("Centre of mass", tag("dl", *rows), tag("p", f"in the sensor frame {seen.frame}", class_="aside"))
+    com = _card("Centre of mass", tag("dl", *rows), tag("p", _place(seen), class_="aside"))
     return tag("div", mass, com, _moments_card(report), class_="cards")
+
+
+def _place(seen: Estimate) -> str:
+    return f"in the sensor frame {seen.frame}" if seen.frame == "S" else f"in the grasp frame of {seen.frame}"
 
 
 def _stack(report: Report) -> Html:
@@ -111,7 +122,7 @@ def comparison(report: Report) -> Html:
         verdict = tag("td", "yes" if known else "impossible", class_="" if known else "bad")
         lines.append(tag("tr", tag("th", name, scope="row"), *cells, verdict, class_="ours" if not place else None))
     lead = "How far each method is from the true object, from the same log. Inertia is about the centre of mass."
-    return section("Against the truth", _table(heads, lines), name="against", lead=lead)
+    return section("Against the truth", table(heads, lines), name="against", lead=lead)
 
 
 def _error_cell(errors: Array, place: int, unit: str) -> Html:
@@ -133,10 +144,11 @@ def _side_by_side(answers: dict[str, Estimate]) -> Html:
         cells = [measured(factor * estimate.mass, factor * float(estimate.std[0]), unit)]
         cells += [measured(1e3 * estimate.com[k], 1e3 * float(estimate.std[1 + k]), "mm") for k in range(3)]
         lines.append(tag("tr", tag("th", name, scope="row"), *(tag("td", cell) for cell in cells)))
-    return section("Side by side", _table(("", "mass", "x", "y", "z"), lines), name="against")
+    return section("Side by side", table(("", "mass", "x", "y", "z"), lines), name="against")
 
 
-def _table(heads: tuple[str, ...], lines: list[Html]) -> Html:
+def table(heads: tuple[str, ...], lines: list[Html]) -> Html:
+    """Return a table that scrolls sideways on small screens."""
     head = tag("thead", tag("tr", *(tag("th", h, scope="col") if h else tag("td") for h in heads)))
     return tag("div", tag("table", head, tag("tbody", *lines)), class_="scroll", tabindex=0, role="region",
                aria_label="table")  # fmt: skip
@@ -191,8 +203,8 @@ def numbers(report: Report) -> Html:
             cells.append(tag("td", "" if away is None else f"{fixed(away, 1)} σ", class_="bad" if away and away > 3 else None))  # fmt: skip  # noqa: E501
         lines.append(tag("tr", *cells))
     heads = ("parameter", "found", *(("truth", "away") if true is not None else ()))
-    lead = f"In the axes of {seen.frame}; inertia about the centre of mass."
-    return section("All ten parameters", _table(heads, lines), name="numbers", lead=lead)
+    lead = f"{_place(seen).capitalize()}; inertia about the centre of mass."
+    return section("All ten parameters", table(heads, lines), name="numbers", lead=lead)
 
 
 def _largest(values: Array) -> float:

@@ -162,7 +162,8 @@
   // --- state -------------------------------------------------------------------------------------------------------
   const start = { yaw: -0.49, pitch: 0.38, zoom: 1, pan: [0, 0, 0] };
   const eye = { ...start };
-  const show = { com: "com" in marks, sensor: "sensor" in marks, ellipsoid: false, chips: true, points: false };
+  const grasps = marks.grasps ? marks.grasps.rows : [];
+  const show = { com: "com" in marks, sensor: "sensor" in marks, grasps: grasps.length > 0, ellipsoid: !!marks.open && rings.length > 0, chips: true, points: false };
   let mode = "parts", explode = 0, cut = 0, lit = null, wanted = false;
   const night = window.matchMedia("(prefers-color-scheme: dark)");
   const redraw = () => { if (!wanted) { wanted = true; requestAnimationFrame(draw); } };
@@ -181,9 +182,11 @@
     let distance = 0;
     const held = some.map(([c, centre]) => add(c, add(centre, middle, -1), 1.3 * explode));
     if (show.ellipsoid && marks.ellipsoid)
-      for (const a of marks.ellipsoid) for (const s of [1, -1]) held.push(add(marks.com, a, s));
+      for (const [i, j] of [[0, 1], [1, 2], [2, 0]]) for (let k = 0; k < 12; k++)
+        held.push(add(add(marks.com, marks.ellipsoid[i], Math.cos((turn * k) / 12)), marks.ellipsoid[j], Math.sin((turn * k) / 12)));
     if (show.sensor && marks.sensor && Math.hypot(...add(marks.sensor.at, middle, -1)) < 4 * reach)
       for (const a of marks.sensor.axes) held.push(add(marks.sensor.at, a, 0.22 * size));
+    if (show.grasps) for (const g of grasps) for (const a of g.axes) held.push(add(g.at, a, 0.13 * size));
     const ends = [0, 1, 2].map((k) => held.reduce(([l, h], c) => [Math.min(l, c[k]), Math.max(h, c[k])], [Infinity, -Infinity]));
     const centre = ends.map(([l, h]) => (l + h) / 2);
     for (const c of held) {
@@ -250,6 +253,11 @@
       drawn(sphere, framed(...marks.spread.axes, marks.com), [0.9, 0.66, 0.22], 0.32, 1);
       gl.enable(gl.DEPTH_TEST);
     }
+    if (show.grasps) {
+      gl.disable(gl.DEPTH_TEST);
+      for (const g of grasps) if (g.spread[2].some((v) => v)) drawn(sphere, framed(...g.spread, g.at), [0.9, 0.66, 0.22], 0.4, 1);
+      gl.enable(gl.DEPTH_TEST);
+    }
     for (const [test, strength, write] of [[gl.GREATER, 0.5, false], [gl.LEQUAL, 1, true]]) {
       gl.depthFunc(test); gl.depthMask(write);
       drawMarks(seen, strength);
@@ -261,12 +269,14 @@
     mesh(model, paint, alpha, kind); gl.bindVertexArray(thing.array); gl.drawArrays(gl.TRIANGLES, 0, thing.count);
   };
   const tint = [[0.82, 0.27, 0.18], [0.18, 0.58, 0.36], [0.2, 0.45, 0.8]];
+  const drawFrame = (frame, l, strength) => frame.axes.forEach((z, k) => {
+    const x = unit(crossed(Math.abs(z[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], z)), y = crossed(z, x);
+    const scaled = (a) => add([0, 0, 0], a, l);
+    drawn(arrow, framed(scaled(x), scaled(y), scaled(z), frame.at), tint[k], strength, 1);
+  });
   const drawMarks = (seen, strength) => {
-    if (show.sensor && marks.sensor) marks.sensor.axes.forEach((z, k) => {
-      const x = unit(crossed(Math.abs(z[0]) < 0.9 ? [1, 0, 0] : [0, 1, 0], z)), y = crossed(z, x), l = 0.2 * size;
-      const scaled = (a) => add([0, 0, 0], a, l);
-      drawn(arrow, framed(scaled(x), scaled(y), scaled(z), marks.sensor.at), tint[k], strength, 1);
-    });
+    if (show.sensor && marks.sensor) drawFrame(marks.sensor, 0.2 * size, strength);
+    if (show.grasps) for (const g of grasps) drawFrame(g, 0.12 * size, strength);
     if (!marks.com) return;
     if (show.ellipsoid) for (const thing of rings)
       drawn(thing, framed([1, 0, 0], [0, 1, 0], [0, 0, 1], marks.com), [0.86, 0.62, 0.2], 0.9 * strength, 1);
@@ -400,9 +410,11 @@
   // --- controls ----------------------------------------------------------------------------------------------------
   const hint = root.querySelector(".hint");
   const note = () => {
-    const larger = marks.spread && marks.spread.larger;
-    hint.hidden = !(show.com && larger);
-    hint.textContent = larger > 1 ? `95 % ellipsoid of the centre of mass, drawn ${larger} times larger` : "95 % ellipsoid of the centre of mass";
+    const said = [], times = (larger) => (larger > 1 ? `, drawn ${larger} times larger` : "");
+    if (show.com && marks.spread && marks.spread.larger) said.push(`of the centre of mass${times(marks.spread.larger)}`);
+    if (show.grasps && marks.grasps) said.push(`of the grasps' places${times(marks.grasps.larger)}`);
+    hint.hidden = !said.length;
+    hint.textContent = `95 % ellipsoid${said.length > 1 ? "s" : ""} ${said.join("; ")}`;
   };
   for (const button of root.querySelectorAll("[data-mode]")) button.addEventListener("click", () => {
     mode = button.dataset.mode;

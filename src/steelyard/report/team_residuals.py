@@ -1,0 +1,69 @@
+"""What a team's answer leaves over: the sum of all wrenches less what the payload needed, row by row."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.log import MotionLog
+from steelyard.logs.team_conditioning import condition
+from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.report.contents import Residuals
+from steelyard.spatial import cross
+from steelyard.team.estimate import TeamEstimate
+from steelyard.team.grasps import Grasps
+
+CUTOFF_HZ = 3.0
+_PAUSE_S = 0.1
+
+
+def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
+    """Return the residuals in the reference grasp of all rows with complete wrenches, below 3 Hz; None without any.
+
+    Recordings follow each other without the pauses between them. The motion is the mean over the robots that saw it.
+    """
+    grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
+    start, parts = 0.0, []
+    for recording in log.recordings:
+        if recording.kind == "grasp" and len(log.recordings) > 1:
+            continue
+        time, left = _left(log, recording, grasps, estimate)
+        if len(time):
+            still = np.full(len(time), recording.kind == "still")
+            parts.append((time - time[0] + start, left, still))
+            start = float(parts[-1][0][-1]) + _PAUSE_S
+    if not parts:
+        return None
+    time, left, still = (np.concatenate(column) for column in zip(*parts, strict=True))
+    return Residuals(time, left[:, 3:], left[:, :3], still)
+
+
+def _left(log: TeamLog, recording: TeamRecording, grasps: Grasps, estimate: TeamEstimate) -> tuple[Array, Array]:
+    """Return times (T,) and what is left (T, 6) [N m, N] at R's origin, in R's axes."""
+    rows = condition(log, recording, CUTOFF_HZ)
+    turn = grasps.poses.rotation.matrix
+    has, speed, rate = rows.has_rate, *(_at_reference(grasps, values) for values in (rows.twist, rows.twist_rate))
+    if recording.kind == "still":
+        has, speed, rate = rows.has_gravity, np.zeros_like(speed), np.zeros_like(rate)
+    keep = rows.complete_wrench() & has.any(0) & rows.has_gravity.any(0)
+    twist, change = _mean(speed, has)[keep], _mean(rate, has)[keep]
+    down = _mean(np.einsum("nij,ntj->nti", turn, rows.gravity), rows.has_gravity)[keep]
+    wrench = grasps.total_wrench(rows.wrench)[keep]
+    acceleration = change[:, 3:] + cross(twist[:, :3], twist[:, 3:])
+    moved = MotionLog(wrench, down, acceleration, twist[:, :3], change[:, :3])
+    left = wrench - moved.predicted(estimate.parameters.vector) - estimate.wrench_bias
+    return rows.time[keep], left
+
+
+def _at_reference(grasps: Grasps, twist: Array) -> Array:
+    """Return twists (N, T, 6) given at the grasps as twists of R, in R's axes; their derivatives likewise."""
+    turn, place = grasps.poses.rotation.matrix, grasps.poses.position
+    omega = np.einsum("nij,ntj->nti", turn, twist[..., :3])
+    velocity = np.einsum("nij,ntj->nti", turn, twist[..., 3:])
+    return np.concatenate([omega, velocity + cross(np.broadcast_to(place[:, None], omega.shape), omega)], -1)
+
+
+def _mean(values: Array, known: np.ndarray[tuple[int, ...], np.dtype[np.bool_]]) -> Array:
+    """Return the mean (T, k) over the robots that know a row."""
+    share = known / np.maximum(known.sum(0), 1)
+    return np.asarray(np.einsum("nt,ntk->tk", share, np.where(known[..., None], values, 0.0)))

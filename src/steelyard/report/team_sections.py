@@ -1,0 +1,94 @@
+"""The section of a team's page: where every robot holds the payload, how late its clock is, and the truth beside it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.report.contents import Report
+from steelyard.report.drawing import colours_of
+from steelyard.report.markup import Html, joined, tag
+from steelyard.report.numbers import fixed, general, measured, rpy_deg
+from steelyard.report.palette import hexadecimal
+from steelyard.report.sections import section, table
+from steelyard.spatial import Pose
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
+
+
+def grasps(report: Report) -> Html:
+    """Return the table of grasps; nothing for one robot."""
+    seen = report.estimate
+    if not isinstance(seen, TeamEstimate):
+        return Html("")
+    true = {} if report.truth is None else report.truth.grasps
+    late = bool(seen.clock_offsets_s)
+    heads = ["robot", "x", "y", "z", "roll, pitch, yaw"]
+    heads += ["clock is late by"] if late else []
+    heads += ["away from the truth"] if true else []
+    lines = [_line(report, seen, name, true.get(name), bool(true), late) for name in seen.grasps]
+    lead = (
+        f"Pose of every grasp in that of {seen.reference}, one standard deviation. Nobody measured these: they follow "
+        "from how the robots saw one rigid body move."
+    )
+    return section(
+        "Where the robots hold", table(tuple(heads), lines), *_rivals(report, seen), name="grasps", lead=lead
+    )
+
+
+def _line(report: Report, seen: TeamEstimate, name: str, true: Pose | None, compared: bool, late: bool) -> Html:
+    grasp, own = seen.grasps[name], name == seen.reference
+    colour = colours_of(report).get(1 + list(seen.grasps).index(name), (150, 150, 150))
+    swatch = tag("svg", tag("rect", width=12, height=12, rx=3, fill=hexadecimal(colour)), width=12, height=12,
+                 aria_hidden="true")  # fmt: skip
+    cells = [tag("th", swatch, " ", name, scope="row")]
+    if own:
+        cells.append(tag("td", "the reference", colspan=4, class_="aside"))
+    else:
+        cells += [
+            tag("td", measured(1e3 * float(p), 1e3 * float(s), "mm"))
+            for p, s in zip(grasp.pose.position, grasp.std_m, strict=True)
+        ]
+        cells.append(tag("td", _angles(grasp)))
+    if late:
+        said = "" if own else _late(seen, name)
+        cells.append(tag("td", said))
+    if compared:
+        cells.append(tag("td", "" if own or true is None else _away(grasp, true)))
+    return tag("tr", *cells)
+
+
+def _angles(grasp: GraspEstimate) -> Html:
+    std = float(grasp.std_deg.max())
+    places = max(0, int(1 - np.floor(np.log10(std)))) if std > 0 else 2
+    shown = ", ".join(fixed(float(a), places) for a in rpy_deg(grasp.pose.rotation))
+    bar = tag("span", f" ± {fixed(std, places)}", class_="pm") if std > 0 else ""
+    return tag("span", tag("span", shown, class_="v"), bar, tag("span", "°", class_="u"))
+
+
+def _late(seen: TeamEstimate, name: str) -> Html:
+    std = seen.clock_offset_std_s.get(name, 0.0)
+    return measured(1e3 * seen.clock_offsets_s.get(name, 0.0), 1e3 * std, "ms")
+
+
+def errors(grasp: GraspEstimate, true: Pose) -> tuple[float, float]:
+    """Return distance [mm] and angle [deg] of a grasp from the true one."""
+    turn = (true.rotation.inverse() @ grasp.pose.rotation).angle()
+    return 1e3 * float(np.linalg.norm(grasp.pose.position - true.position)), float(np.rad2deg(turn))
+
+
+def _away(grasp: GraspEstimate, true: Pose) -> str:
+    gap, turn = errors(grasp, true)
+    return f"{general(gap, 2)} mm, {general(turn, 2)}°"
+
+
+def _rivals(report: Report, seen: TeamEstimate) -> list[Html]:
+    """Return what the other methods' grasps are off by, where the truth is known."""
+    true = {} if report.truth is None else {n: X for n, X in report.truth.grasps.items() if n != seen.reference}
+    rows = []
+    for name, rival in report.rivals.items():
+        if true and isinstance(rival, TeamEstimate):
+            off = np.array([[errors(each.grasps[n], X) for n, X in true.items()] for each in (seen, rival)]).mean(1)
+            rows.append(
+                f"{name}: {general(float(off[1, 0]), 2)} mm and {general(float(off[1, 1]), 2)}° on average, "
+                f"{general(float(off[1, 0] / max(off[0, 0], 1e-12)), 2)} times as far."
+            )
+    return [joined(tag("p", row, class_="aside")) for row in rows]
