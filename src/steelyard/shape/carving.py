@@ -25,6 +25,7 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     empty  whether points (N, 3) are known to be outside: `Scan.empty`
 
     With the underside closed, all that no view saw to be empty is the object's; between, the solid's own verdict holds.
+    A surface that looked open is closed by that.
     """
     vertices = solid.mesh.vertices
     tets = Delaunay(vertices).simplices.astype(np.int64)
@@ -36,7 +37,8 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     inside = ((sure >= 0) & (share < _EMPTY)) | (share < _FULL)
     # A cell that only the views put inside is as sure as they are.
     sure = np.where(sure >= 0, sure, 1 - share / _EMPTY)
-    return replace(solid, mesh=TetMesh(vertices, tets[inside]), sure=sure[inside])
+    findings = tuple(f for f in solid.findings if f.code != "surface-open")
+    return replace(solid, mesh=TetMesh(vertices, tets[inside]), sure=sure[inside], findings=findings)
 
 
 def _solid(corners: Array) -> Any:
