@@ -16,8 +16,9 @@ from steelyard.parts.parts import Parts
 
 # Worth a look: a chi-square that right, homogeneous parts exceed once in so many logs.
 SUSPICIOUS = 1e-2
-# Freed parts must be so many times likelier than homogeneous ones, what is common among tools counted.
-ODDS = 10.0
+# Freed parts must be so many times likelier than homogeneous ones, what is common among tools counted: strong evidence
+# by the usual word (Kass and Raftery 1995).
+ODDS = 20.0
 # A part is named where it is freed with at least this probability, and as sure where with that.
 NAMED, SURE = 0.2, 0.9
 
