@@ -21,6 +21,9 @@ from steelyard.simulate.team import TeamTrial, TeamTruth, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
 from steelyard.spatial import Pose
 from steelyard.team import PublishedTeam, TeamEstimate
+from steelyard.team.joint import JointTeam, needs_twists
+from steelyard.team.pose_team import PoseTeam
+from steelyard.team.twist_team import TwistTeam
 
 FIRST_SEED = 100
 SIZES = (2, 4, 8, 16, 32, 64)
@@ -54,7 +57,18 @@ def _published_grasps(log: TeamLog) -> Pose:
     return PublishedTeam(cutoff_hz=None, close_loops=False).grasps(log)[0].poses
 
 
-METHODS: Mapping[str, Method] = MappingProxyType({"paper": Method(PublishedTeam().identify, _published_grasps)})
+def _joint_grasps(log: TeamLog) -> Pose:
+    if needs_twists(log):
+        return TwistTeam.of(log, clocks=True).fit.grasps
+    return PoseTeam.of(log, clocks=True).fit.team.grasps
+
+
+METHODS: Mapping[str, Method] = MappingProxyType(
+    {
+        "paper": Method(PublishedTeam().identify, _published_grasps),
+        "joint": Method(JointTeam().identify, _joint_grasps),
+    }
+)
 
 
 def run(

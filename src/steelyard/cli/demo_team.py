@@ -28,12 +28,12 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
     from steelyard.io import read_team, result_dict, write_result, write_team
     from steelyard.report import write_report
     from steelyard.report.numbers import people
-    from steelyard.simulate.three_omnids import three_omnids
+    from steelyard.simulate.three_omnids import three_omnids, told
 
     made = three_omnids(seed)
     with tempfile.TemporaryDirectory() as scratch:
         folder = keep or Path(scratch)
-        written = write_team(made.log, folder / TEAM, made.joints)
+        written = write_team(made.log, folder / TEAM, made.joints, heading=told(made, seed))
         log = read_team(written)
         best, paper = api.identify_team(log), api.identify_team(log, "paper")
         write_result(best, folder / "result.json")

@@ -50,12 +50,18 @@ class JointReadings(Protocol):
 
 
 def write_team(
-    log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings]] = (), *, packed: bool = False
+    log: TeamLog,
+    path: Path,
+    joints: Sequence[Mapping[str, JointReadings]] = (),
+    *,
+    packed: bool = False,
+    heading: str = "",
 ) -> Path:
     """Write the description to `path` and one CSV per robot and recording into the folder of that name beside it.
 
-    joints  by recording and robot: written in place of the poses and forces that they give
-    packed  gzip the tables
+    joints   by recording and robot: written in place of the poses and forces that they give
+    packed   gzip the tables
+    heading  stands first in the description, as a comment
 
     Returns `path`. Raises BadFile where the folder cannot be written, BadValue for a six-axis robot with joints.
     """
@@ -65,7 +71,8 @@ def write_team(
     except OSError as error:
         raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
     level = {_gravity(robot) for robot in log.robots}
-    text = [f"[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
+    said = "".join(f"# {line}\n" for line in heading.splitlines())
+    text = [f"{said}[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
     text[0] += _gravity(log.robots[0]) if len(level) == 1 else ""
     for robot in log.robots:
         by_joints = any(robot.name in each for each in joints)

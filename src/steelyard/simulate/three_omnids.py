@@ -37,6 +37,18 @@ class ThreeOmnids:
         return dict(zip(self.log.names, np.asarray(late).tolist(), strict=True))
 
 
+def told(made: ThreeOmnids, seed: int) -> str:
+    """Return what a description of the session says first, with the truth."""
+    body = made.truth.body
+    com = ", ".join(f"{x:.4f}" for x in body.com)
+    moments = ", ".join(f"{x:.3f}" for x in made.truth.moments)
+    return (
+        f"Three Omnids carry one payload: simulated joint angles and spring torques at 100 Hz, seed {seed}.\n"
+        "10 s of free motion, four still poses, 52 s of motion; the clock of 'right' is 13 ms late.\n"
+        f"The truth: {float(body.mass):g} kg, centre of mass ({com}) m, principal moments {moments} kg m^2."
+    )
+
+
 def three_omnids(seed: int) -> ThreeOmnids:
     """Return one session: 10 s of free motion, four still poses, 52 s of motion; "left" is the reference."""
     made = simulate_team(TeamScene(CASES["C"], late_s=LATE_S), seed)
