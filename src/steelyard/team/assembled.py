@@ -10,9 +10,11 @@ from steelyard.check import Array
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import com_jacobian
+from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
-from steelyard.team.body_rows import balance_frame
+from steelyard.team.body_rows import balance_frame, reach
+from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 from steelyard.team.payload_doubt import moved_by_gains, moved_by_grasps
 from steelyard.team.payload_fit import SHOWN, PayloadFit
@@ -24,9 +26,10 @@ def assembled(
 ) -> TeamEstimate:
     """Return the estimate of a team whose grasps (N,) in R are known to within `spread`."""
     balance = balance_frame(grasps)
+    spread = spread.with_lost(reach(grasps))
     moved = moved_by_grasps(payload, balance.inverse() @ grasps)
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
-    body = InertialParameters(payload.parameters).in_frame(balance)
+    body = InertialParameters(consistent(payload.parameters, payload.covariance, payload.scale)).in_frame(balance)
     change = np.stack([InertialParameters(row).in_frame(balance).vector for row in np.eye(10)], axis=1)
     estimates = {name: GraspEstimate(grasps[i], spread.of(i), spread.lost(i)) for i, name in enumerate(log.names)}
     samples = {g.parts[0].still: sum(p.samples for p in g.parts) for g in payload.groups}
@@ -39,7 +42,7 @@ def assembled(
             10 - payload.lost.shape[1], payload.condition, sum(samples.values()), samples.get(True, 0),
             float(np.sqrt((force**2).mean())), float(np.sqrt((moment**2).mean())), payload.chi2,
         ),
-        identified=_identified(body, change @ inner @ change.T, payload),
+        identified=_identified(body, change @ inner @ change.T, payload, bool(spread.blind.size)),
         frame=log.reference,
         reference=log.reference,
         grasps=estimates,
@@ -48,13 +51,16 @@ def assembled(
     )  # fmt: skip
 
 
-def _identified(body: InertialParameters, covariance: Array, payload: PayloadFit) -> Array:
+def _identified(body: InertialParameters, covariance: Array, payload: PayloadFit, open_grasps: bool) -> Mask:
     """Return which (10,) of mass, centre of mass and inertia about it are known to a good part of what they can be."""
-    if not payload.lost.shape[1]:
+    if not payload.lost.shape[1] and not open_grasps:
         return np.ones(10, np.bool_)
     jacobian = np.zeros((10, 10))
     jacobian[0, 0] = 1
     jacobian[1:] = com_jacobian(body.vector)
     std = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
     scale = payload.scale / np.concatenate([[1.0], np.full(3, payload.scale[0]), np.ones(6)])
-    return np.asarray(std < SHOWN * scale)
+    known = std < SHOWN * scale
+    # The centre of mass is the first moment over the mass.
+    known[1:] &= known[0]
+    return np.asarray(known)

@@ -6,7 +6,7 @@ per recording
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -23,6 +23,7 @@ from steelyard.team.pose_covariance import grasp_covariance
 from steelyard.team.pose_team import PoseTeam
 from steelyard.team.published import require_wrenches
 from steelyard.team.spectra import band_edges, gathered
+from steelyard.team.team_findings import bad_robots, gains, late_clocks, lost_directions, open_parameters, vertical
 from steelyard.team.twist_team import TwistTeam
 
 
@@ -44,18 +45,28 @@ class JointTeam:
         require_wrenches(log)
         if needs_twists(log):
             moving = TwistTeam.of(log, self.clocks)
-            grasps, spread, late = moving.fit.grasps, moving.fit.spread, moving.late
-            made, noise = moving.rows(self.highest_hz)
-            groups = _groups(made, noise, self.highest_hz, 1)
+            grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
+            made, path = moving.rows(self.highest_hz)
+            found, down, order = [], moving.down(), 1
         else:
             standing = PoseTeam.of(log, self.clocks)
-            grasps, spread, late = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.late
-            made, noise = standing.rows(log, self.highest_hz)
-            groups = _groups(made, noise, self.highest_hz, 2)
+            grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
+            late, found, order = standing.late, list(standing.findings), 2
+            made, path = standing.rows(log, self.highest_hz)
+            down = vertical(standing.gravity(log), standing.fit.team.motion)
+        groups = _groups(made, path, self.highest_hz, order)
         D, size = summing(balance_frame(grasps).inverse() @ grasps), reach(grasps)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
-        return assembled(log, grasps, spread, payload, D, late)
+        team = assembled(log, grasps, spread, payload, D, late)
+        found += [
+            *lost_directions(team.grasps, down),
+            *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
+            *bad_robots(log.names, noise),
+            *gains(payload.gain),
+            *open_parameters(team.identified, team.evidence.rank),
+        ]
+        return replace(team, findings=tuple(found))
 
 
 def needs_twists(log: TeamLog) -> bool:

@@ -19,8 +19,8 @@ from steelyard.logs.log import Mask
 from steelyard.team.payload_model import ROUNDING, Group, Normal, normal, residual_scatter
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
-BIAS = np.geomspace(0.01, 10.0, 10)
-GAIN = np.array([0.0, 3e-3, 0.01, 0.03, 0.1])
+BIAS = np.geomspace(1e-3, 10.0, 13)
+GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
 ROUNDS = 4
 # Noise has settled where it changes by less than this share.
 SETTLED = 0.03
@@ -165,7 +165,7 @@ class _Models:
         evidence -= 0.5 * (np.linalg.slogdet(spread)[1] + np.linalg.slogdet(held)[1]).sum(1)
         phi, covariance = _answers(full, sum((n.noise for n in normals), np.zeros((10, 10))) * unit, scale * right)
         return cls(
-            scale * phi, unit * covariance, plain, evidence, chi2, inner, blind, np.broadcast_to(g[:, 10:], (len(H), 6))
+            scale * phi, unit * covariance, plain, evidence, np.asarray(chi2), np.asarray(inner), blind, g[:, 10:]
         )
 
     def solution(self, model: int, recording: int) -> Array:
@@ -208,7 +208,8 @@ def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> G
     phi = models.phi[best]
     M = motion_map(phi)[:, :6]
     shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
-    seen = squares / np.maximum(rows, 1.0)[:, None]
+    # The mean of a variance given its rows, not the likeliest: weights must not be promised too high.
+    seen = squares / np.maximum(rows - 2, 0.5 * rows + 1e-9)[:, None]
     thin = rows < 1
     if thin.any() and not thin.all():
         seen[thin] = seen[~thin].mean(0)
@@ -226,6 +227,7 @@ def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> G
 
 def _residual(groups: tuple[Group, ...]) -> Array:
     """Return the rms (6,) of what is left of the summed moment and force, per row."""
-    total = sum((g.wrench_noise * sum(p.rows for p in g.parts)[:, None]).sum(0) for g in groups)
     rows = sum(float(p.rows.sum()) for g in groups for p in g.parts)
+    each = [np.einsum("ki,k->i", g.wrench_noise, p.rows) for g in groups for p in g.parts]
+    total = np.sum(each, axis=0)
     return np.asarray(np.sqrt(total / max(rows, 1.0)))

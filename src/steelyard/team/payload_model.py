@@ -14,6 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import basis, motion_map
+from steelyard.logs.log import Integers, Mask
 from steelyard.team.spectra import Spectra
 
 # Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
@@ -56,13 +57,13 @@ class Normal:
     pulled: Array
 
 
-def gain_columns(D: Array) -> tuple[Array, Array]:
+def gain_columns(D: Array) -> tuple[Integers, Array]:
     """Return which of the 6 N pushes are forces (3 N,), and the unit wrench at B of each (6, 3 N)."""
-    force = np.flatnonzero(np.arange(D.shape[1]) % 6 >= 3)
+    force: Integers = np.flatnonzero(np.arange(D.shape[1]) % 6 >= 3).astype(np.int64)
     return force, D[:, force]
 
 
-def unit_bias(D: Array, six_axis: Array, size: float) -> Array:
+def unit_bias(D: Array, six_axis: Mask, size: float) -> Array:
     """Return C (6, 6): a unit bias on every force axis, and `size` [m] times that on moments of six-axis wrists."""
     _, forces = gain_columns(D)
     moment = np.repeat(six_axis, 6) & (np.arange(D.shape[1]) % 6 < 3)

@@ -9,7 +9,7 @@ Source: sandwich H^-1 V H^-1 with V = F^1/2 H F^1/2.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -38,6 +38,15 @@ class Spread:
     blind: Array
     late: Array | None
     turns: Array
+
+    def with_lost(self, size: float) -> Spread:
+        """Return the spread with directions that are not shown as unsure as a team of this size [m] can be."""
+        if not self.blind.size:
+            return self
+        turn = np.arange(len(self.blind)) % 6 < 3
+        largest = np.maximum(np.abs(self.blind[turn]).max(0), np.abs(self.blind[~turn]).max(0) / size)
+        lost = self.blind / np.maximum(largest, 1e-300)
+        return replace(self, full=self.full + lost @ lost.T)
 
     def of(self, robot: int) -> Array:
         """Return the covariance (6, 6) of one grasp, rotation and position in R's axes."""

@@ -65,9 +65,9 @@ def _grasp(T_r: Pose, T_i: Pose) -> Pose:
     a, b = A.position - A.position.mean(0), B.position - B.position.mean(0)
     turning, moving = alpha.T @ beta, a.T @ b
     candidates = [_wahba(turning), _wahba(moving)]
-    spread, axes = np.linalg.eigh(alpha.T @ alpha)
+    seen, axes = np.linalg.eigh(alpha.T @ alpha)
     axis = axes[:, 2]
-    if spread[1] > ONE_AXIS**2 * spread[2] and spread[1] > len(alpha) * ROTATION_NOISE**2:
+    if seen[1] > ONE_AXIS**2 * seen[2] and seen[1] > len(alpha) * (10 * ROTATION_NOISE) ** 2:
         return Pose(candidates[0], _position(A, B, candidates[0])[0])
     for angle in np.arange(TURNS) * (2 * np.pi / TURNS):
         candidates.append(Rotation.exp(angle * axis) @ candidates[0])

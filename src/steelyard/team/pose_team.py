@@ -2,21 +2,26 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
+from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
+from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.pose_fit import FEW_ROWS, PoseFit, fit_poses
 from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import TeamMotion
+from steelyard.team.presence import as_long, idle, let_go, presence_findings
+from steelyard.team.slips import SlipAt, alone, edited, find_slip
 from steelyard.team.stacked import Stretch, all_poses, stretches
 
 # Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
@@ -24,6 +29,18 @@ PUNCTUAL = 2e-4
 # A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
 DOUBTED = 4.0
 CLOCK_ROUNDS = 6
+MOST_SLIPS = 3
+
+
+Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
+
+
+def _unchanged(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+    return parts
+
+
+def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, ...]:
+    return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,13 +50,34 @@ class PoseTeam:
     parts: tuple[Stretch, ...]
     fit: PoseFit
     late: Mapping[str, float]
+    findings: tuple[Finding, ...] = ()
 
     @classmethod
     def of(cls, log: TeamLog, clocks: bool) -> PoseTeam:
-        """Return the joint fit; raises CannotAnswer where poses or rows in common are missing."""
+        """Return the joint fit; raises CannotAnswer where poses or rows in common are missing.
+
+        Robots that let go for a while and grasps that slip are found on the way: first the rows in which a robot
+        pushes with nothing are left out, then those stay out in which it is not where the others say.
+        """
+        raw = stretches(log, {})
+        resting = idle(raw)
+        if not any(rows.any() for rows in resting):
+            return cls._fitted(log, clocks, _unchanged)._without_slips(log, clocks, _unchanged)
+        first = cls._fitted(log, clocks, lambda parts: _unseen(parts, resting))
+        off = first.off(log)
+
+        def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+            return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
+
+        found = presence_findings(raw, edit(raw), log.names)
+        team = cls._fitted(log, clocks, edit)._without_slips(log, clocks, edit)
+        return replace(team, findings=(*found, *team.findings))
+
+    @classmethod
+    def _fitted(cls, log: TeamLog, clocks: bool, edit: Edit) -> PoseTeam:
         reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
-        parts = stretches(log, late)
+        parts = edit(stretches(log, late))
         data = TeamMotion(*all_poses(parts))
         start = first_team(data, reference, log.names)
         few = slice(None, None, max(1, len(data.valid) // FEW_ROWS if clocks else 1))
@@ -58,18 +96,73 @@ class PoseTeam:
             late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
             if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * doubt)).all():
                 break
-            parts = stretches(log, late)
+            parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
             if data.valid.shape[0] != len(fit.team.motion.position):
                 fit = replace(fit, team=replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes)))
         return cls(parts, fit, late)
+
+    def _without_slips(self, log: TeamLog, clocks: bool, edit: Edit) -> PoseTeam:
+        """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were."""
+        team, slips = self, list[SlipAt]()
+        for _ in range(MOST_SLIPS):
+            found = team._slip(log)
+            if found is None:
+                break
+            # Once more without what follows the slip, which has bent the first fit.
+            team = self._fitted(log, clocks, edited(edit, [*slips, found]))
+            slips.append(team._measured(log, found))
+        if not slips:
+            return self
+        team = self._fitted(log, clocks, edited(edit, slips))
+        return replace(team, findings=tuple(slip.finding(log) for slip in slips))
+
+    def _slip(self, log: TeamLog) -> SlipAt | None:
+        best, start = None, 0
+        apart = alone(self.fit.linear.residual, self.fit.linear.J, self.fit.linear.W)
+        for number, part in enumerate(self.parts):
+            rows = slice(start, start + len(part))
+            start += len(part)
+            slip = find_slip(apart[rows], part.seen, part.rate)
+            if slip is not None and (best is None or slip.score > best.slip.score):
+                best = SlipAt(number, float(part.time[slip.row]), slip)
+        return best
+
+    def _measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
+        """Return the slip with its time and step renewed against the others' motion."""
+        raw = stretches(log, self.late)[found.recording]
+        start = sum(len(part) for part in self.parts[: found.recording])
+        apart = self.residuals(raw, start)[:, found.slip.robot]
+        return found.renewed(apart, raw.seen[:, found.slip.robot], raw)
+
+    def gravity(self, log: TeamLog) -> Array:
+        """Return gravity (3,) [m/s^2] in the reference home."""
+        return _gravity(log, self.fit.team.homes)
+
+    def residuals(self, raw: Stretch, start: int) -> Array:
+        """Return rotation vector and position (T, N, 6) from where the team says to what was measured, used or not."""
+        motion = self.fit.team.motion[np.minimum(start + np.arange(len(raw)), len(self.fit.team.motion.position) - 1)]
+        G, Z = self.fit.team.grasps, self.fit.team.homes
+        return pose_rows.residuals(
+            raw.poses.rotation.matrix, raw.poses.position, raw.seen, G.rotation.matrix, G.position, Z.rotation.matrix,
+            Z.position, motion.rotation.matrix, motion.position,
+        )  # fmt: skip
+
+    def off(self, log: TeamLog) -> list[Array]:
+        """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
+        out, start = [], 0
+        for raw, part in zip(stretches(log, self.late), self.parts, strict=True):
+            left = self.residuals(raw, start) / np.repeat(self.fit.noise, 3, axis=1)
+            out.append(np.sqrt((left**2).mean(-1)))
+            start += len(part)
+        return out
 
     def rows(self, log: TeamLog, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their poses, and a row's covariance.
 
         The covariance (6, 6) is that of the path, in the balance frame's axes.
         """
-        gravity, fit = _gravity(log, self.fit.team.homes), self.fit
+        gravity, fit = self.gravity(log), self.fit
         frame = balance_frame(fit.team.grasps)
         noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", fit.linear.J, fit.linear.W, fit.linear.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
@@ -77,7 +170,7 @@ class PoseTeam:
         for part in self.parts:
             rows = slice(start, start + len(part))
             start += len(part)
-            body = from_poses(part, fit.team.motion[rows] @ frame, part.seen.any(1), gravity, highest_hz)
+            body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
             out.append((body, fit.linear.residual[rows]))
         return out, noise
 

@@ -20,7 +20,7 @@ from steelyard.logs.log import Integers
 from steelyard.team.body_rows import BodyRows, Run
 
 # A band holds at least so many rows, and its upper end is at least so many times its lower one.
-ROWS, RATIO = 12, 1.35
+ROWS, RATIO = 30, 1.35
 # Share of a run, and seconds, over which it is faded in and out: the shorter.
 FADE_SHARE, FADE_S = 0.1, 1.0
 
@@ -48,13 +48,14 @@ def fade(rows: int, rate: float) -> Array:
     window = np.ones(rows)
     rise = 0.5 - 0.5 * np.cos(np.pi * (np.arange(ramp) + 0.5) / ramp)
     window[:ramp], window[-ramp:] = rise, rise[::-1]
-    return window / np.sqrt((window**2).mean())
+    return np.asarray(window / np.sqrt((window**2).mean()))
 
 
 def frequencies(run: Run, highest_hz: float) -> Array:
     """Return the frequencies [Hz] of the rows of a run that are used."""
     size = len(run.motion)
-    return np.arange(min(size, int(2 * size * highest_hz / run.rate) + 1)) * (run.rate / (2 * size))
+    rows = min(size, int(2 * size * highest_hz / run.rate) + 1)
+    return np.asarray(np.arange(rows) * (run.rate / (2 * size)), dtype=np.float64)
 
 
 def band_edges(recordings: Sequence[BodyRows], highest_hz: float) -> Array:

@@ -15,6 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.logs.log import Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
 from steelyard.team.pose_covariance import Spread
@@ -79,13 +80,13 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Tw
     return TwistFit(grasps, noise, Spread(spread, blind, std, turn), delays, std)
 
 
-def fused_twist(twist: Array, seen: Array, grasps: Pose, noise: Array) -> tuple[Array, Array]:
+def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[Array, Array]:
     """Return the payload's twist (T, 6) in R from those of all grasps (T, N, 6), and its covariance for a full row."""
     J, W = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
     each = np.einsum("nka,nk,nkb->nab", J, W, J)
     info = np.einsum("tn,nab->tab", seen.astype(float), each) if not seen.all() else np.array([each.sum(0)])
     pull = np.einsum("nka,nk,tnk->ta", J, W, twist * seen[..., None])
-    some = seen.any(1) if len(info) > 1 else np.ones(1, np.bool_)
+    some: Mask = np.asarray(seen.any(1)) if len(info) > 1 else np.ones(1, np.bool_)
     inverse = np.linalg.inv(np.where(some[:, None, None], info, np.eye(6)))
     return np.einsum("tab,tb->ta", np.broadcast_to(inverse, (len(twist), 6, 6)), pull), np.linalg.inv(each.sum(0))
 
@@ -114,9 +115,8 @@ def _pair(S: Array) -> tuple[Array, Array]:
     """Return rotation (3, 3) and position (3,) of the second robot's grasp in the first's from their scatter."""
     w_w, v_v = S[:3, 6:9], S[3:6, 9:12]
     values, axes = np.linalg.eigh(S[:3, :3])
-    candidates = [_wahba(w_w)]
+    candidates = [_wahba(w_w), _wahba(v_v)]
     if values[1] < ONE_AXIS**2 * values[2]:
-        candidates += [_wahba(v_v)]
         for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS):
             candidates.append(Rotation.exp(angle * axes[:, 2]).matrix @ candidates[0])
     found = [_position(S, R) for R in candidates]
@@ -178,7 +178,7 @@ def _scores(mixed: Array) -> Array:
     """Return sum ad(y_i)^T (P y)_i from sum (P y) (Pi y)^T."""
     count = len(mixed) // 6
     blocks = mixed.reshape(count, 6, count, 6)[np.arange(count), :, np.arange(count)]
-    return np.einsum("cak,nck->na", AD, blocks).ravel()
+    return np.asarray(np.einsum("cak,nck->na", AD, blocks).ravel())
 
 
 def _contracted(P: Array, S: Array) -> Array:
@@ -190,7 +190,7 @@ def _contracted(P: Array, S: Array) -> Array:
         half = np.einsum("cak,cjd->akjd", AD, p[i], optimize=True)
         half = np.einsum("akjd,kjl->ajdl", half, s[i], optimize=True)
         out[i] = np.einsum("ajdl,dbl->ajb", half, AD, optimize=True)
-    return out.reshape(6 * count, 6 * count)
+    return np.asarray(out.reshape(6 * count, 6 * count))
 
 
 def _solved(H: Array, g: Array, floor: Array, unknown: Array) -> tuple[Array, Array, Array]:

@@ -44,6 +44,15 @@ class TwistTeam:
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
         return cls(parts, fit, late)
 
+    def down(self) -> Array | None:
+        """Return the mean direction of gravity (3,) in R, None where nobody can tell it."""
+        told = [(_down(part, self.fit.grasps)) for part in self.parts]
+        rows = np.concatenate([down[level] for down, level in told])
+        if not len(rows):
+            return None
+        mean = rows.mean(0)
+        return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
+
     def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
 

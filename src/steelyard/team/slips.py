@@ -1,0 +1,158 @@
+"""A grasp that slips: found as a step of one grasp against all others, timed, and told from every other robot's.
+
+The residual of a robot against the motion that the others alone show is flat but for noise; a slip is a step in it.
+Means over a second before and after are compared; how much they differ by noise alone is measured on the log itself.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Rotation
+from steelyard.team.stacked import Stretch
+
+# [s] on either side that are averaged, and left out between, where the slip itself may last.
+WINDOW_S, GAP_S = 1.0, 0.1
+# A step counts from so many times its own spread (a chi-square of six numbers), and from this size [m, rad].
+THRESHOLD, LEAST_M, LEAST_RAD = 60.0, 1e-3, 2e-3
+# Share of rows of a window that must have been measured.
+FILLED = 0.5
+# [s] around a slip in which nothing of its robot is used.
+CLEAR_S = 0.2
+
+
+@dataclass(frozen=True)
+class Slip:
+    """A step of robot `robot` at row `row` of its recording, by `distance` [m] and `angle` [rad]."""
+
+    robot: int
+    row: int
+    distance: float
+    angle: float
+    score: float
+
+
+@dataclass(frozen=True, eq=False)
+class SlipAt:
+    """A slip in one recording at `time` [s]; `step` (6,) rotation and position of the grasp after it, in its own axes.
+
+    Without a step the rows after it are left out of everything.
+    """
+
+    recording: int
+    time: float
+    slip: Slip
+    step: Array | None = None
+
+    def renewed(self, apart: Array, seen: Mask, part: Stretch) -> SlipAt:
+        """Return the slip from the residuals (T, 6) of its robot against the others' motion."""
+        score = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)))[0]
+        row = int(np.argmax(score))
+        middle = part.time[row]
+        after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
+        full = apart[after].mean(0) - apart[before].mean(0)
+        angle, distance = float(np.linalg.norm(full[:3])), float(np.linalg.norm(full[3:]))
+        slip = Slip(self.slip.robot, row, distance, angle, float(score[row]))
+        return replace(self, time=float(middle), slip=slip, step=full)
+
+    def applied(self, parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        """Return the recordings without the slipped grasp's poses from then on, its wrench moved to where it was."""
+        out, robot = list(parts), self.slip.robot
+        for number in range(self.recording, len(parts)):
+            part = parts[number]
+            after = part.time > self.time if number == self.recording else np.ones(len(part), np.bool_)
+            near = np.abs(part.time - self.time) < CLEAR_S
+            seen, felt, wrench = part.seen.copy(), part.felt.copy(), part.wrench.copy()
+            seen[after | near, robot] = False
+            felt[near, robot] = False
+            if self.step is None:
+                felt[after, robot] = False
+            else:
+                turn = Rotation.exp(self.step[:3])
+                force, moment = (turn.apply(wrench[after, robot, k : k + 3]) for k in (3, 0))
+                wrench[after, robot, 3:] = force
+                wrench[after, robot, :3] = moment + np.cross(self.step[3:], force)
+            out[number] = replace(part, seen=seen, felt=felt, wrench=wrench)
+        return tuple(out)
+
+    def finding(self, log: TeamLog) -> Finding:
+        """Return the finding with robot, time and size."""
+        name, record = log.names[self.slip.robot], log.recordings[self.recording].name
+        size = f"{1e3 * self.slip.distance:.1f} mm and {np.rad2deg(self.slip.angle):.2f} deg"
+        return Finding.of(
+            "grasp-slipped",
+            f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'; from there on its poses are "
+            "left out and its forces act from where it then was.",
+        )
+
+
+def edited(
+    edit: Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]], slips: Sequence[SlipAt]
+) -> Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]:
+    """Return an edit of recordings after which slips are taken out too."""
+
+    def both(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        parts = edit(parts)
+        for slip in slips:
+            parts = slip.applied(parts)
+        return parts
+
+    return both
+
+
+def alone(residual: Array, J: Array, W: Array) -> Array:
+    """Return residuals (T, N, 6) against the motion that the other robots show, from those of the joint fit.
+
+    J (N, 6, 6), W (N, 6) as in the fit, all robots present.
+    """
+    A = np.linalg.inv(np.einsum("nia,ni,nib->ab", J, W, J))
+    out = np.empty_like(residual)
+    for i in range(len(J)):
+        held = J[i] @ A @ J[i].T * W[i]
+        left, value, right = np.linalg.svd(np.eye(6) - held)
+        # With two robots in all, what the joint fit shared between them is doubled; nothing is unseen.
+        inverse = right.T @ np.diag(1 / np.maximum(value, 1e-3)) @ left.T
+        out[:, i] = residual[:, i] @ inverse.T
+    return out
+
+
+def find_slip(apart: Array, seen: Mask, rate: float) -> Slip | None:
+    """Return the clearest slip of one recording, None where there is none.
+
+    apart  (T, N, 6) rotation vector and position of each grasp against what the others say
+    """
+    width, gap = round(WINDOW_S * rate), max(1, round(GAP_S * rate / 2))
+    rows, count = seen.shape
+    if rows < 4 * (width + gap) or count < 2:
+        return None
+    best: Slip | None = None
+    for i in range(count):
+        score, step = _steps(apart[:, i], seen[:, i], width, gap)
+        row = int(np.argmax(score))
+        angle, distance = float(np.linalg.norm(step[row, :3])), float(np.linalg.norm(step[row, 3:]))
+        large = distance > LEAST_M or angle > LEAST_RAD
+        if score[row] > THRESHOLD and large and (best is None or score[row] > best.score):
+            best = Slip(i, row, distance, angle, float(score[row]))
+    return best
+
+
+def _steps(apart: Array, seen: Mask, width: int, gap: int) -> tuple[Array, Array]:
+    """Return, for every row, how clear a step there is (T,) and the step (T, 6)."""
+    total = np.cumsum(np.concatenate([np.zeros((1, 7)), np.column_stack([apart * seen[:, None], seen])]), axis=0)
+    middle = np.arange(width + gap, len(seen) - width - gap)
+    before = total[middle - gap] - total[middle - gap - width]
+    after = total[middle + gap + width] - total[middle + gap]
+    good = (before[:, 6] > FILLED * width) & (after[:, 6] > FILLED * width)
+    step = after[:, :6] / np.maximum(after[:, 6:], 1) - before[:, :6] / np.maximum(before[:, 6:], 1)
+    spread = np.median(np.abs(step[good]), axis=0) / 0.6745 if good.any() else np.full(6, np.inf)
+    score, full = np.zeros(len(seen)), np.zeros((len(seen), 6))
+    score[middle[good]] = ((step[good] / np.maximum(spread, 1e-9)) ** 2).sum(1)
+    full[middle] = step
+    return score, full

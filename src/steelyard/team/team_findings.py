@@ -1,0 +1,127 @@
+"""What the joint answer must say beside its numbers: directions not shown, clocks, bad robots, gains, open inertia."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.log import Mask
+from steelyard.spatial import Pose
+from steelyard.team.estimate import GraspEstimate
+
+# A clock is called late from so much [s] and so many standard deviations.
+LATE_S, LATE_STD = 1e-3, 3.0
+# A robot's poses are bad from so many times the noise of the middle one of the team.
+BAD = 20.0
+# A gain error is worth a word from this share.
+GAIN = 3e-3
+# A direction is called by an axis where it is within this cosine of it.
+ALONG = 0.9
+AXES = ("x", "y", "z")
+
+
+def lost_directions(grasps: Mapping[str, GraspEstimate], down: Array | None) -> Iterator[Finding]:
+    """Yield grasp-direction-lost for every grasp and direction in words; `down` (3,) is gravity in R, where known."""
+    for name, grasp in grasps.items():
+        if not len(grasp.lost):
+            continue
+        words = [_in_words(direction, down, name) for direction in _sparse(grasp.lost)]
+        turned = np.linalg.matrix_rank(grasp.lost[:, :3], tol=1e-2)
+        kinds = len(words)
+        if turned == 0 and kinds == 1:
+            why = "all rotation so far was about one axis. Tilt the payload about another axis"
+        elif turned == 0:
+            why = "the payload has not turned. Turn it about two axes"
+        else:
+            why = "the payload has turned about one fixed axis or not at all. Turn it about two axes and move it about"
+        yield Finding.of("grasp-direction-lost", f"{_listed(words)}: {why}.")
+
+
+def _sparse(lost: Array) -> Array:
+    """Return a basis of the lost space with pure positions first, then what turns."""
+    turning = lost[:, :3]
+    u, s, _ = np.linalg.svd(turning)
+    rank = int((s > 1e-2).sum())
+    mixed = u.T @ lost
+    mixed[rank:, :3] = 0.0
+    rows = mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-300)
+    return np.asarray(np.concatenate([rows[rank:], rows[:rank]]))
+
+
+def _in_words(direction: Array, down: Array | None, name: str) -> str:
+    """Return what a lost direction (6,) is: a place along an axis, or a turn about one."""
+    turn, place = direction[:3], direction[3:]
+    turning = float(np.linalg.norm(turn)) > 0.1
+    axis = turn if turning else place
+    axis = axis / max(float(np.linalg.norm(axis)), 1e-300)
+    if down is not None and abs(float(axis @ down)) > ALONG * float(np.linalg.norm(down)):
+        return (
+            f"turn of grasp '{name}' about the vertical" if turning else f"height of grasp '{name}' along the vertical"
+        )
+    biggest = int(np.argmax(np.abs(axis)))
+    if abs(axis[biggest]) > ALONG:
+        where = f"{AXES[biggest]} of the reference grasp"
+    else:
+        where = f"({axis[0]:.2f}, {axis[1]:.2f}, {axis[2]:.2f}) of the reference grasp"
+    return f"turn of grasp '{name}' about {where}" if turning else f"position of grasp '{name}' along {where}"
+
+
+def _listed(words: Sequence[str]) -> str:
+    unique = list(dict.fromkeys(words))
+    text = unique[0] if len(unique) == 1 else f"{', '.join(unique[:-1])} and {unique[-1]}"
+    return text[0].upper() + text[1:]
+
+
+def late_clocks(late: Mapping[str, float], std: Mapping[str, float]) -> Iterator[Finding]:
+    """Yield clock-offset for every robot whose stamps are late or early beyond doubt."""
+    for name, seconds in late.items():
+        doubt = std.get(name, 0.0)
+        if abs(seconds) > max(LATE_S, LATE_STD * doubt):
+            way = "late" if seconds > 0 else "early"
+            text = f"The stamps of '{name}' are {1e3 * abs(seconds):.1f} +- {1e3 * doubt:.1f} ms {way}"
+            yield Finding.of("clock-offset", f"{text} against the reference; they were put right.")
+
+
+def bad_robots(names: Sequence[str], noise: Array) -> Iterator[Finding]:
+    """Yield robot-excluded for robots whose poses or twists (noise (N, 2)) disagree far more than the others'."""
+    if len(names) < 3:
+        return
+    share = (noise / np.median(noise, axis=0)).max(1)
+    for name, times in zip(names, share, strict=True):
+        if times > BAD:
+            yield Finding.of(
+                "robot-excluded",
+                f"What '{name}' says of its motion disagrees with the others {times:.0f} times more than theirs do; "
+                "it counts for next to nothing.",
+            )
+
+
+def gains(gain: float) -> Iterator[Finding]:
+    """Yield common-gain-unseen where the recordings show that force gains err."""
+    if gain > GAIN:
+        yield Finding.of(
+            "common-gain-unseen",
+            f"Force gains err by about {100 * gain:.1f} % from axis to axis; an error that all robots share would look "
+            "like mass, and the error bars do not hold it.",
+        )
+
+
+def open_parameters(identified: Mask, rank: int) -> Iterator[Finding]:
+    """Yield inertia-not-identified where some of the inertia is left open."""
+    if not identified[4:].all():
+        yield Finding.of(
+            "inertia-not-identified",
+            f"The rows fix {rank} of the ten parameters; the inertia is not given. Turn the payload about all three "
+            "axes, faster and slower.",
+        )
+
+
+def vertical(gravity: Array | None, poses: Pose | None) -> Array | None:
+    """Return the mean direction of gravity in R from its direction in H and the payload's path X_HR (T,)."""
+    if gravity is None or poses is None:
+        return None
+    mean = poses.rotation.inverse().apply(gravity).mean(0)
+    return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
