@@ -42,7 +42,7 @@ def _write(shape: Shape, output: Path) -> None:
 
 def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
     made, parts = shape.segmentation, shape.parts
-    sureness = [] if made.cuts is None else made.sureness
+    sureness: Any = [] if made.cuts is None else made.sureness
     return {
         "volume_m3": shape.solid.mesh.volume,
         "volume_std_m3": shape.solid.volume_std * shape.solid.mesh.volume,
