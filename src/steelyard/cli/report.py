@@ -16,9 +16,10 @@ from steelyard.errors import BadValue
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
     from steelyard.parts.parts import Parts
-    from steelyard.report import Residuals, Scene, Truth
+    from steelyard.report import Report, Residuals, Scene, Truth
     from steelyard.shape.cloud import Cloud
     from steelyard.spatial import Pose
+    from steelyard.team.estimate import TeamEstimate
 
 _FILE = click.Path(path_type=Path)
 _SAME_VOLUME = 0.02
@@ -42,25 +43,28 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
     """Write one self-contained page about RESULT (.json): numbers, parts in 3D, residuals, findings."""
     from steelyard.io import read_result
     from steelyard.report import Report, write_report
+    from steelyard.team.estimate import TeamEstimate
 
     if scan is not None and parts is None:
         raise BadValue("--scan colours the parts that --parts gives: give both, or leave --scan out.")
     estimate = read_result(result)
-    facts = None if truth is None else _Facts.read(truth, estimate)
-    of_log, residuals = (None, None) if log is None else _from_log(log, data, estimate)
-    placed = _given_pose(pose_in_sensor) or of_log or (None if facts is None else facts.X_SO)
-    scene, names = (None, {}) if parts is None else _scene(parts, scan, placed, estimate)
-    page = Report(
-        title or f"{result.stem}: what the robot holds",
-        estimate,
-        scene,
-        residuals,
-        {name: read_result(path) for name, path in map(_rival, rivals)},
-        None if facts is None else facts.truth,
-        names if facts is None else {**names, **facts.names},
-        {"command": "steelyard " + " ".join(sys.argv[1:])},
-    )
+    others = {name: read_result(path) for name, path in map(_rival, rivals)}
+    said = {"command": "steelyard " + " ".join(sys.argv[1:])}
+    if isinstance(estimate, TeamEstimate):
+        if parts is not None or truth is not None or pose_in_sensor is not None:
+            raise BadValue("A team's result has no parts to draw: leave --parts, --truth and --pose-in-sensor out.")
+        page = _of_team(title or f"{result.stem}: what the team carries", estimate, log, data, others, said)
+    else:
+        facts = None if truth is None else _Facts.read(truth, estimate)
+        of_log, residuals = (None, None) if log is None else _from_log(log, data, estimate)
+        placed = _given_pose(pose_in_sensor) or of_log or (None if facts is None else facts.X_SO)
+        drawing, names = (None, {}) if parts is None else _scene(parts, scan, placed, estimate)
+        known = None if facts is None else facts.truth
+        names = names if facts is None else {**names, **facts.names}
+        heading = title or f"{result.stem}: what the robot holds"
+        page = Report(heading, estimate, drawing, residuals, others, known, names, said)
     write_report(page, output)
+    scene = page.scene
     drawn = 0 if scene is None else len(scene.bodies)
     size = output.stat().st_size
     if as_json:
@@ -104,6 +108,22 @@ class _Facts:
             if isinstance(mass, float | int):
                 masses[label] = float(mass)
         return cls(Truth(body.in_frame(X_SO), masses), names, X_SO)
+
+
+def _of_team(
+    title: str,
+    estimate: TeamEstimate,
+    log: Path | None,
+    data: Path | None,
+    rivals: Mapping[str, Estimate],
+    provenance: Mapping[str, str],
+) -> Report:
+    """Return the page of a team's result, with the residuals of its log."""
+    from steelyard.io import read_team
+    from steelyard.report.team_page import team_page
+
+    rows = None if log is None else read_team(log, data)
+    return team_page(title, estimate, rows, rivals=rivals, provenance=provenance)
 
 
 def _given_pose(pose_in_sensor: str | None) -> Pose | None:

@@ -66,8 +66,9 @@ def _grasp(path: Path, name: str, entry: Any) -> GraspEstimate:
     if not isinstance(entry, dict):
         raise BadFile(f'{path}: the grasp of "{name}" must be one object with rotation and position_m.')
     where = f'the grasp of "{name}"'
+    matrix = _array(path, entry, "rotation", where, lambda s: s == (3, 3))
     try:
-        turn = Rotation(_array(path, entry, "rotation", where, lambda s: s == (3, 3)))
+        turn = Rotation(matrix)
     except BadInput as error:
         raise BadFile(f"{path}: {where}: {error}") from None
     place = _array(path, entry, "position_m", where, lambda s: s == (3,))

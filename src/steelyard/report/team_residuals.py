@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadValue
 from steelyard.logs.log import MotionLog
 from steelyard.logs.team_conditioning import condition
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -21,7 +22,13 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     """Return the residuals in the reference grasp of all rows with complete wrenches, below 3 Hz; None without any.
 
     Recordings follow each other without the pauses between them. The motion is the mean over the robots that saw it.
+    Raises BadValue where the log is another team's.
     """
+    if set(log.names) != set(estimate.grasps) or log.reference != estimate.reference:
+        raise BadValue(
+            f"the log must be that of the result; it is of {', '.join(log.names)} with reference '{log.reference}', the "
+            f"result of {', '.join(estimate.grasps)} with '{estimate.reference}'."
+        )
     grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
     start, parts = 0.0, []
     for recording in log.recordings:
