@@ -371,3 +371,29 @@ def test_a_team_of_poses_and_six_axis_wrists(tmp_path: Path) -> None:
     )
     made = simulate_team(scene, 1)
     assert_same(made.log, read_team(write_team(made.log, tmp_path / "t.toml")), 1e-5)
+
+
+def test_the_description_that_the_format_shows(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs" / "formats.md").read_text()
+    (tmp_path / "team.toml").write_text(
+        text.split("## Team description (TOML)")[1].split("```toml\n")[1].split("```")[0]
+    )
+    made = omnids()
+    motion, joints = made.log.recordings[-1], made.joints[-1]["robot1"]
+    left = motion.tracks["robot0"]
+    columns = {
+        "left": ("t,qw,qx,qy,qz,x,y,z,wx,wy,wz,fx,fy,fz", [
+            left.time[:, None], left.pose.rotation.quaternion_wxyz(), left.pose.position, 0 * left.pose.position,
+            left.channels["force"],
+        ]),
+        "right": ("t,q1,q2,q3,q4,q5,q6,tau1,tau2,tau3", [joints.time[:, None], joints.angles, joints.torques]),
+    }  # fmt: skip
+    for name, (head, parts) in columns.items():
+        np.savetxt(tmp_path / f"{name}.csv", np.concatenate(parts, 1), delimiter=",", header=head, comments="")
+    log = read_team(tmp_path / "team.toml")
+    assert (log.names, log.reference) == (("left", "right"), "left")
+    assert log.force_only("left")
+    assert log.force_only("right")
+    np.testing.assert_allclose(log.recordings[0].tracks["left"].channels["force"], left.channels["force"])
+    expected = motion.tracks["robot1"].channels["position"]
+    np.testing.assert_allclose(log.recordings[0].tracks["right"].channels["position"], expected, atol=1e-12)

@@ -26,8 +26,8 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     """
     if set(log.names) != set(estimate.grasps) or log.reference != estimate.reference:
         raise BadValue(
-            f"the log must be that of the result; it is of {', '.join(log.names)} with reference '{log.reference}', the "
-            f"result of {', '.join(estimate.grasps)} with '{estimate.reference}'."
+            f"the log must be that of the result; it is of {', '.join(log.names)} with reference '{log.reference}', "
+            f"the result of {', '.join(estimate.grasps)} with '{estimate.reference}'."
         )
     grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
     start, parts = 0.0, []
