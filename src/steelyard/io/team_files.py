@@ -23,7 +23,7 @@ from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
 from steelyard.logs.team_track import Track
 from steelyard.robots.omnid import Omnid
 
-# Readings may pass a stop by play and by the zero of an encoder; by more than this [rad] they are other columns.
+# Readings may pass a stop by play and by the zero of an encoder; where most do by more than this [rad] they are others.
 _BEYOND = np.deg2rad(25.0)
 
 
@@ -204,4 +204,8 @@ def _require_likely(robot: Omnid, joints: Array) -> None:
     """Raise BadValue where joint angles (T, 6) [rad] are those of no Omnid, so that columns or units are others."""
     low, high = robot.arm_limits
     x, y, z = (stop + _BEYOND for stop in robot.gimbal_stops)
-    replace(robot, arm_limits=(low - _BEYOND, high + _BEYOND), gimbal_stops=(x, y, z)).require_within(joints)
+    wide = replace(robot, arm_limits=(low - _BEYOND, high + _BEYOND), gimbal_stops=(x, y, z))
+    try:
+        wide.require_within(np.median(joints, axis=0))
+    except BadValue:
+        wide.require_within(joints)

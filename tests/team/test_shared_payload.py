@@ -1,0 +1,68 @@
+"""The pipeline of a team: two methods through one door, rows that miss numbers said."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_track import Track
+from steelyard.pipelines.shared_payload import METHODS, identify_team
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import CASES, TeamScene
+from steelyard.team import TeamEstimate
+
+
+@cache
+def trial() -> TeamTrial:
+    return simulate_team(TeamScene(CASES["A"], motion_samples=1500), 5)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_both_methods_find_the_payload(method: str) -> None:
+    found = sy.identify_team(trial().log, method)  # type: ignore[arg-type]
+    assert isinstance(found, TeamEstimate)
+    assert found.method == method
+    assert found.mass == pytest.approx(12, abs=0.02)
+    assert np.linalg.norm(found.com - trial().truth.body.com) < 0.004
+    assert found.findings == ()
+
+
+def test_a_method_that_is_none_is_refused() -> None:
+    with pytest.raises(BadValue, match=r"method must be one of joint, paper; got 'best'."):
+        identify_team(trial().log, "best")  # type: ignore[arg-type]
+
+
+def with_gap(log: TeamLog, begin: int, end: int) -> TeamLog:
+    """Return the log without the force of robot1 in these rows of the last recording."""
+    *others, motion = log.recordings
+    track = motion.tracks["robot1"]
+    force = np.array(track.channels["force"])
+    force[begin:end] = np.nan
+    cut = Track.of(track.time, rotation=track.channels["rotation"], position=track.channels["position"], force=force)
+    return log.with_recordings(*others, TeamRecording("motion", {**motion.tracks, "robot1": cut}, motion.name))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_missing_rows_are_said_and_cost_only_their_data(method: str) -> None:
+    whole, cut = (identify_team(log, method) for log in (trial().log, with_gap(trial().log, 400, 700)))  # type: ignore[arg-type]
+    (said,) = [f for f in cut.findings if f.code == "rows-missing"]
+    assert said.message == "'robot1' has no number in 300 of 1500 rows of 'motion-5' (force)."
+    # Poses are whole, so the grasps are what they were; the payload is as well known as the other rows allow.
+    for name, grasp in whole.grasps.items():
+        np.testing.assert_allclose(cut.grasps[name].pose.position, grasp.pose.position, atol=2e-5)
+    moments = trial().truth.moments
+    assert cut.principal_moments is not None
+    np.testing.assert_allclose(cut.principal_moments, moments, rtol=0.03)
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_no_forces_no_payload(method: str) -> None:
+    log = trial().log
+    bare = [TeamRecording(r.kind, {n: t.without("force") for n, t in r.tracks.items()}, r.name) for r in log.recordings]
+    with pytest.raises(CannotAnswer, match="no robot of the team measured a force"):
+        identify_team(log.with_recordings(*bare), method)  # type: ignore[arg-type]
