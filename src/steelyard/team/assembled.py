@@ -20,13 +20,21 @@ from steelyard.team.payload_doubt import moved_by_gains, moved_by_grasps
 from steelyard.team.payload_fit import SHOWN, PayloadFit
 from steelyard.team.pose_covariance import Spread
 
+# [m] What is taken for the size of a team where the motion does not show where its grasps are.
+UNKNOWN_SIZE = 1.0
+
+
+def team_size(grasps: Pose, spread: Spread) -> float:
+    """Return how far the grasps are from their middle [m], as far as that is known."""
+    return max(reach(grasps), UNKNOWN_SIZE) if spread.blind.size else reach(grasps)
+
 
 def assembled(
     log: TeamLog, grasps: Pose, spread: Spread, payload: PayloadFit, D: Array, late: Mapping[str, float]
 ) -> TeamEstimate:
     """Return the estimate of a team whose grasps (N,) in R are known to within `spread`."""
     balance = balance_frame(grasps)
-    spread = spread.with_lost(reach(grasps))
+    spread = spread.with_lost(team_size(grasps, spread))
     moved = moved_by_grasps(payload, balance.inverse() @ grasps)
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
     body = InertialParameters(consistent(payload.parameters, payload.covariance, payload.scale)).in_frame(balance)

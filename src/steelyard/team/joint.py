@@ -13,8 +13,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.assembled import assembled
-from steelyard.team.body_rows import BodyRows, balance_frame, reach, summing
+from steelyard.team.assembled import assembled, team_size
+from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
@@ -55,7 +55,8 @@ class JointTeam:
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
         groups = _groups(made, path, self.highest_hz, order)
-        D, size = summing(balance_frame(grasps).inverse() @ grasps), reach(grasps)
+        D = summing(balance_frame(grasps).inverse() @ grasps)
+        size = team_size(grasps, spread)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
         team = assembled(log, grasps, spread, payload, D, late)

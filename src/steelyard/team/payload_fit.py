@@ -20,6 +20,7 @@ from steelyard.team.payload_model import ROUNDING, Group, Normal, normal, residu
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
 BIAS = np.geomspace(1e-3, 10.0, 13)
+# That gains have no error at all is beforehand as likely as all other sizes together.
 GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
 ROUNDS = 4
 # Noise has settled where it changes by less than this share.
@@ -73,7 +74,8 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             for part in group.parts
         ]
         models = _Models.of(normals, C, ladder, scale)
-        weight = np.exp(models.evidence - models.evidence.max())
+        chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(len(GAIN) - 1), 0.0)
+        weight = np.exp(chance - chance.max())
         weight /= weight.sum()
         phi, best = weight @ models.phi, int(np.argmax(weight))
         renewed = tuple(_judged(g, D, models, best, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
@@ -90,8 +92,9 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
     blind = tuple(tuple(models.blind[best, a:b]) for a, b in pairwise(starts))
     noise = sum((n.noise for n in normals), np.zeros((10, 10)))
-    values, vectors = np.linalg.eigh((models.information[best] - noise) * np.outer(scale, scale))
-    shown = _shown(values)
+    unit = np.outer(scale, scale)
+    values, vectors = np.linalg.eigh((models.information[best] - noise) * unit)
+    shown = _shown(values, vectors, noise * unit)
     condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
     return PayloadFit(
         phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, float(bias), float(gain),
@@ -187,16 +190,20 @@ def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
     of this mass and size can be.
     """
     values, vectors = np.linalg.eigh(full - noise)
-    shown = _shown(values)
+    shown = _shown(values, vectors, noise)
     inverse = (vectors * np.where(shown, 1 / np.where(shown, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
     lost = vectors * ~shown[:, None]
     covariance = inverse @ full @ inverse + lost @ lost.swapaxes(1, 2)
     return (inverse @ right[..., None])[..., 0], covariance
 
 
-def _shown(values: Array) -> Mask:
-    """Return which rising information (..., 10), in units of what a body can be, is more than noise and rounding."""
-    return np.asarray((values > SHOWN**-2.0) & (values > RANK * values[..., -1:]))
+def _shown(values: Array, vectors: Array, noise: Array) -> Mask:
+    """Return which rising information (..., 10), in units of what a body can be, is more than noise and rounding.
+
+    What noise in the motion alone would seem to say, `noise`, is known to no better than its own size.
+    """
+    seeming = np.einsum("...pk,pq,...qk->...k", vectors, noise, vectors)
+    return np.asarray((values > SHOWN**-2.0) & (values > RANK * values[..., -1:]) & (values > seeming))
 
 
 def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> Group:

@@ -198,5 +198,6 @@ def _gravity(log: TeamLog, homes: Pose) -> Array:
     said = [homes[i].rotation.apply(r.gravity) for i, r in enumerate(log.robots) if r.gravity is not None]
     if not said:
         raise CannotAnswer("somebody must know where gravity points: give [team] gravity for level bases.")
-    own = log.robot(log.reference).gravity
-    return np.asarray(said[0] if own is None else own)
+    size = np.mean([np.linalg.norm(one) for one in said])
+    mean = np.mean(said, axis=0)
+    return np.asarray(mean * (size / np.linalg.norm(mean)))

@@ -67,9 +67,9 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Tw
         full = np.zeros(6 * data.count)
         full[unknown] = step
         grasps, noise = grasps @ exp(full.reshape(-1, 6)), new
-    factor = np.sqrt(_inflation(data, grasps, noise, H, unknown))
+    factor = np.sqrt(_inflation(data, grasps, noise, H + floor, unknown))
     size = factor[(unknown % 6) // 3]
-    covariance = inverse @ (H[np.ix_(unknown, unknown)] * np.outer(size, size)) @ inverse
+    covariance = inverse @ ((H + floor)[np.ix_(unknown, unknown)] * np.outer(size, size)) @ inverse
     spread = np.zeros((6 * data.count, 6 * data.count))
     spread[np.ix_(unknown, unknown)] = covariance
     blind = np.zeros((6 * data.count, lost.shape[1]))

@@ -1,0 +1,258 @@
+"""Laws of the joint estimator, from a log of a whole team to its answer."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.inertia import InertialParameters, forms
+from steelyard.logs.team_log import TeamRecording
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import EXACT, Presence, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_motions import Freedom
+from steelyard.spatial import Pose, Rotation
+from steelyard.team import TeamEstimate
+from steelyard.team.adjoint import log as pose_log
+from steelyard.team.consistent import consistent
+from steelyard.team.joint import JointTeam
+from steelyard.team.twist_fit import fit_twists
+from steelyard.team.twist_rows import twist_stretches
+from steelyard.team.twist_statistic import TwistScatter
+
+QUIET = TeamNoise(
+    pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.2, torque_white_Nm=0.02
+)
+X, Y, Z = np.eye(3)
+
+
+def trial(noise: TeamNoise = QUIET, seed: int = 100, **changes: Any) -> TeamTrial:
+    scene: dict[str, Any] = {"sensing": "poses", "kinds": ("still", "motion"), "motion_samples": 1500} | changes
+    return simulate_team(TeamScene(noise, scene.pop("robots", 3), **scene), seed)
+
+
+def error(made: TeamTrial, found: TeamEstimate) -> Array:
+    """Largest grasp error [rad, m], error of mass [kg], centre of mass [m] and principal moments [kg m^2]."""
+    grasps = np.array([found.grasps[n].pose.matrix() for n in made.log.names])
+    apart = np.abs(pose_log(made.truth.grasps.inverse() @ Pose.from_matrix(grasps)))
+    body = made.truth.body
+    moments = found.principal_moments
+    assert moments is not None
+    return np.array(
+        [
+            apart[:, :3].max(),
+            apart[:, 3:].max(),
+            abs(found.mass - float(body.mass)),
+            float(np.linalg.norm(found.com - body.com)),
+            float(np.abs(moments - made.truth.moments).max()),
+        ]
+    )
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+@pytest.mark.parametrize("robots", [3, 5])
+def test_exact_logs_give_exact_answers(sensing: str, robots: int) -> None:
+    made = trial(EXACT, sensing=sensing, robots=robots, bases_move=sensing == "twists")
+    found = JointTeam().identify(made.log)
+    assert (error(made, found) < [1e-8, 1e-8, 1e-4, 1e-5, 1e-4]).all()
+    assert found.evidence.rank == 10
+    assert found.identified.all()
+    assert not found.findings
+
+
+def test_errors_are_of_the_size_that_is_said() -> None:
+    scores = []
+    for seed in range(12):
+        made = trial(seed=seed, motion_samples=1000)
+        found = JointTeam().identify(made.log)
+        body, upper = made.truth.body, np.triu_indices(3)
+        off = [[found.mass - float(body.mass)], found.com - body.com]
+        off.append((found.parameters.inertia_com - body.inertia_com)[upper])
+        scores.append(np.concatenate(off) / found.std)
+    assert 0.6 < np.sqrt(np.mean(np.square(scores))) < 1.5
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+def test_relabelled_robots_give_the_same_answer(sensing: str) -> None:
+    made = trial(sensing=sensing, bases_move=sensing == "twists")
+    log = made.log
+    order = (0, 2, 1)
+    other = replace(log, robots=tuple(log.robots[i] for i in order))
+    one, two = JointTeam().identify(log), JointTeam().identify(other)
+    np.testing.assert_allclose(two.parameters.vector, one.parameters.vector, rtol=1e-6, atol=1e-6)
+    for name in log.names:
+        np.testing.assert_allclose(two.grasps[name].pose.matrix(), one.grasps[name].pose.matrix(), atol=1e-7)
+
+
+def test_another_reference_gives_the_same_body_and_grasps() -> None:
+    made = trial()
+    one = JointTeam(clocks=False).identify(made.log)
+    two = JointTeam(clocks=False).identify(made.log.with_reference("robot2"))
+    X_02 = one.grasps["robot2"].pose
+    np.testing.assert_allclose(
+        (X_02 @ two.grasps["robot1"].pose).matrix(), one.grasps["robot1"].pose.matrix(), atol=1e-6
+    )
+    moved = two.parameters.in_frame(X_02)
+    np.testing.assert_allclose(moved.vector, one.parameters.vector, rtol=1e-5, atol=1e-5)
+
+
+def test_moved_homes_change_nothing() -> None:
+    made = trial()
+    homes = {
+        n: Pose(Rotation.exp(np.array([0.3, -0.2, 1.0 + i])), np.array([i, 2.0, -1.0]))
+        for i, n in enumerate(made.log.names)
+    }
+    one, two = JointTeam().identify(made.log), JointTeam().identify(made.log.with_homes(homes))
+    np.testing.assert_allclose(two.parameters.vector, one.parameters.vector, rtol=1e-6, atol=1e-6)
+
+
+def test_the_statistic_of_twists_adds_over_time() -> None:
+    made = trial(sensing="twists", bases_move=True, kinds=("motion",))
+    whole = twist_stretches(made.log, {})
+    statistic = TwistScatter.of(whole)
+    size = 6 * 3
+    rows = whole[0].twist.reshape(-1, size)
+    np.testing.assert_allclose(statistic.merged().scatter[0][:size, :size], rows.T @ rows, rtol=1e-12, atol=1e-12)
+    both = fit_twists(statistic + statistic, 0, made.log.names)
+    once = fit_twists(statistic, 0, made.log.names)
+    np.testing.assert_allclose(both.grasps.position, once.grasps.position, atol=1e-5)
+    np.testing.assert_allclose(both.spread.full[6:12, 6:12], once.spread.full[6:12, 6:12] / 2, rtol=0.5, atol=1e-9)
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+def test_a_late_clock_is_found_and_put_right(sensing: str) -> None:
+    made = trial(sensing=sensing, bases_move=sensing == "twists", late_s={1: 0.013})
+    found = JointTeam().identify(made.log)
+    assert abs(found.clock_offsets_s["robot1"] - 0.013) < 5e-4
+    assert "clock-offset" in found.codes()
+    blind = JointTeam(clocks=False).identify(made.log)
+    assert error(made, blind)[1] > 5 * error(made, found)[1]
+
+
+# Freedom of rotation and translation, ranks of the grasps' lost directions and of the wrench side.
+MOTIONS = {
+    "general": (Freedom.general(), 0, 10),
+    "two axes": (Freedom(np.eye(3)[:, :2], np.eye(3)), 0, 10),
+    "planar": (Freedom(np.eye(3)[:, 2:], np.eye(3)[:, :2]), 1, 7),
+    "translation": (Freedom(np.zeros((3, 0)), np.eye(3)), 3, 4),
+}
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_what_a_motion_does_not_show_is_named(motion: str, sensing: str) -> None:
+    freedom, lost, rank = MOTIONS[motion]
+    quiet = replace(QUIET, pose_rad=1e-4, pose_m=1e-4)
+    made = trial(quiet, freedom=freedom, sensing=sensing, bases_move=sensing == "twists", kinds=("motion",))
+    found = JointTeam().identify(made.log)
+    assert [len(found.grasps[n].lost) for n in made.log.names] == [0, lost, lost]
+    assert found.evidence.rank == rank
+    assert ("grasp-direction-lost" in found.codes()) == (lost > 0)
+    assert (found.inertia_com is None) == (rank < 10)
+    if motion == "planar":
+        text = next(f.message for f in found.findings if f.code == "grasp-direction-lost")
+        assert "Height of grasp 'robot1' along the vertical: all rotation so far was about one axis" in text
+
+
+def test_still_poses_alone_fix_mass_and_centre() -> None:
+    made = trial(kinds=("grasp", "still"))
+    recordings = [r for r in made.log.recordings if r.kind == "still"]
+    grasp = next(r for r in made.log.recordings if r.kind == "grasp")
+    dumb = TeamRecording("grasp", {n: t.without("force") for n, t in grasp.tracks.items()}, "grasp")
+    found = JointTeam().identify(made.log.with_recordings(dumb, *recordings))
+    assert found.evidence.rank == 4
+    assert found.identified[:4].all()
+    assert found.inertia_com is None
+    assert abs(found.mass - 12) < 0.1
+    assert np.linalg.norm(found.com - made.truth.body.com) < 0.02
+
+
+def test_two_robots_with_gimbals_work_in_motion() -> None:
+    made = trial(EXACT, robots=2, six_axis=frozenset({0}), kinds=("motion",))
+    found = JointTeam().identify(made.log)
+    assert (error(made, found) < [1e-8, 1e-8, 1e-3, 1e-4, 1e-3]).all()
+
+
+def test_mixed_wrists() -> None:
+    made = trial(six_axis=frozenset({1}))
+    assert (error(made, JointTeam().identify(made.log)) < [2e-3, 2e-3, 0.03, 0.01, 0.2]).all()
+
+
+def test_a_slip_is_found_timed_and_isolated() -> None:
+    made = trial(slip=Slip(1, np.array([0.003, 0.004, 0.0]), 7.0), kinds=("motion",), motion_samples=1500)
+    found = JointTeam().identify(made.log)
+    (slipped,) = [f for f in found.findings if f.code == "grasp-slipped"]
+    assert "grasp of 'robot1' slipped by 5.0 mm" in slipped.message
+    time = float(slipped.message.split(" at ")[1].split(" s of")[0])
+    assert abs(time - 7.05) < 0.3
+    assert error(made, found)[1] < 2e-3
+
+
+def test_no_slip_without_one() -> None:
+    for seed in range(6):
+        assert "grasp-slipped" not in JointTeam().identify(trial(seed=seed).log).codes()
+
+
+def test_a_robot_that_leaves_is_told_from_one_whose_data_are_missing() -> None:
+    left = trial(robots=4, presence=(Presence(2, leaves=8.0),))
+    found = JointTeam().identify(left.log)
+    assert "robot-left" in found.codes()
+    assert error(left, found)[2] < 0.05
+    gone = trial(robots=4, gaps={2: ((8.0, 20.0),)})
+    missing = JointTeam().identify(gone.log)
+    assert not {"robot-left", "robot-joined"} & missing.codes()
+    assert error(gone, missing)[2] < 0.05
+
+
+def test_a_robot_that_joins_is_noticed() -> None:
+    made = trial(robots=4, presence=(Presence(2, joins=6.0, new=True),))
+    found = JointTeam().identify(made.log)
+    assert "robot-joined" in found.codes()
+    assert error(made, found)[2] < 0.05
+
+
+def test_missing_rows_of_one_robot_leave_the_wrench_side_for_all() -> None:
+    made = trial(dropout=0.05)
+    assert (error(made, JointTeam().identify(made.log)) < [2e-3, 2e-3, 0.05, 0.01, 0.3]).all()
+
+
+def test_a_bias_in_every_recording_is_not_pretended_away() -> None:
+    made = trial(replace(QUIET, force_bias_N=0.5))
+    found = JointTeam().identify(made.log)
+    clean = JointTeam().identify(trial().log)
+    assert found.std[0] > 2 * clean.std[0]
+    assert abs(found.mass - 12) < 4 * found.std[0]
+
+
+def test_gain_errors_are_spoken_of() -> None:
+    made = trial(replace(QUIET, force_gain=0.03))
+    found = JointTeam().identify(made.log)
+    assert "common-gain-unseen" in found.codes()
+    assert found.std[0] > JointTeam(gains=False).identify(trial().log).std[0]
+
+
+def test_forces_of_nobody() -> None:
+    made = trial()
+    bare = [
+        TeamRecording(r.kind, {n: t.without("force") for n, t in r.tracks.items()}, r.name) for r in made.log.recordings
+    ]
+    with pytest.raises(CannotAnswer, match="no robot of the team measured a force"):
+        JointTeam().identify(made.log.with_recordings(*bare))
+
+
+def test_answers_that_are_no_body_become_the_nearest_one() -> None:
+    rng = np.random.default_rng(0)
+    body = InertialParameters.from_com(12, np.array([0.1, 0.05, 0.1]), np.diag([2.3, 3.4, 5.6])).vector
+    scale = np.array([12.0, *[8.4] * 3, *[6.0] * 6])
+    assert consistent(body, np.eye(10), scale) is body
+    for _ in range(5):
+        factor = rng.normal(size=(10, 10))
+        phi = body + np.concatenate([np.zeros(4), rng.normal(0, 1.5, 6)])
+        found = consistent(phi, factor @ factor.T, scale)
+        assert np.linalg.eigvalsh(forms.pseudo_inertia(found))[0] > 0
+        inverse = np.linalg.inv(factor @ factor.T)
+        assert (found - phi) @ inverse @ (found - phi) <= (body - phi) @ inverse @ (body - phi)
