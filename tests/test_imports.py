@@ -45,7 +45,9 @@ MAY_IMPORT: dict[str, set[str]] = {
     "pipelines": UPPER | {"simulate", "evaluate", "sanity"},
     "io": {
         "spatial", "inertia", "logs.log", "logs.recording", "logs.team_log", "logs.team_track",
-        "logs.team_streams", "robots.omnid", "team.estimate", "shape.mesh", "shape.tets", "shape.nesting", "shape.cloud", "shape.views", "parts.parts", "parts.from_mesh", "parts.known", "parts.hierarchy", "identify.estimate",
+        "logs.team_streams", "robots.omnid", "team.estimate", "shape.mesh", "shape.tets", "shape.nesting",
+        "shape.cloud", "shape.views", "parts.parts", "parts.from_mesh", "parts.known", "parts.hierarchy",
+        "identify.estimate",
     },
 }  # fmt: skip
 MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live"}

@@ -8,10 +8,15 @@ from box_tools import write_tools
 from click.testing import CliRunner
 
 from steelyard.bench import held_object
-from steelyard.bench.held_object_cases import METHODS
+from steelyard.bench.held_object_cases import PART_METHODS, RIVALS
 from steelyard.bench.held_object_table import held_object_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadFile, BadValue
+from steelyard.io.object_writing import write_object
+from steelyard.simulate.workshop import known_object
+from steelyard.workshop import catalogue
+
+ON_TRUTH = (*PART_METHODS, *RIVALS)
 
 ROW = {
     "object", "noise", "seed", "half", "method", "mass_pct", "com_pct", "com_mm", "inertia_pct", "riemannian",
@@ -33,12 +38,12 @@ def result(folder):
 def test_rows_means_and_bounds_have_the_names_of_the_format(result):
     assert all(set(row) >= ROW for row in result["rows"])
     # Two objects, one seed without noise and two each at three levels.
-    assert len(result["rows"]) == 2 * (1 + 3 * 2) * len(METHODS)
+    assert len(result["rows"]) == 2 * (1 + 3 * 2) * len(ON_TRUTH)
     for kind in ("mean", "median"):
         for noise in ("none", "low", "moderate", "high"):
             for half, runs in (("all", 4), ("mixed", 2), ("uniform", 2)):
                 group = result[kind][noise][half]
-                assert set(group) == set(METHODS)
+                assert set(group) == set(ON_TRUTH)
                 assert set(group["ours"]) >= MEAN
                 assert group["ours"]["runs"] == (runs if noise != "none" else runs // 2)
     assert set(result["bound"]) == {"low", "moderate", "high"}
@@ -83,7 +88,7 @@ def test_split_and_merged_parts(folder):
 
 def test_table_has_every_method_and_table_iv_beside(result):
     text = held_object_table(result)
-    for word in (*METHODS, "bound, parts known", "Table IV hps", "high, mixed: mean", "high, all: median"):
+    for word in (*ON_TRUTH, "bound, parts known", "Table IV hps", "high, mixed: mean", "high, all: median"):
         assert word in text
 
 
@@ -95,7 +100,7 @@ def test_command_prints_one_json_object(folder):
 
 
 def test_refusals_name_what_there_is(folder, tmp_path):
-    with pytest.raises(BadValue, match="parts must be one of truth, truth-split"):
+    with pytest.raises(BadValue, match="parts must be one of segmented, truth, truth-split"):
         held_object.run(folder, "guess")
     with pytest.raises(BadValue, match="no noise scenario 'loud'; there are: none, low"):
         held_object.run(folder, noises=("loud",))
@@ -119,3 +124,20 @@ def test_hps_on_the_shared_objects_is_what_was_measured_before(data_dir):
     keys = ("mass_pct", "com_pct", "inertia_pct", "riemannian")
     np.testing.assert_allclose([low[k] for k in keys], [0.46, 0.33, 3.6, 0.13], rtol=0.3)
     np.testing.assert_allclose([high[k] for k in keys], [5.7, 0.71, 10.8, 0.23], rtol=0.4)
+
+
+def test_parts_are_found_in_the_cloud(tmp_path):
+    write_object(known_object(catalogue.build("rubber-mallet")), tmp_path / "rubber-mallet")
+    found = held_object.run(tmp_path, "segmented", 1, noises=("low",), methods=("ours", "paper-route"), repeats=1)
+    rows = {row["method"]: row for row in found["rows"]}
+    assert rows["ours"]["riemannian"] < 0.3 < rows["paper-route"]["riemannian"]
+    scores = found["objects"]["rubber-mallet"]["segmentation"]
+    assert 0.85 < scores["ours"]["volume_ratio"] < 1.15
+    assert scores["paper-route"]["volume_ratio"] > 1.3
+    assert set(found["rank_correlation"]) == {"ours", "paper-route"}
+    assert "rank correlation" in held_object_table(found)
+
+
+def test_the_papers_route_needs_a_cloud(folder):
+    with pytest.raises(BadValue, match="paper-route"):
+        held_object.run(folder, "truth", seeds=1, noises=("low",), methods=("paper-route",), repeats=1)

@@ -120,6 +120,8 @@ def _plan(parts: str, noises: tuple[str, ...], seeds: int, methods: tuple[str, .
         for name in names:
             if name not in there:
                 raise BadValue(f"There is no {what} '{name}'; there are: {', '.join(there)}.")
+    if "paper-route" in methods and parts != "segmented":
+        raise BadValue(f'paper-route finds its own parts in the cloud; give parts "segmented", not {parts!r}.')
     everything = {"truth": (*PART_METHODS, *RIVALS), "segmented": (*PART_METHODS, "paper-route", *RIVALS)}.get(
         parts, PART_METHODS
     )
