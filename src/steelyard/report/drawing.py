@@ -147,7 +147,7 @@ def _grasps(estimate: TeamEstimate, frame: Frame) -> dict[str, Any]:
     for grasp in estimate.grasps.values():
         values, axes = np.linalg.eigh(grasp.covariance[3:, 3:])
         spreads.append((axes * np.sqrt(_CHI2_95 * np.maximum(values, 0))).T)
-    larger = _magnified(float(np.linalg.norm(spreads, axis=-1).max()), frame.size)
+    larger = _magnified(float(np.linalg.norm(spreads, axis=-1).max()), 2 * frame.size)  # to stand out of the grippers
     rows = [
         {"at": _plain(grasp.pose.position), "axes": _plain(grasp.pose.rotation.matrix.T), "spread": _plain(s * larger)}
         for grasp, s in zip(estimate.grasps.values(), spreads, strict=True)

@@ -94,11 +94,17 @@ def _tube(curve: Array, radius: float) -> tuple[Array, Integers]:
     if closed:
         way[0] = way[-1] = (way[0] + way[-1]) / np.linalg.norm(way[0] + way[-1])
     side = np.cross(way[0], np.eye(3)[np.abs(way[0]).argmin()])
-    rings = []
-    for at, along in zip(curve, way, strict=True):
+    sides = []
+    for along in way:
         side = side - along * (side @ along)
         side = side / np.linalg.norm(side)
-        turn = np.linspace(0, 2 * np.pi, _AROUND, endpoint=False)[:, None]
+        sides.append(side)
+    # What carrying the side once around a closed curve has turned it by is taken back on the way.
+    across = np.cross(way[0], sides[0])
+    turned = np.arctan2(sides[-1] @ across, sides[-1] @ sides[0]) if closed else 0.0
+    rings = []
+    for at, along, side, share in zip(curve, way, sides, np.linspace(0, 1, len(curve)), strict=True):
+        turn = (np.linspace(0, 2 * np.pi, _AROUND, endpoint=False) - share * turned)[:, None]
         rings.append(at + radius * (np.cos(turn) * side + np.sin(turn) * np.cross(along, side)))
     vertices = np.concatenate([*rings, curve[:1], curve[-1:]])
     k, j = np.meshgrid(np.arange(len(curve) - 1), np.arange(_AROUND), indexing="ij")

@@ -1,0 +1,113 @@
+"""The page of a team: closed surfaces that pass through the grasps, residuals of noise alone, the truth beside."""
+
+from __future__ import annotations
+
+import json
+from functools import cache
+
+import numpy as np
+import pytest
+
+from steelyard.errors import BadValue
+from steelyard.identify.estimate import Evidence
+from steelyard.inertia import InertialParameters
+from steelyard.report import render
+from steelyard.report.drawing import drawing
+from steelyard.report.team_page import team_page
+from steelyard.report.team_residuals import team_residuals
+from steelyard.report.team_scene import team_scene
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import EXACT, TeamScene
+from steelyard.spatial import Pose, Rotation
+from steelyard.team import GraspEstimate, TeamEstimate
+
+
+def answer(body: InertialParameters, grasps: dict[str, Pose]) -> TeamEstimate:
+    first = next(iter(grasps))
+    spread = np.diag([1e-4] * 3 + [1e-3, 2e-3, 5e-4]) ** 2
+    return TeamEstimate(
+        body, 1e-8 * np.eye(10), "joint", Evidence(10, 4.0, 500, 100, 0.3, 0.2), np.ones(10, np.bool_),
+        frame=first, reference=first,
+        grasps={n: GraspEstimate(X, np.zeros((6, 6)) if n == first else spread) for n, X in grasps.items()},
+        clock_offsets_s=dict.fromkeys(grasps, 0.0), clock_offset_std_s=dict.fromkeys(grasps, 1e-4),
+    )  # fmt: skip
+
+
+def around(count: int) -> TeamEstimate:
+    """Robots on a tilted circle about the centre of mass, the reference at the origin."""
+    angle = 2 * np.pi * np.arange(count) / count
+    circle = np.stack([np.cos(angle), np.sin(angle), 0.1 * np.cos(2 * angle)], axis=1)
+    body = InertialParameters.from_com(12.0, -circle[0], np.diag([2.0, 3.0, 4.0]))
+    return answer(body, {f"r{k}": Pose(Rotation.identity(), p - circle[0]) for k, p in enumerate(circle)})
+
+
+@pytest.mark.parametrize("count", [2, 3, 4, 9])
+def test_surfaces_are_closed_and_pass_through_the_grasps(count: int) -> None:
+    found = around(count)
+    ring, *grippers = team_scene(found).bodies
+    assert len(grippers) == count
+    size = float(np.ptp(ring.vertices, axis=0).max())
+    for body in (ring, *grippers):
+        # Every edge is shared by two triangles that run along it in opposite ways: closed and facing one side. The
+        # ends of the closed curve share their place, not their vertices.
+        _, place = np.unique(np.round(body.vertices / size, 7), axis=0, return_inverse=True)
+        corners = place.ravel()[body.triangles]
+        edges = np.concatenate([corners[:, [k, (k + 1) % 3]] for k in range(3)])
+        forward, back = ({tuple(e) for e in edges[:, order]} for order in ([0, 1], [1, 0]))
+        assert forward == back
+        a, b, c = np.moveaxis(body.vertices[body.triangles], 1, 0)
+        assert np.einsum("ij,ij->i", np.cross(a, b), c).sum() > 0
+    for grasp in found.grasps.values():
+        assert np.linalg.norm(ring.vertices - grasp.pose.position, axis=1).min() < 0.03 * size
+
+
+def test_marks_hold_every_grasp_magnified_alike() -> None:
+    found = around(3)
+    page = team_page("t", found)
+    assert page.scene is not None
+    marks = drawing(page, page.scene)["marks"]
+    rows, larger = marks["grasps"]["rows"], marks["grasps"]["larger"]
+    assert marks["open"]
+    assert "sensor" not in marks
+    assert not np.any(rows[0]["spread"])
+    lengths = np.linalg.norm(rows[2]["spread"], axis=1)
+    np.testing.assert_allclose(np.sort(lengths), larger * np.sqrt(7.815) * np.array([5e-4, 1e-3, 2e-3]), rtol=1e-5)
+    json.dumps(marks, allow_nan=False)
+
+
+@cache
+def exact() -> TeamTrial:
+    return simulate_team(TeamScene(EXACT, grasp_samples=100, motion_samples=800), 2)
+
+
+def test_residuals_of_the_truth_are_small_and_of_another_body_are_not() -> None:
+    made = exact()
+    grasps = {name: made.truth.grasps[k] for k, name in enumerate(made.log.names)}
+    left = team_residuals(made.log, answer(made.truth.body, grasps))
+    assert left is not None
+    assert left.still.sum() == 400
+    # What the filter and the differences take away of the motion, far below what carries 12 kg.
+    assert float(np.abs(left.force).max()) < 1.0
+    assert float(np.abs(left.torque).max()) < 1.0
+    heavier = InertialParameters(1.1 * made.truth.body.vector)
+    more = team_residuals(made.log, answer(heavier, grasps))
+    assert more is not None
+    assert float(np.linalg.norm(more.force, axis=1).mean()) == pytest.approx(0.1 * 12 * 9.81, rel=0.05)
+
+
+def test_the_log_must_be_that_of_the_result() -> None:
+    with pytest.raises(BadValue, match="the log must be that of the result; it is of robot0, robot1, robot2"):
+        team_residuals(exact().log, around(3))
+
+
+def test_the_page_says_where_everybody_holds_and_how_far_off() -> None:
+    made = exact()
+    grasps = {name: made.truth.grasps[k] for k, name in enumerate(made.log.names)}
+    moved = {
+        n: X if n == "robot0" else Pose(X.rotation, X.position + np.array([0.003, 0, 0])) for n, X in grasps.items()
+    }
+    good, bad = answer(made.truth.body, grasps), answer(made.truth.body, moved)
+    text = render(team_page("<b>Team</b>", bad, rivals={"the other": good}, truth=(made.truth.body, grasps)))
+    for said in ("Where the robots hold", "3.0 mm, 0°", "the other: 0", "in the grasp frame of robot0", "robot2"):
+        assert said in text, said
+    assert "<b>Team" not in text
