@@ -13,13 +13,15 @@ from steelyard.errors import CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.team_log import TeamRecording
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import EXACT, Presence, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.consistent import consistent
+from steelyard.team.hinge import bodies, find_hinge, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
+from steelyard.team.stacked import stretches
 from steelyard.team.twist_fit import fit_twists
 from steelyard.team.twist_rows import twist_stretches
 from steelyard.team.twist_statistic import TwistScatter
@@ -206,6 +208,32 @@ def test_a_robot_that_leaves_is_told_from_one_whose_data_are_missing() -> None:
     missing = JointTeam().identify(gone.log)
     assert not {"robot-left", "robot-joined"} & missing.codes()
     assert error(gone, missing)[2] < 0.05
+
+
+def test_a_hinge_is_found() -> None:
+    held = Hinge(
+        frozenset({2, 3}), Y, np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]), np.array([-0.6, 0.0, 0.0])
+    )
+    made = trial(robots=4, hinge=held, kinds=("motion",))
+    team = stretches(made.log, {})
+    twist, noise, rate = moving_twists(team)
+    assert bodies(twist, noise) == [(0, 1), (2, 3)]
+    axis, point, _, share = find_hinge(twist[:, 0], twist[:, 2], rate)
+    X = (made.truth.payload.inverse() @ made.truth.grasps)[2].inverse()
+    true_axis, true_point = X.rotation.apply(held.axis), X.apply(held.point)
+    assert abs(float(axis @ true_axis)) > np.cos(np.deg2rad(1.0))
+    assert np.linalg.norm(np.cross(true_axis, point - true_point)) < 0.01
+    assert share > 0.9
+    (finding,) = rigidity_findings(team, made.log.names)
+    assert finding.code == "payload-jointed"
+    assert "'robot2' and 'robot3' another" in finding.message
+    assert "payload-jointed" in JointTeam().identify(made.log).codes()
+
+
+@pytest.mark.parametrize("motion", MOTIONS)
+def test_rigid_payloads_are_not_called_otherwise(motion: str) -> None:
+    made = trial(freedom=MOTIONS[motion][0], kinds=("motion",))
+    assert not rigidity_findings(stretches(made.log, {}), made.log.names)
 
 
 def test_a_robot_that_joins_is_noticed() -> None:

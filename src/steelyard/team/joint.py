@@ -16,6 +16,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.estimate import TeamEstimate
+from steelyard.team.hinge import rigidity_findings
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
@@ -51,7 +52,8 @@ class JointTeam:
         else:
             standing = PoseTeam.of(log, self.clocks)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
-            late, found, order = standing.late, list(standing.findings), 2
+            late, order = standing.late, 2
+            found = [*standing.findings, *(rigidity_findings(standing.parts, log.names) if standing.rough else [])]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
         groups = _groups(made, path, self.highest_hz, order)

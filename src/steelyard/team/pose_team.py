@@ -12,7 +12,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, Rotation
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
@@ -30,6 +30,8 @@ PUNCTUAL = 2e-4
 DOUBTED = 4.0
 CLOCK_ROUNDS = 6
 MOST_SLIPS = 3
+# Noise above this share of the motion asks whether the payload is rigid.
+ROUGH = 0.05
 
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
@@ -134,6 +136,15 @@ class PoseTeam:
         start = sum(len(part) for part in self.parts[: found.recording])
         apart = self.residuals(raw, start)[:, found.slip.robot]
         return found.renewed(apart, raw.seen[:, found.slip.robot], raw)
+
+    @property
+    def rough(self) -> bool:
+        """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
+        path = self.fit.team.motion
+        middle = Rotation.nearest(path.rotation.matrix.mean(0))
+        turned = float(np.sqrt(((middle.inverse() @ path.rotation).log() ** 2).mean()))
+        moved = float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))
+        return bool((self.fit.noise > ROUGH * np.array([turned, moved])).any())
 
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""

@@ -1,0 +1,131 @@
+"""Whether the payload is one rigid body: groups of grasps that move as one, and the hinge between two groups.
+
+On a rigid body every grasp's twist is a fixed linear map of any other's. Where that leaves much of a twist unexplained,
+the two are on different bodies. What the second body does beyond the first, y_2 - M y_1, is then, for a hinge, one
+screw times the rate of its angle. The angle bends M; it is integrated and taken out, a few times.
+Source: own; the paper names jointed payloads as future work.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.conditioning import lowpass
+from steelyard.team.adjoint import adjoint, exp
+from steelyard.team.stacked import Stretch
+from steelyard.team.twist_rows import differenced
+
+# [Hz] above which twists from poses are mostly noise.
+CUTOFF_HZ = 2.0
+# Two grasps are on one body where less than this share of the twist's power is left, each part in its own size.
+RIGID = 0.05
+# One screw explains at least this share of what the second body does beyond the first.
+ONE_SCREW = 0.9
+ROUNDS = 8
+# What is left counts from so many times the power of the noise.
+LOUD = 5.0
+PARTS = (slice(0, 3), slice(3, 6))
+# Rows that must be there.
+FEWEST = 200
+
+
+def moving_twists(parts: Sequence[Stretch]) -> tuple[Array, Array, float]:
+    """Return low-passed twists (T, N, 6) of the longest recording in motion, in rows that all robots saw.
+
+    Also the mean square (N, 2) of what the filter took away, turning and moving, and the rate [Hz].
+    """
+    part = max((p for p in parts if p.kind != "still"), key=len, default=parts[0])
+    every = [differenced(part.poses[:, i], part.seen[:, i], part.rate) for i in range(part.seen.shape[1])]
+    good = np.flatnonzero(np.all([seen for _, seen in every], axis=0))
+    if len(good) < FEWEST or (np.diff(good) > 1).any():
+        return np.zeros((0, len(every), 6)), np.zeros((len(every), 2)), part.rate
+    twist = np.stack([values[good] for values, _ in every], axis=1)
+    flat = lowpass(twist.reshape(len(twist), -1), min(CUTOFF_HZ, 0.4 * part.rate), part.rate)
+    smooth = flat.reshape(twist.shape)
+    taken = ((twist - smooth) ** 2).mean(0).reshape(-1, 2, 3).mean(2)
+    return smooth, taken, part.rate
+
+
+def unexplained(first: Array, second: Array, noise: Array) -> float:
+    """Return the share of the power of `second` (T, 6) that no fixed linear map of `first` (T, 6) explains.
+
+    What is left below LOUD times the noise (2,) of turning and of moving counts as none.
+    """
+    left = second - first @ np.linalg.lstsq(first, second, rcond=1e-6)[0]
+    shares = [0.0]
+    for k, floor in zip(PARTS, noise, strict=True):
+        if (left[:, k] ** 2).mean() > LOUD * floor:
+            shares.append(float((left[:, k] ** 2).sum() / max(float((second[:, k] ** 2).sum()), 1e-300)))
+    return max(shares)
+
+
+def bodies(twist: Array, noise: Array) -> list[tuple[int, ...]]:
+    """Return the groups of robots that move as one body each."""
+    groups: list[list[int]] = []
+    for i in range(twist.shape[1]):
+        for group in groups:
+            if unexplained(twist[:, group[0]], twist[:, i], noise[group[0]] + noise[i]) < RIGID:
+                group.append(i)
+                break
+        else:
+            groups.append([i])
+    return [tuple(group) for group in groups]
+
+
+def find_hinge(first: Array, second: Array, rate: float) -> tuple[Array, Array, float, float]:
+    """Return axis, point, swing [rad] and the share of one screw, in the second grasp, from twists (T, 6) of both."""
+    size = np.repeat([np.sqrt((second[:, :3] ** 2).mean()), np.sqrt((second[:, 3:] ** 2).mean())], 3)
+    angle, screw, share = np.zeros(len(first)), np.zeros(6), 0.0
+    for _ in range(ROUNDS):
+        # Seen from where the second body is at angle zero, its twist is M y_1 + screw d angle.
+        straight = np.einsum("tij,tj->ti", adjoint(exp(angle[:, None] * screw)), second) if screw.any() else second
+        left = straight - first @ np.linalg.lstsq(first, straight, rcond=1e-6)[0]
+        _, values, axes = np.linalg.svd(left / size, full_matrices=False)
+        share = float(values[0] ** 2 / (values**2).sum())
+        screw = axes[0] * size
+        length = float(np.linalg.norm(screw[:3]))
+        if length == 0:
+            break
+        screw = screw / length
+        weighted = screw / size**2
+        speed = left @ weighted / float(screw @ weighted)
+        angle = np.cumsum(speed) / rate
+        angle = angle - np.linspace(angle[0], angle[-1], len(angle))
+        angle = angle - angle.mean()
+    point = np.cross(screw[:3], screw[3:])
+    return screw[:3], point, float(np.abs(angle).max()), share
+
+
+def rigidity_findings(parts: Sequence[Stretch], names: Sequence[str]) -> list[Finding]:
+    """Return payload-jointed with the hinge's axis, or payload-not-rigid, where the grasps are not on one body."""
+    twist, noise, rate = moving_twists(parts)
+    if not len(twist):
+        return []
+    groups = bodies(twist, noise)
+    if len(groups) == 1:
+        return []
+    called = [" and ".join(f"'{names[i]}'" for i in group) for group in groups]
+    if len(groups) == 2:
+        one, two = (group[0] for group in groups)
+        axis, point, swing, share = find_hinge(twist[:, one], twist[:, two], rate)
+        if share > ONE_SCREW:
+            text = ", ".join(f"{a:.3f}" for a in axis), ", ".join(f"{1e3 * a:.0f}" for a in point)
+            return [
+                Finding.of(
+                    "payload-jointed",
+                    f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) through "
+                    f"({text[1]}) mm of grasp '{names[two]}', which swung by {np.rad2deg(swing):.0f} deg. What is "
+                    "given is for the payload as if it were one; lock the hinge to weigh it.",
+                )
+            ]
+    return [
+        Finding.of(
+            "payload-not-rigid",
+            f"The grasps do not move as on one rigid body: {'; '.join(called)} move by themselves. What is given is "
+            "for the payload as if it were rigid.",
+        )
+    ]
