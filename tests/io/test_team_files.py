@@ -230,7 +230,6 @@ WRONG: dict[str, tuple[Change, str]] = {
     "kinds": (swap('kind = "grasp"', 'kind = "motion"'), 'team.toml, [[robot]] 2 ("robot1"), recording 1: recording "grasp-0" is "grasp" here and "motion" for "robot0". Give both one kind.'),
     "named twice": (swap('name = "still-2"', 'name = "still-1"'), 'team.toml, [[robot]] 1 ("robot0"), recording 3: the robot has another recording named "still-1". Rename one.'),
     "no time": (swap('time = { columns = ["t"], unit = "s" }', ""), 'team.toml, [[robot]] 1 ("robot0"), recording 1, stream 1 ("team/robot0-grasp-0.csv"): the streams of a team need time: robots are brought together by their clocks. Give time = { columns = ["t"], unit = "s" }, or time = { rate = 100, unit = "Hz" } where all start together.'),
-    "order": (swap('["q1", "q2", "q3", "q4", "q5", "q6"]', '["q4", "q5", "q6", "q1", "q2", "q3"]'), 'team.toml, [[robot]] 1 ("robot0"), recording 1: Delta joint'),
     "gravity": (swap("gravity = [0, 0, -9.81]", "gravity = [0, 0, -981]"), 'team.toml, [team]: "gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got [0, 0, -981].'),
     "torque alone": (lambda t: re.sub(r"    joint_position[^\n]*\n", "", t, count=1), 'team.toml, [[robot]] 1 ("robot0"), recording 1: "joint_torque" becomes a force only at known joint angles. Give "joint_position" as well.'),
     "away": (swap('name = "grasp-0"', 'name = "grasp-0"\n  away = true'), 'team.toml, [[robot]] 1 ("robot0"), recording 1: "away" says that the robot holds nothing in this recording; leave out its streams.'),
@@ -245,6 +244,18 @@ def test_wrong_descriptions(files: Path, what: str) -> None:
     with pytest.raises(BadInput) as error:
         read_team(files)
     assert str(error.value).startswith(said)
+
+
+def test_degrees_called_radians_are_no_angles_of_an_omnid(files: Path) -> None:
+    table = files.with_suffix("") / "robot1-motion-5.csv"
+    head, *rows = table.read_text().splitlines()
+    numbers = np.array([row.split(",") for row in rows], float)
+    numbers[:, 1:7] = np.rad2deg(numbers[:, 1:7])
+    np.savetxt(table, numbers, delimiter=",", header=head, comments="")
+    with pytest.raises(
+        BadInput, match=r'\("robot1"\), recording 6: Delta joint 1 must be within -25.0 to 105.0 deg; 200 of 200 rows'
+    ):
+        read_team(files)
 
 
 def test_counts_that_differ_need_names(files: Path) -> None:
