@@ -117,9 +117,9 @@ def rigidity_findings(parts: Sequence[Stretch], names: Sequence[str]) -> list[Fi
             return [
                 Finding.of(
                     "payload-jointed",
-                    f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) through "
-                    f"({text[1]}) mm of grasp '{names[two]}', which swung by {np.rad2deg(swing):.0f} deg. What is "
-                    "given is for the payload as if it were one; lock the hinge to weigh it.",
+                    f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) "
+                    f"through ({text[1]}) mm of grasp '{names[two]}', which swung by {np.rad2deg(swing):.0f} deg. What "
+                    "is given is for the payload as if it were one; lock the hinge to weigh it.",
                 )
             ]
     return [

@@ -20,7 +20,8 @@ from steelyard.team.payload_model import ROUNDING, Group, Normal, normal, residu
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
 BIAS = np.geomspace(1e-3, 10.0, 13)
-# That gains have no error at all is beforehand as likely as all other sizes together.
+# That gains have no error at all is beforehand as likely as so many other sizes together.
+NO_GAIN_ERROR = 3.0
 GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
 ROUNDS = 4
 # Noise has settled where it changes by less than this share.
@@ -74,7 +75,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             for part in group.parts
         ]
         models = _Models.of(normals, C, ladder, scale)
-        chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(len(GAIN) - 1), 0.0)
+        chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(NO_GAIN_ERROR), 0.0)
         weight = np.exp(chance - chance.max())
         weight /= weight.sum()
         phi, best = weight @ models.phi, int(np.argmax(weight))
@@ -88,6 +89,10 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
         groups = renewed
     off = models.phi - phi
     covariance = np.tensordot(weight, models.covariance, 1) + np.einsum("l,lp,lq->pq", weight, off, off)
+    # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
+    # in the noise already.
+    last = groups[-1]
+    covariance = covariance * (1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0))
     bias, gain = np.sqrt(weight @ np.square(ladder))
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
     blind = tuple(tuple(models.blind[best, a:b]) for a, b in pairwise(starts))
