@@ -114,14 +114,15 @@ def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, 
 
 def _names(best: Estimate, shape: Shape, seen: Seen) -> dict[int, tuple[str, float]]:
     """Return what each part found is called, and its true mass: that of the true part it mostly lies in, by volume."""
+    import numpy as np
+
     made = shape.segmentation.cut(len(best.parts))
     owner = seen.true_part(made.mesh.centroids)
     out = {}
     for k in range(len(made)):
         inside = made.labels == k
-        home = int(owner[inside][made.mesh.volumes[inside].argmax()])
-        density = float(seen.tool.densities[home])
-        out[k] = (seen.tool.part_names[home], density * float(made.mesh.volumes[inside].sum()))
+        shares = np.bincount(owner[inside], made.mesh.volumes[inside], len(seen.tool.densities))
+        out[k] = (seen.tool.part_names[int(shares.argmax())], float(shares @ seen.tool.densities))
     return out
 
 

@@ -16,6 +16,8 @@ from steelyard.shape.volume import Solid
 # Places in a cell that are asked: its centroid, and halfway from there to each corner.
 _PLACES = np.array([[0.25] * 4, *(0.15 + 0.4 * np.eye(4))])
 _EMPTY, _FULL = 0.5, 0.1  # share of the places seen empty, above which a cell is outside, below which it is inside
+# Cells that cloud and views judge differently count half; volumes are no better than this share even where they agree.
+_HALF, _LEAST_STD = 0.5, 0.02
 _FLAT = 1e-9  # of the cube of the cell's longest edge: volume below which it is none
 
 
@@ -33,12 +35,16 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     corners = vertices[tets]
     asked = np.einsum("pk,tkd->ptd", _PLACES, corners)
     share = np.asarray(empty(asked.reshape(-1, 3)), float).reshape(len(_PLACES), -1).mean(0)
-    sure = _sure(solid, tets)
+    sure = known = _sure(solid, tets)
     inside = ((sure >= 0) & (share < _EMPTY)) | (share < _FULL)
     # A cell that only the views put inside is as sure as they are.
     sure = np.where(sure >= 0, sure, 1 - share / _EMPTY)
     findings = tuple(f for f in solid.findings if f.code != "surface-open")
-    return replace(solid, mesh=TetMesh(vertices, tets[inside]), sure=sure[inside], findings=findings)
+    mesh = TetMesh(vertices, tets[inside])
+    volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
+    disputed = float(volume[(share < _EMPTY) != (known >= 0)].sum()) / mesh.volume
+    std = min(solid.volume_std, max(_LEAST_STD, _HALF * disputed))
+    return replace(solid, mesh=mesh, sure=sure[inside], volume_std=std, findings=findings)
 
 
 def _solid(corners: Array) -> Any:

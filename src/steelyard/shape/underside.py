@@ -54,12 +54,12 @@ class Underside:
         return np.column_stack([xy, self.height[i, j]]), normal
 
     def below(self, points: Array) -> Any:
-        """Return whether points (N, 3) lie under the object or under the table."""
+        """Return whether points (N, 3) lie under the table, under the object, or beside it where it covers no table."""
         place = np.floor((points[:, :2] - self.low) / self.pitch).astype(int)
         inside = ((place >= 0) & (place < self.height.shape)).all(1)
         place = np.clip(place, 0, np.array(self.height.shape) - 1)
-        height = self.height[place[:, 0], place[:, 1]]
-        return (points[:, 2] < 0) | (inside & np.isfinite(height) & (points[:, 2] < height - 0.5 * self.pitch))
+        height = np.where(inside, self.height[place[:, 0], place[:, 1]], np.inf)
+        return (points[:, 2] < 0) | (points[:, 2] < height - 0.5 * self.pitch)
 
 
 def _slope(height: Array, axis: int) -> Array:
