@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.team_log import TeamRecording
 from steelyard.simulate.team import TeamTrial, simulate_team
@@ -261,6 +261,19 @@ def test_gain_errors_are_spoken_of() -> None:
     found = JointTeam().identify(made.log)
     assert "common-gain-unseen" in found.codes()
     assert found.std[0] > JointTeam(gains=False).identify(trial().log).std[0]
+
+
+def test_known_wrists_are_taken_out_where_they_are() -> None:
+    made = trial()
+    whole = JointTeam().identify(made.log)
+    wrists = {"robot0": 0.4, "robot2": 0.9}
+    alone = JointTeam(wrists=wrists).identify(made.log)
+    assert alone.mass == pytest.approx(whole.mass - 1.3)
+    places = np.array([whole.grasps[n].pose.position for n in wrists])
+    moment = 0.4 * places[0] + 0.9 * places[1]
+    np.testing.assert_allclose(alone.mass * alone.com + moment, whole.mass * whole.com, atol=1e-9)
+    with pytest.raises(BadValue, match="wrist of 'nobody'"):
+        JointTeam(wrists={"nobody": 1.0}).identify(made.log)
 
 
 def test_forces_of_nobody() -> None:

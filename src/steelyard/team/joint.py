@@ -6,12 +6,14 @@ per recording
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
@@ -34,11 +36,14 @@ class JointTeam:
 
     clocks      whether each robot's clock offset is estimated
     gains       whether errors of the force axes' gains are allowed for, as large as the recordings show
+    wrists      mass [kg] that moves with each named robot's grasp between its force sensor and the payload: it is
+                taken out, as a point at the grasp. It moves like the payload and cannot be told from it by any motion
     highest_hz  of what motion and wrench are compared at; above, a payload carried by robots hardly moves
     """
 
     clocks: bool = True
     gains: bool = True
+    wrists: Mapping[str, float] = field(default_factory=dict)
     highest_hz: float = 4.0
 
     def identify(self, log: TeamLog) -> TeamEstimate:
@@ -61,7 +66,7 @@ class JointTeam:
         size = team_size(grasps, spread)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
-        team = assembled(log, grasps, spread, payload, D, late)
+        team = _without_wrists(assembled(log, grasps, spread, payload, D, late), self.wrists)
         found += [
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
@@ -70,6 +75,18 @@ class JointTeam:
             *open_parameters(team.identified, team.evidence.rank),
         ]
         return replace(team, findings=tuple(found))
+
+
+def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:
+    """Return the estimate less a point mass at every grasp named; raises BadValue for a robot that is not there."""
+    if not wrists:
+        return team
+    unknown = sorted(set(wrists) - set(team.grasps))
+    if unknown:
+        raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
+    places = np.array([team.grasps[name].pose.position for name in wrists])
+    points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
+    return replace(team, parameters=team.parameters - points)
 
 
 def needs_twists(log: TeamLog) -> bool:
