@@ -248,6 +248,23 @@ def test_missing_rows_of_one_robot_leave_the_wrench_side_for_all() -> None:
     assert (error(made, JointTeam().identify(made.log)) < [2e-3, 2e-3, 0.05, 0.01, 0.3]).all()
 
 
+def test_rows_that_nobody_saw_are_left_out() -> None:
+    made = trial(gaps={i: ((5.0, 6.0),) for i in range(3)})
+    assert (error(made, JointTeam().identify(made.log)) < [2e-3, 2e-3, 0.05, 0.01, 0.3]).all()
+
+
+def test_a_robot_that_disagrees_is_named_and_hardly_counts() -> None:
+    made = trial(robots=4)
+    rng, last = np.random.default_rng(0), made.log.recordings[-1]
+    track = last.tracks["robot3"]
+    shaken = track.channels["position"] + rng.normal(0, 0.05, (len(track), 3))
+    worse = replace(track, channels={**track.channels, "position": shaken})
+    bad = replace(last, tracks={**last.tracks, "robot3": worse})
+    found = JointTeam().identify(made.log.with_recordings(*made.log.recordings[:-1], bad))
+    assert "robot-excluded" in found.codes()
+    assert abs(found.mass - 12) < 0.05
+
+
 def test_a_bias_in_every_recording_is_not_pretended_away() -> None:
     made = trial(replace(QUIET, force_bias_N=0.5))
     found = JointTeam().identify(made.log)

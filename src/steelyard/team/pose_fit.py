@@ -59,7 +59,10 @@ def linearise(data: TeamMotion, team: Team, noise: Array) -> Linear:
     W, J = np.repeat(noise**-2.0, 3, axis=1), adjoint_inverse(team.grasps)
     found, place = data.patterns
     info = np.einsum("nia,ni,nib->nab", J, W, J)
-    inverse = np.linalg.inv(np.einsum("cn,nab->cab", found.astype(float), info))
+    held = np.einsum("cn,nab->cab", found.astype(float), info)
+    # Rows that nobody saw say nothing: any motion will do.
+    held[~found.any(1)] = np.eye(6)
+    inverse = np.linalg.inv(held)
     G, Z, X = team.grasps, team.homes, team.motion
     residual = pose_rows.residuals(
         data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position, Z.rotation.matrix,
@@ -70,7 +73,11 @@ def linearise(data: TeamMotion, team: Team, noise: Array) -> Linear:
     free, rest = pose_rows.followed(residual, data.valid, J, W, inverse, place)
     scores = pose_rows.scores(rest, data.features, WHICH, SIGN)
     information = sum(
-        (pose_rows.information(S, J, W, seen, WHICH, SIGN) for S, seen in zip(data.scatter, found, strict=True)),
+        (
+            pose_rows.information(S, J, W, seen, WHICH, SIGN)
+            for S, seen in zip(data.scatter, found, strict=True)
+            if seen.any()
+        ),
         np.zeros((OWN * data.count, OWN * data.count)),
     )
     return Linear(information, scores.sum(0), residual, free, scores, J, W, inverse)
