@@ -157,7 +157,7 @@ def _level(log: TeamLog, rows: TeamRows) -> int:
             return rows.index(name)
     raise CannotAnswer(
         "somebody must know where gravity points: give [team] gravity for level bases and rotations, or a gravity "
-        "channel; the joint method estimates a base's tilt."
+        "channel of a level sensor to at least one robot."
     )
 
 
