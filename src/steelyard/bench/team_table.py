@@ -31,6 +31,14 @@ def team_table(result: dict[str, Any]) -> str:
     sizes = {f"{row['method']}, N = {row['n']}": row for row in result["scale"]}
     if sizes:
         lines += ["", *block("grasps from white twists, 998 rows", sizes, _SCALE)]
+    if "bound" in result:
+        kinds = {k: v for k, v in result["bound"].items() if isinstance(v, dict)}
+        said = ", ".join(f"{kind} {v['ratio']:.2f}" for kind, v in kinds.items())
+        lines += ["", f"joint, rms error over the Cramer-Rao bound with white noise: {said}"]
+    for noise, kinds in result.get("coverage", {}).items():
+        if isinstance(kinds, dict):
+            said = ", ".join(f"{kind} {v['coverage_pct']:.1f} %" for kind, v in kinds.items())
+            lines += [f"joint, 95 % intervals hold the truth, {noise} noise: {said}"]
     return "\n".join(lines)
 
 
