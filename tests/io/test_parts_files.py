@@ -73,7 +73,8 @@ def write_wrong(saved: SavedParts, path: Path, **changed: Any) -> None:
 @pytest.mark.parametrize(
     ("changed", "reason"),
     [
-        ({"tets": None}, 'array "tets" is missing. Write the file with: steelyard segment CLOUD -o p.npz.'),
+        ({"tets": None}, 'array "tets" is missing, so this is no file of parts. A cloud is given with --scan; '
+         "parts are written by: steelyard segment CLOUD -o parts.npz."),
         ({"tets": np.array([[0, 1, 2, 99]])}, "tets must name vertices 0..29; got 0..99."),
         ({"tets": np.array([[0, 1, 2, 3.5]])}, 'array "tets" must hold whole numbers.'),
         ({"tets": np.array([[0, 1, 2, np.nan]])}, 'array "tets" must hold whole numbers.'),

@@ -9,6 +9,7 @@ import pytest
 
 import steelyard as sy
 from steelyard.errors import BadValue
+from steelyard.parts.parts import Parts
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
 from steelyard.shape.cloud import Cloud
 from steelyard.simulate import hammer
@@ -77,3 +78,10 @@ def test_parts_and_scan_are_not_both_given(made: hammer.Example, shape: Shape) -
 def test_a_scan_needs_its_place_in_the_sensor(made: hammer.Example, shape: Shape) -> None:
     with pytest.raises(BadValue, match="pose_in_sensor"):
         sy.identify(replace(made.recording, object_pose=None), scan=shape)
+
+
+def test_a_mesh_in_millimetres_is_named(made: hammer.Example) -> None:
+    scale = np.repeat([1e9, 1e12, 1e15], [1, 3, 6])
+    huge = Parts(made.tool.parts.label, made.tool.parts.moments * scale)
+    with pytest.raises(BadValue, match=r"in millimetres: scale it by 0\.001"):
+        sy.identify(made.recording, parts=huge)

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from steelyard.cli.console import print_json, say_if_compiling
+from steelyard.errors import BadValue
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -21,6 +22,8 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def segment(scan: Path, parts: int | None, output: Path | None, as_json: bool) -> None:
     """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""
+    if output is not None and output.resolve() == scan.resolve():
+        raise BadValue(f"{output} is the scan itself; give the parts another name, such as parts.npz.")
     say_if_compiling()
     from steelyard.api import shape_of
 

@@ -112,7 +112,8 @@ def read_parts(path: Path | str) -> SavedParts:
     for name in ("vertices", "tets", "labels"):
         if name not in arrays:
             raise BadFile(
-                f'{path}: array "{name}" is missing. Write the file with: steelyard segment CLOUD -o {path.name}.'
+                f'{path}: array "{name}" is missing, so this is no file of parts. A cloud is given with --scan; '
+                "parts are written by: steelyard segment CLOUD -o parts.npz."
             )
     if len(arrays["tets"]) > MOST_CELLS:
         raise BadFile(f"{path}: {len(arrays['tets'])} cells are more than the {MOST_CELLS} that can be handled.")

@@ -37,6 +37,8 @@ if TYPE_CHECKING:
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # Cuts of the object into parts, seen from S, the log weight of each beforehand, and how wrong they may be.
 Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
+# [m] No robot holds a part that fills a cube of this edge; one of a centimetre in millimetres does.
+LARGEST = 2.0
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
 # Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
@@ -175,10 +177,21 @@ def _shape(parts: Parts | Shape, recording: Recording) -> Placed:
     grasp_m, grasp_rad = recording.object_pose_std or (0.0, 0.0)
     grasp = {"grasp_m": grasp_m, "grasp_rad": grasp_rad}
     if isinstance(parts, Parts):
+        _require_metres(parts)
         return (parts.in_frame(recording.object_pose),), None, replace(MEASURED, **grasp)
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts.parts)
     return placed, cuts.prior, replace(parts.error, **grasp)
+
+
+def _require_metres(parts: Parts) -> None:
+    """Raise BadValue where the parts are too large for any robot: their mesh is in millimetres."""
+    size = float(np.cbrt(parts.volume.max()))
+    if size > LARGEST:
+        raise BadValue(
+            f"the largest part has a volume of {parts.volume.max():.3g} m^3, a cube of {size:.3g} m; a held object's "
+            f"must be below {LARGEST:g} m. The mesh is probably in millimetres: scale it by 0.001."
+        )
 
 
 def _estimator(
