@@ -143,7 +143,7 @@ def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, whole
 
 
 @numba.njit(cache=True, nogil=True)
-def _union(pool: Any, offset: Any, length: Any, a: int, b: int, mark: Any, stamp: int, rows: Any) -> int:
+def vertices_of_both(pool: Any, offset: Any, length: Any, a: int, b: int, mark: Any, stamp: int, rows: Any) -> int:
     """Write the vertices of two clusters into `rows`, each once; return how many."""
     count = 0
     for node in (a, b):
@@ -248,7 +248,7 @@ def _merge_all(
         a, b = end[e, 0], end[e, 1]
         if not exact[e]:
             stamp += 1
-            count = _union(pool, offset, length, a, b, mark, stamp, rows)
+            count = vertices_of_both(pool, offset, length, a, b, mark, stamp, rows)
             if count == 5:
                 known[e], kept = _five_points(xyz, rows), 5
                 vertex[:5, 2] = rows[:5]
@@ -316,7 +316,7 @@ def _merge_all(
     while made < n - 1:
         (va, a), (vb, b) = heapq.heappop(bodies), heapq.heappop(bodies)
         stamp += 1
-        count = _union(pool, offset, length, a, b, mark, stamp, rows)
+        count = vertices_of_both(pool, offset, length, a, b, mark, stamp, rows)
         h, kept = hull_volume(xyz, rows, count, tolerance, work)
         c = n + made
         merges[made, 0], merges[made, 1] = min(a, b), max(a, b)

@@ -18,6 +18,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.parts.clustering import vertices_of_both
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import hull_volume, hull_work
@@ -163,20 +164,6 @@ def _support(row: Any, smaller: float, limits: tuple[float, float, float, float]
 
 
 @numba.njit(cache=True, nogil=True)
-def _joined(clusters: tuple[int, int], pool: Any, offset: Any, length: Any, mark: Any, stamp: int, rows: Any) -> int:
-    """Write the hull vertices of two clusters into `rows`, each once; return how many."""
-    count = 0
-    for c in clusters:
-        for k in range(offset[c], offset[c] + length[c]):
-            v = pool[k]
-            if mark[v] != stamp:
-                mark[v] = stamp
-                rows[count] = v
-                count += 1
-    return count
-
-
-@numba.njit(cache=True, nogil=True)
 def _price(hull: float, support: float, va: float, vb: float, paint: float, stage: int) -> tuple[float, float]:
     """Return what orders a merge, and its seam: what a part that holds both sides costs.
 
@@ -272,7 +259,7 @@ def _merge(
             if exact[p, q]:
                 break
             stamp += 1
-            count = _joined((p, q), pool, offset, length, mark, stamp, rows)
+            count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
             h, kept = hull_volume(xyz, rows, count, tolerance, work)
             if kept >= 0:
                 known[p, q] = h
@@ -296,7 +283,7 @@ def _merge(
             p, q = min(p, q), max(p, q)
         if last_p != p or last_q != q:
             stamp += 1
-            count = _joined((p, q), pool, offset, length, mark, stamp, rows)
+            count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
             h, kept = hull_volume(xyz, rows, count, tolerance, work)
         if kept < 0:
             faults, kept, h = faults + 1, count, max(hull[p], hull[q])
