@@ -112,6 +112,18 @@ def test_truth_names_only_parts_that_are_the_same(capsys: pytest.CaptureFixture[
     assert "part 1" not in page
 
 
+def test_parts_of_another_object_are_refused(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    changed = json.loads((folder / "result.json").read_text())
+    changed["parts"][0]["volume_m3"] *= 1.5
+    (folder / "other.json").write_text(json.dumps(changed))
+    for parts in ("hammer.ply", "parts.npz"):
+        status, out, err = run(capsys, folder, "@other.json", "--parts", f"@{parts}", "-o", "@none.html")
+        assert (status, out) == (2, "")
+        assert err.startswith(f"steelyard: {folder}/{parts}: ")
+        assert "that the result was made with." in err
+        assert not (folder / "none.html").exists()
+
+
 @pytest.mark.parametrize(
     ("arguments", "error"),
     [

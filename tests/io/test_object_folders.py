@@ -14,6 +14,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from steelyard.api import identify
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.object_folders import object_folders, read_object, read_track
@@ -62,7 +63,13 @@ def predicted(track: Track, body: InertialParameters) -> np.ndarray:
 
 def test_a_folder_comes_back_as_it_was(known: KnownObject, good: Path) -> None:
     again = read_object(good)
-    assert sorted(path.name for path in good.iterdir()) == ["mesh.ply", "motion.npz", "points.npz", "truth.json"]
+    assert sorted(path.name for path in good.iterdir()) == [
+        "log.toml",
+        "mesh.ply",
+        "motion.npz",
+        "points.npz",
+        "truth.json",
+    ]
     assert [path.name for path in good.parent.iterdir()] == [good.name]
     assert (again.name, again.part_names, again.part_materials) == (known.name, known.part_names, known.part_materials)
     for name in ("vertices", "triangles", "part", "rgb"):
@@ -275,3 +282,12 @@ def test_the_motion_is_read_alone_as_with_the_folder(good: Path) -> None:
     assert whole is not None
     for name, column in alone.columns().items():
         np.testing.assert_array_equal(column, whole.columns()[name])
+
+
+def test_a_folder_is_a_log_as_it_stands(good: Path, known: KnownObject) -> None:
+    estimate = identify(good / "log.toml", parts=good / "mesh.ply")
+    np.testing.assert_allclose(estimate.mass, known.truth.mass, rtol=1e-4)
+    np.testing.assert_allclose(estimate.com, known.truth.com, atol=1e-5)
+    inertia = known.truth.inertia_com
+    np.testing.assert_allclose(estimate.parameters.inertia_com, inertia, atol=2e-3 * inertia.max())
+    assert {part.label for part in estimate.parts} == set(known.parts.label.tolist())

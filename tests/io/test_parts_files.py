@@ -144,3 +144,21 @@ def test_a_file_that_unpacks_to_very_much_is_not_unpacked(tmp_path: Path, monkey
 def test_wrong_values_are_named(saved: SavedParts) -> None:
     with pytest.raises(BadValue, match="the tree is of 2 cells"):
         SavedParts(saved.solid, saved.labels, tree=Hierarchy(np.array([0, 1]), np.array([[0, 1]]), np.array([0.1])))
+
+
+def test_the_cut_of_a_result_is_told_by_its_volumes(saved: SavedParts) -> None:
+    whole = saved.parts.volume
+    assert saved.recut(whole) is saved
+    joined = saved.recut([whole[2], whole[0] + whole[1]])
+    np.testing.assert_array_equal(joined.labels, np.array([1, 1, 0])[saved.labels])
+    np.testing.assert_allclose(joined.parts.volume, [whole[2], whole[0] + whole[1]])
+    assert joined.rgb is not None
+    np.testing.assert_allclose(joined.rgb[0], [250, 251, 252.5])
+    np.testing.assert_allclose(joined.rgb[1], np.average([[1, 2, 3], [4, 5, 6]], axis=0, weights=whole[:2]))
+
+
+@pytest.mark.parametrize("factors", [(1.01, 1, 1), (1, 1), (1, 1, 1, 1)])
+def test_volumes_of_another_solid_are_refused(saved: SavedParts, factors: tuple[float, ...]) -> None:
+    whole = [*saved.parts.volume, saved.parts.volume[0]]
+    with pytest.raises(BadValue, match="no cut of these parts has the"):
+        saved.recut([volume * factor for volume, factor in zip(whole, factors, strict=False)])

@@ -10,14 +10,16 @@ from steelyard.bench.tables import block
 _COLUMNS = (
     ("mass %", "mass_pct", 3),
     ("CoM %", "com_pct", 3),
-    ("floored", "com_pct_floored", 2),
+    ("CoM % floored", "com_pct_floored", 2),
     ("CoM mm", "com_mm", 3),
     ("inertia %", "inertia_pct", 2),
     ("Riemannian", "riemannian", 3),
     ("consistent %", "consistent_pct", 0),
-    ("zeroed", "zeroed", 0),
+    ("zero parts", "zeroed", 0),
     ("solve ms", "solve_ms", 2),
 )
+
+WITH_TABLE_IV = ("truth", "segmented")
 
 
 def held_object_table(result: dict[str, Any]) -> str:
@@ -39,7 +41,13 @@ def held_object_table(result: dict[str, Any]) -> str:
 
 def _head(result: dict[str, Any]) -> str:
     seeds = f", {len(result['seeds'])} seeds" if "seeds" in result else ""
-    return f"parts: {result['parts']}; {len(result['objects'])} objects{seeds}"
+    lines = [
+        f"parts: {result['parts']}; {len(result['objects'])} objects{seeds}",
+        "CoM % floored: to whole percents per axis, as the paper counts. zero parts: wrongly at zero mass, all runs.",
+    ]
+    if result["parts"] in WITH_TABLE_IV:
+        lines.append("Table IV: as printed in the paper, over its own twenty objects.")
+    return "\n".join(lines)
 
 
 def _runs(methods: dict[str, dict[str, Any]]) -> int:
@@ -58,7 +66,7 @@ def _rows(result: dict[str, Any], noise: str, half: str) -> dict[str, dict[str, 
     if limits:
         rows["bound, parts known"] = blank | {k: v for k, v in limits.items() if k != "groups"}
         rows["bound, equal densities known"] = blank | limits["groups"]
-    if half == "all" and result["parts"] in ("truth", "segmented"):
+    if half == "all" and result["parts"] in WITH_TABLE_IV:
         for name, row in result.get("table_iv", {}).get(noise, {}).items():
             rows[f"Table IV {name}"] = blank | row
     return rows

@@ -1,4 +1,4 @@
-"""`steelyard bench identify|coverage|held-object|part-coverage|materials|segment|team`."""
+"""`steelyard bench ...`: a verb for every table of BENCHMARK.md."""
 
 from __future__ import annotations
 
@@ -172,6 +172,18 @@ def speed(tets: int, many: int, repeats: int, as_json: bool) -> None:
 
     result = job.run(tets, many, repeats, progress_bar("bench speed"))
     print_json(result) if as_json else click.echo(job.speed_table(result))
+
+
+@bench.command()
+@click.option("--count", type=click.IntRange(min=1), default=60, show_default=True, help="Channels, plates and tubes.")
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@_JSON
+def sheets(count: int, seed: int, as_json: bool) -> None:
+    """Thin channels, plates and open tubes from bare points: is the volume right, and are wrong ones named?"""
+    from steelyard.bench import sheets as job
+
+    result = job.run(count, seed, progress_bar("bench sheets"))
+    print_json(result) if as_json else click.echo(job.sheets_table(result))
 
 
 @bench.command()

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from steelyard.parts.parts import Parts
     from steelyard.report import Report, Residuals, Scene, Truth
     from steelyard.shape.cloud import Cloud
+    from steelyard.shape.mesh import TriangleMesh
     from steelyard.spatial import Pose
     from steelyard.team.estimate import TeamEstimate
 
@@ -157,16 +158,38 @@ def _scene(parts: Path, scan: Path | None, placed: Pose | None, estimate: Estima
     """Return what is drawn, and the names of its parts; their centroids say where it sits if nothing else does."""
     from steelyard.io.parts_files import read_parts
     from steelyard.io.ply_files import read_mesh
-    from steelyard.parts.from_mesh import parts_of_mesh
     from steelyard.report import scene_of_mesh, scene_of_solid
 
     cloud = None if scan is None else _cloud(scan)
     if parts.suffix.lower() == ".ply":
         mesh = read_mesh(parts)
-        return scene_of_mesh(mesh, cloud, placed or _matched(lambda: parts_of_mesh(mesh), estimate)), {}
+        return scene_of_mesh(mesh, cloud, placed or _matched(_enclosed(parts, mesh, estimate), estimate)), {}
     saved = read_parts(parts)
-    placed = placed or _matched(lambda: saved.parts, estimate)
+    if estimate.parts:
+        try:
+            saved = saved.recut([part.volume for part in estimate.parts])
+        except BadValue as error:
+            raise BadValue(f"{parts}: {error}") from None
+    placed = placed or _matched(saved.parts, estimate)
     return scene_of_solid(saved.solid, saved.labels, cloud, saved.rgb, placed), dict(enumerate(saved.names))
+
+
+def _enclosed(path: Path, mesh: TriangleMesh, estimate: Estimate) -> Parts | None:
+    """Return the parts of a mesh, None where it encloses nothing; raises BadValue where they are not the result's."""
+    from steelyard.parts.from_mesh import parts_of_mesh
+
+    try:
+        parts = parts_of_mesh(mesh)
+    except BadValue:  # can still be drawn
+        return None
+    drawn = dict(zip(parts.label.tolist(), parts.volume.tolist(), strict=True))
+    for part in estimate.parts:
+        if abs(drawn.get(part.label, 0.0) - part.volume) > _SAME_VOLUME * part.volume:
+            raise BadValue(
+                f"{path}: part {part.label} has {1e6 * drawn.get(part.label, 0.0):.4g} cm^3, in the result "
+                f"{1e6 * part.volume:.4g} cm^3. Give the mesh that the result was made with."
+            )
+    return parts
 
 
 def _cloud(scan: Path) -> Cloud:
@@ -175,18 +198,13 @@ def _cloud(scan: Path) -> Cloud:
     return read_cloud(scan)
 
 
-def _matched(drawn: Callable[[], Parts], estimate: Estimate) -> Pose | None:
+def _matched(parts: Parts | None, estimate: Estimate) -> Pose | None:
     """Return where the parts sit in the sensor by their centroids there, None where those do not say."""
     import numpy as np
 
     from steelyard.report.scene import pose_from_centroids
 
     told = {part.label: part.centroid for part in estimate.parts}
-    try:
-        parts = drawn()
-    except BadValue:  # a surface that encloses nothing can still be drawn
+    if parts is None or not told or set(parts.label.tolist()) != set(told):
         return None
-    labels = parts.label.tolist()
-    if not told or set(labels) != set(told):
-        return None
-    return pose_from_centroids(np.stack([told[label] for label in labels]), parts.centroid)
+    return pose_from_centroids(np.stack([told[label] for label in parts.label.tolist()]), parts.centroid)

@@ -108,7 +108,13 @@ def _evidence_lines(estimate: Estimate) -> list[str]:
     """Return bias, residuals, hold-out and method in a few lines."""
     seen = estimate.evidence
     torque, force = np.split(estimate.wrench_bias, 2)
+    explained = (
+        "; leave-one-out: how much the answer moves when poses are left out"
+        if seen.jackknife_people is not None
+        else ""
+    )
     lines = [
+        f"  ±          one standard deviation{explained}",
         f"  method     {estimate.method}, rank {seen.rank}, {seen.samples} rows of which {seen.still_samples} at rest",
         f"  residual   {seen.residual_force_N:.3g} N, {seen.residual_torque_Nm:.3g} N m rms"
         + ("" if seen.chi2_per_dof is None else f"; chi² per degree of freedom {seen.chi2_per_dof:.2f}"),

@@ -30,7 +30,9 @@ def read_cloud(path: Path | str) -> Cloud:
         raise BadFile(f"{path}: no such file.")
     match path.suffix.lower():
         case ".ply":
-            columns = read_ply(path).get("vertex", {})
+            elements = read_ply(path)
+            columns = elements.get("vertex", {})
+            _require_points_only(path, len(next(iter(elements.get("face", {}).values()), ())))
         case ".pcd":
             columns = read_pcd(path)
         case ".npz":
@@ -45,6 +47,15 @@ def read_cloud(path: Path | str) -> Cloud:
     return _checked(
         path, _stacked(columns, "xyz"), _rgb(columns), label, None if normals is None else _stacked(columns, normals)
     )
+
+
+def _require_points_only(path: Path, faces: int) -> None:
+    """Raise BadFile where the file is a mesh: its vertices lie where its maker needed them, not all over."""
+    if faces:
+        raise BadFile(
+            f"{path}: this is a mesh of {faces} faces; a cloud has points alone. Give the mesh with --parts, or save "
+            "points spread over its surface."
+        )
 
 
 def _stacked(columns: dict[str, Any], names: Any) -> Any:

@@ -1,4 +1,4 @@
-"""Object folders written: mesh.ply, points.npz, motion.npz, truth.json, all or none of them."""
+"""Object folders written: mesh.ply, points.npz, motion.npz, truth.json and log.toml, all or none of them."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_bytes, write_mesh
+from steelyard.io.recording_files import object_table
 from steelyard.parts.known import KnownObject
 
 PARTS_NOTE = (
@@ -24,12 +25,26 @@ GRADED_NOTE = (
     " Where homogeneous is false the density changes within the part as grading says: density is its mean, and the "
     "whole is exact for the density as it is."
 )
+# motion.npz as a log, so that `steelyard identify log.toml --parts mesh.ply` runs as it stands.
+LOG = """[log]
+gravity = [0, 0, -9.81]   # in the world frame W, m/s^2
+wrench  = "on-object"     # exact: no noise, no bias
+
+[[stream]]
+path = "motion.npz"
+time = { columns = ["time"], unit = "s" }
+rotation = { columns = ["rotation_world_from_sensor"], form = "matrix" }
+position = { columns = ["position_world"], unit = "m" }
+force = { columns = ["force_sensor"], unit = "N" }
+torque = { columns = ["torque_sensor"], unit = "N*m" }
+"""
 
 
 def write_object(known: KnownObject, folder: Path | str) -> None:
     """Write an object folder; it appears complete or not at all. Raises BadFile.
 
-    The wrench is the physical one (gravity down), what the sensor applies to the object.
+    The wrench is the physical one (gravity down), what the sensor applies to the object. `log.toml` describes the
+    motion as a log and says where the mesh sits in the sensor.
     """
     folder = Path(folder)
     if known.track is None or known.part_masses is None:
@@ -43,6 +58,7 @@ def write_object(known: KnownObject, folder: Path | str) -> None:
         write_bytes(temporary / "points.npz", _npz(points))
         write_bytes(temporary / "motion.npz", _npz(known.track.columns()))
         write_bytes(temporary / "truth.json", (json.dumps(truth_dict(known), indent=1) + "\n").encode())
+        write_bytes(temporary / "log.toml", f"{LOG}\n{object_table(known.X_SO)}".encode())
         folder.mkdir(exist_ok=True)
         for path in sorted(temporary.iterdir()):
             path.replace(folder / path.name)

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import io
 import zipfile
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -30,6 +31,7 @@ MOST_CELLS = 4_000_000
 _LONGEST_M = 100.0
 _LONGEST_NAME = 80
 _AGREE = 1e-6
+_SAME = 1e-4  # volumes of one part, computed twice
 _TREE = ("merges", "cost", "piece")
 _DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zipfile.BadZipFile)
 
@@ -78,6 +80,50 @@ class SavedParts:
     def parts(self) -> Parts:
         """The parts with their exact moments; raises BadValue where one has no volume."""
         return Parts(np.arange(self.count), self.solid.moments(self.labels, self.count), self.rgb)
+
+    def recut(self, volumes: Sequence[float]) -> SavedParts:
+        """Return the solid in the parts of these volumes (K,) [m^3]: part k is the node of the tree with volume k.
+
+        A log may choose another cut of the tree than shape and colour did; a result tells it by the volumes. Raises
+        BadValue where no cut of this solid has them.
+        """
+        if np.shape(volumes) == (self.count,) and np.allclose(volumes, self.parts.volume, rtol=_SAME, atol=0):
+            return self
+        total = 1e6 * float(np.sum(volumes))
+        other = BadValue(
+            f"no cut of these parts has the {len(volumes)} volumes of the result, {total:.4g} cm^3 in all; the parts "
+            f"have {1e6 * self.solid.volume:.4g} cm^3. Give the file that the result was made with."
+        )
+        if self.tree is None:
+            raise other
+        node = _node_volumes(self.tree, self.solid)
+        matching = [np.flatnonzero(np.isclose(node, volume, rtol=_SAME, atol=0)) for volume in volumes]
+        if not all(len(found) for found in matching):
+            raise other
+        try:
+            labels = self.tree.cut_at(int(found[0]) for found in matching)
+        except BadValue:
+            raise other from None
+        largest_first = np.argsort(-np.bincount(labels, self.solid.volumes))
+        number = np.empty(len(volumes), np.int64)
+        number[largest_first] = np.argsort(-np.asarray(volumes), kind="stable")
+        return SavedParts(self.solid, number[labels], self._mean_colours(number[labels], len(volumes)), self.tree)
+
+    def _mean_colours(self, labels: Integers, count: int) -> Array | None:
+        """Return the mean colours (K, 3) of other parts of the same solid."""
+        if self.rgb is None:
+            return None
+        cells = self.rgb[self.labels] * self.solid.volumes[:, None]
+        sums = [np.bincount(labels, column, count) for column in (*cells.T, self.solid.volumes)]
+        return np.stack(sums[:3], axis=1) / sums[3][:, None]
+
+
+def _node_volumes(tree: Hierarchy, solid: TetMesh) -> Array:
+    """Return the volume (2N-1,) of every node of the tree [m^3]."""
+    volume = np.concatenate([np.bincount(tree.piece, solid.volumes, len(tree)), np.zeros(len(tree.merges))])
+    for k, (a, b) in enumerate(tree.merges):
+        volume[len(tree) + k] = volume[a] + volume[b]
+    return volume
 
 
 def write_parts(saved: SavedParts, path: Path | str) -> None:

@@ -34,7 +34,7 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     gravity = ", ".join(f"{g:g}" for g in recording.gravity)
     text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
     if recording.object_pose is not None:
-        text.append(_placed(recording.object_pose, recording.object_pose_std))
+        text.append(object_table(recording.object_pose, recording.object_pose_std))
     for stream in recording.streams:
         text.append(_described(stream))
         write_text(folder / stream.name, _csv(stream))
@@ -43,8 +43,8 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     return description
 
 
-def _placed(pose: Pose, std: tuple[float, float] | None) -> str:
-    """Return the [object] table."""
+def object_table(pose: Pose, std: tuple[float, float] | None = None) -> str:
+    """Return the [object] table of a description: where the object's frame O sits in S; std in m and rad."""
     position, rotation = (
         ", ".join(f"{v:.12g}" for v in values) for values in (pose.position, pose.rotation.matrix.ravel())
     )

@@ -203,7 +203,7 @@ def _estimator(
     """Return the estimator and what there is to say about the choice."""
     if shape is not None and options.method == "auto":
         cuts, weights, error = shape
-        given = f"is given in {len(cuts[0])} parts" if len(cuts) == 1 else f"was scanned, in {len(cuts)} cuts"
+        given = f"was scanned, in {len(cuts)} cuts" if len(cuts) > 1 else f"is given in {_counted(len(cuts[0]))}"
         why = f"method: auto chose part-masses, because the shape {given}"
         return PartCuts(cuts, weights, bias, shape_error=error), (why,)
     if options.method == "least-squares":
@@ -224,6 +224,11 @@ def _estimator(
         else "all rows used are at rest, where it is weighted least squares kept physically consistent"
     )
     return estimator, (f"method: auto chose noise-aware, because {why}", prior)
+
+
+def _counted(parts: int) -> str:
+    """Return how many parts, in words that say what one part means."""
+    return f"{parts} parts" if parts > 1 else "one part, taken to be of one density"
 
 
 def _with_tool(
