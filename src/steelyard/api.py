@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -95,19 +96,22 @@ def _parts(parts: str | Path | Parts | None) -> Parts | None:
     return parts_of_mesh(read_mesh(Path(parts)))
 
 
-def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None) -> Shape:
+def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None, cells: str = "delaunay") -> Shape:
     """Return the closed solid in homogeneous parts of what was seen of an object.
 
     scan   a cloud (.ply, .pcd, .npz), a folder of views, or their values
     parts  how many, where that is known; chosen by shape and colour where not
+    cells  "delaunay", or a mesher that is installed, "ftetwild" or "tetgen", to fill the same volume anew
 
     Raises BadInput where nothing closed can be made of it.
     """
+    from steelyard.io.foreign_cells import in_cells_of
     from steelyard.pipelines.shape_in_parts import Shape, shape_of
 
     if isinstance(scan, Shape):
         return scan
-    return shape_of(_seen(Path(scan)) if isinstance(scan, str | Path) else scan, parts)
+    refill = None if cells == "delaunay" else partial(in_cells_of, cells)
+    return shape_of(_seen(Path(scan)) if isinstance(scan, str | Path) else scan, parts, refill)
 
 
 def _seen(path: Path) -> Cloud | Views:

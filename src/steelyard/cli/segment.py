@@ -18,16 +18,23 @@ if TYPE_CHECKING:
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("scan", type=click.Path(path_type=Path))
 @click.option("--parts", type=click.IntRange(1, 40), help="How many parts; chosen by shape and colour where left out.")
+@click.option(
+    "--cells",
+    type=click.Choice(["delaunay", "ftetwild", "tetgen"]),
+    default="delaunay",
+    show_default=True,
+    help="Fill the volume anew with the cells of this mesher, where it is installed (TetGen is under the AGPL).",
+)
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write parts.npz.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def segment(scan: Path, parts: int | None, output: Path | None, as_json: bool) -> None:
+def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_json: bool) -> None:
     """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""
     if output is not None and output.resolve() == scan.resolve():
         raise BadValue(f"{output} is the scan itself; give the parts another name, such as parts.npz.")
     say_if_compiling()
     from steelyard.api import shape_of
 
-    shape = shape_of(scan, parts)
+    shape = shape_of(scan, parts, cells)
     if output is not None:
         _write(shape, output)
     if as_json:

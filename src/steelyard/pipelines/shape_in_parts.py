@@ -5,7 +5,8 @@ views -> fuse -> cloud -> enclose -> solid -> segment -> parts, and the cuts tha
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from steelyard.parts.segment import Segmentation, segment
 from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.tets import TetMesh
 from steelyard.shape.views import Views
 from steelyard.shape.volume import Solid, enclose
 
@@ -83,14 +85,20 @@ class Cuts:
     prior: Array
 
 
-def shape_of(seen: Views | Scan | Cloud, parts: int | None = None) -> Shape:
+def shape_of(
+    seen: Views | Scan | Cloud, parts: int | None = None, refill: Callable[[TetMesh], TetMesh] | None = None
+) -> Shape:
     """Return the solid in parts behind views, a fused scan or a cloud.
 
     parts  how many, where that is known; chosen by shape and colour where not
+    refill fills the same volume with other cells; None keeps those of Delaunay
 
     Raises CannotAnswer or BadInput where nothing closed can be made of it.
     """
     if isinstance(seen, Views):
         seen = fuse(seen)
     solid = carved(enclose(seen.cloud), seen.empty) if isinstance(seen, Scan) else enclose(seen)
+    if refill is not None:
+        mesh = refill(solid.mesh)
+        solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)))
     return Shape(solid, segment(solid.cloud, solid, parts=parts), seen if isinstance(seen, Scan) else None)
