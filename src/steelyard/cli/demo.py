@@ -113,17 +113,16 @@ def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, 
 
 
 def _names(best: Estimate, shape: Shape, seen: Seen) -> dict[int, tuple[str, float]]:
-    """Return what each part found is called, and its true mass: that of the true part it mostly lies in, by volume."""
+    """Return what each part found is called, by the true part that fills most of it, and the true mass inside it."""
     import numpy as np
 
+    from steelyard.parts.segment import nearest_cell
+
     made = shape.segmentation.cut(len(best.parts))
-    owner = seen.true_part(made.mesh.centroids)
-    out = {}
-    for k in range(len(made)):
-        inside = made.labels == k
-        shares = np.bincount(owner[inside], made.mesh.volumes[inside], len(seen.tool.densities))
-        out[k] = (seen.tool.part_names[int(shares.argmax())], float(shares @ seen.tool.densities))
-    return out
+    found = ((made.labels[nearest_cell(points, made.mesh.centroids)], volume) for points, volume in seen.filled())
+    volumes = np.stack([np.bincount(part, volume, len(made)) for part, volume in found])
+    masses = seen.tool.densities @ volumes
+    return {k: (seen.tool.part_names[int(volumes[:, k].argmax())], float(masses[k])) for k in range(len(made))}
 
 
 def _page(answers: Mapping[str, Estimate], shape: Shape, rows: MotionLog, seen: Seen, seed: int) -> Report:

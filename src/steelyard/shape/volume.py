@@ -24,6 +24,7 @@ _JUMP = 0.01  # of a spacing: height over which the jump through a disc is sprea
 _BLURRED = 0.36  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
+_SIDES = 100  # directions that are asked which way is out
 _OPEN = 0.07  # length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
@@ -83,11 +84,23 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
     """Return the cloud's surface elements; normals that came with it and all point inward are turned."""
     surface = oriented(cloud)
-    if (surface.area * (surface.normals * surface.xyz).sum(1)).sum() >= 0:
+    # Where a direction ends on the solid its normal points that way: true also of a surface with holes, whose total
+    # flux may have any sign.
+    ahead = _directions(_SIDES)
+    ends = (surface.xyz @ ahead.T).argmax(0)
+    if (surface.normals[ends] * ahead).sum() >= 0:
         return surface, ()
     text = "All normals that came with the cloud point into the solid; they were turned."
     found = (Finding.of("normals-flipped", text),) if cloud.normals is not None else ()
     return replace(surface, normals=-surface.normals), found
+
+
+def _directions(count: int) -> Array:
+    """Return directions (count, 3) spread evenly over the sphere, along a spiral of golden steps."""
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
+    flat = np.sqrt(1 - z**2)
+    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
 
 
 def _complex(surface: Oriented) -> tuple[Any, Array, Array]:

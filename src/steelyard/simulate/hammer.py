@@ -15,13 +15,12 @@ from steelyard.check import Array, frozen
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
-from steelyard.shape.mesh import Integers
+from steelyard.shape.inside import inside
 from steelyard.shape.views import Views
 from steelyard.simulate.motions import Kinematics, Step, StopAndGo
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop import catalogue
-from steelyard.workshop.sampling import surface_cloud
 from steelyard.workshop.tools import Tool
 
 GRAVITY = np.array([0.0, 0.0, -9.81])
@@ -92,12 +91,13 @@ class Seen(Example):
     X_SW: Pose
     X_WO: Pose
 
-    def true_part(self, points: Array) -> Integers:
-        """Return the true part (N,) that each point (N, 3) of W is nearest to."""
-        from scipy.spatial import cKDTree
-
-        surface = surface_cloud(self.tool)
-        return np.asarray(surface.labels[cKDTree(surface.xyz).query(self.X_WO.inverse().apply(points))[1]])
+    def filled(self, count: int = 4000) -> list[tuple[Array, Array]]:
+        """Return for each true part about `count` points (N, 3) in W that fill it, and the volumes (N,) around them."""
+        out = []
+        for label in self.tool.parts.label:
+            points, volume = inside(self.tool.mesh.of_part(int(label)), count)
+            out.append((self.X_WO.apply(points), volume))
+        return out
 
 
 def scanned(seed: int = 0, views: int = VIEWS) -> Seen:
