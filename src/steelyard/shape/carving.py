@@ -16,8 +16,9 @@ from steelyard.shape.volume import Solid
 # Places in a cell that are asked: its centroid, and halfway from there to each corner.
 _PLACES = np.array([[0.25] * 4, *(0.15 + 0.4 * np.eye(4))])
 _EMPTY, _FULL = 0.5, 0.1  # share of the places seen empty, above which a cell is outside, below which it is inside
-# Cells that cloud and views judge differently count half; volumes are no better than this share even where they agree.
-_HALF, _LEAST_STD = 0.5, 0.02
+# Cells that cloud and views judge differently count half. Volumes of scans are no better than this share even where
+# they agree: the rms error over scans of tools without hidden hollows, whose undersides nobody saw.
+_HALF, _LEAST_STD = 0.5, 0.05
 _FLAT = 1e-9  # of the cube of the cell's longest edge: volume below which it is none
 
 
@@ -43,7 +44,7 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     mesh = TetMesh(vertices, tets[inside])
     volume = np.abs(np.linalg.det(corners[:, 1:] - corners[:, :1])) / 6
     disputed = float(volume[(share < _EMPTY) != (known >= 0)].sum()) / mesh.volume
-    std = min(solid.volume_std, max(_LEAST_STD, _HALF * disputed))
+    std = max(_LEAST_STD, min(solid.volume_std, _HALF * disputed))
     return replace(solid, mesh=mesh, sure=sure[inside], volume_std=std, findings=findings)
 
 

@@ -2,7 +2,8 @@
 
 The paper projects the whole cloud on the table. Here the space over each spot of the table counts as the object's only
 as far down as no view saw it to be empty. Under a part that stands off the table that leaves a wedge which no sight
-line reached, as steep as the lowest sight line: there the underside goes on flat from where it was last seen.
+line reached, as steep as the lowest sight line: there the underside goes on from where it was last seen, bending as
+little as can be.
 Source: "The Sum of Its Parts", section V-A; we differ as said.
 """
 
@@ -24,6 +25,7 @@ from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene
 _WALL = 0.5  # a normal less upright than this belongs to a wall
 _FOOT, _HIGHEST_FOOT = 0.0005, 0.008  # steps in which the end of a wall is sought, and how far up [m]
 _DOWNWARD = -0.35  # a normal that points down by more than this belongs to an underside that was seen
+_TAUT = 1e-3  # weight of the underside's slope beside its bending
 _STEEPER = 1.3  # than the lowest sight line: a slope that is the object's own, not the edge of what was seen
 
 
@@ -159,7 +161,7 @@ def underside(
     rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
     bare = rim & ~steep
     height = np.where(bare, _median_along(height, rim), height)
-    span = _spanned(height, rim | steep, under)
+    span = _spanned(height, rim, steep, under)
     return Underside(low, pitch, np.where(under, np.clip(span, 0.0, np.where(under, top, 0.0)), np.inf), seen & under)
 
 
@@ -191,25 +193,36 @@ def _steepness(height: Array, under: Any) -> Array:
     return np.asarray(np.sqrt(out))
 
 
-def _spanned(height: Array, fixed: Any, under: Any) -> Array:
-    """Return heights under the object that are the mean of their neighbours', `fixed` cells kept (Laplace)."""
-    free = under & ~fixed
+def _spanned(height: Array, rim: Any, steep: Any, under: Any) -> Array:
+    """Return heights under the object that bend as little as can be, cells of `rim` and `steep` kept.
+
+    Where a slope of the object itself was seen it goes on and levels out, as a rod's does; from a rim, whose slope says
+    nothing, the underside goes on flat. The least sum over cells of (mean of the neighbours - height)^2, and _TAUT
+    times that of the steps between neighbours.
+    """
     out = np.where(under, height, 0.0)
+    fixed = (rim | steep) & under
+    free = under & ~fixed
     if not free.any():
         return out
     number = np.full(under.shape, -1)
-    number[free] = np.arange(free.sum())
-    i, j = np.nonzero(free)
-    rows, columns, load, degree = [], [], np.zeros(len(i)), np.zeros(len(i))
-    for a, b in ((i - 1, j), (i + 1, j), (i, j - 1), (i, j + 1)):
-        inside = under[a, b]
-        degree += inside
-        near: Integers = number[a, b]
-        rows.append(np.flatnonzero(near >= 0))
-        columns.append(near[near >= 0])
-        load += np.where(inside & (near < 0), out[a, b], 0.0)
-    row, column = np.concatenate(rows), np.concatenate(columns)
-    size = (len(i), len(i))
-    matrix = sparse.diags(degree) - sparse.csc_matrix((np.ones(len(row)), (row, column)), size)
-    out[free] = spsolve(matrix.tocsc(), load)
+    number[under] = np.arange(under.sum())
+    steps = _steps(number)
+    laplace = (steps.T @ steps).tocsr()
+    bend = laplace[number[free | (steep & under)]]
+    energy = (bend.T @ bend + _TAUT * laplace).tocsr()
+    kept, open_ = number[fixed], number[free]
+    rows = energy[open_]
+    out[free] = spsolve(rows[:, open_].tocsc(), -rows[:, kept] @ out[fixed])
     return out
+
+
+def _steps(number: Integers) -> Any:
+    """Return the matrix of the differences of neighbouring cells; `number` is -1 where there is none."""
+    pairs = [(number[1:], number[:-1]), (number[:, 1:], number[:, :-1])]
+    a, b = (np.concatenate([pair[k].ravel() for pair in pairs]) for k in (0, 1))
+    both = (a >= 0) & (b >= 0)
+    a, b = a[both], b[both]
+    row = np.arange(len(a))
+    value = np.concatenate([np.ones(len(a)), -np.ones(len(a))])
+    return sparse.csr_matrix((value, (np.concatenate([row, row]), np.concatenate([a, b]))), (len(a), number.max() + 1))
