@@ -11,10 +11,10 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify import noise_cost
+from steelyard.identify.dense import eigen, product, product_transposed, transposed
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
-from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
-from steelyard.identify.newton import residual_map_of
+from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.people import people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
@@ -43,13 +43,20 @@ OPEN, UNSEEN = 0.1, 1e-12
 def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
     """Return the covariance (p, p) of the linear parameters, the prior counted as data of its own strength."""
     size = H.shape[0]
-    J = np.eye(size)
-    J[:10, :10] = jacobian
-    A, score = J.T @ H @ J, J.T @ V @ J
-    A[:10, :10] += prior
-    score[:10, :10] += prior
-    bread = J @ inverse_scaled(A)
-    return bread @ score @ bread.T
+    J = np.zeros((size, size))
+    for i in range(size):
+        J[i, i] = 1.0
+    for i in range(10):
+        for j in range(10):
+            J[i, j] = jacobian[i, j]
+    back = transposed(J)
+    A, score = product(product(back, H), J), product(product(back, V), J)
+    for i in range(10):
+        for j in range(10):
+            A[i, j] += prior[i, j]
+            score[i, j] += prior[i, j]
+    bread = product(J, inverse_scaled(A))
+    return product_transposed(product(bread, score), bread)
 
 
 def conclude(
@@ -144,8 +151,12 @@ def natural_sizes(phi: Array) -> Array:
     mass = max(abs(phi[0]), 1e-6)
     square = phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]
     trace = abs((phi[4] + phi[7] + phi[9]) / 2 - square / mass)
-    out = np.full(10, max(trace, mass * SMALLEST_RADIUS**2))
-    out[0], out[1:4] = mass, max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    out = np.empty(10)
+    out[0] = mass
+    for i in range(1, 4):
+        out[i] = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    for i in range(4, 10):
+        out[i] = max(trace, mass * SMALLEST_RADIUS**2)
     return out
 
 
@@ -161,34 +172,39 @@ def _sight(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, Array]:
     In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
     """
     sizes = natural_sizes(phi)
-    mass, radius = sizes[0], sizes[1]
-    natural = np.full(10, mass * radius * radius)
-    natural[0], natural[1:4] = mass, mass * radius
-    F, G = _without_bias(H, V)
-    values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
-    directions = people_jacobian(phi) @ (natural.reshape(-1, 1) * vectors)
+    F, G, _, _ = without_bias(H, V)
+    natural, scaled = np.empty(10), np.empty((10, 10))
+    for i in range(10):
+        natural[i] = sizes[i] if i == 0 else sizes[0] * sizes[1] * (1.0 if i < 4 else sizes[1])
+    for i in range(10):
+        for j in range(10):
+            scaled[i, j] = F[i, j] * natural[i] * natural[j]
+    values, vectors = eigen(scaled)
+    into = np.empty((10, 10))
+    for i in range(10):
+        for k in range(10):
+            into[i, k] = natural[i] * vectors[i, k]
+    directions = product(people_jacobian(phi), into)
     # Directions that the data leave open may be off by several times their natural size, not by anything at all.
-    hidden = values < max(OPEN, UNSEEN * values[-1])
-    inverse = np.where(hidden, 0.0, 1 / np.where(hidden, 1.0, values))
-    bread = (directions * inverse) @ np.ascontiguousarray(vectors.T) * natural
-    variance = ((bread @ G) * bread).sum(1)
-    open_end = (np.where(hidden, directions, 0.0) ** 2).sum(1) / OPEN
-    std = np.where(open_end > sizes**2, np.inf, np.sqrt(np.maximum(variance, 0.0) + open_end))
-    fixed = values > RANK_INFORMATION
-    condition = np.sqrt(values[-1] / values[fixed][0]) if fixed.any() else np.inf
-    return int(fixed.sum()), condition, std, sizes
-
-
-@numba.njit(cache=True)
-def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
-    """Return information and score variance (10, 10) of phi with the bias projected out."""
-    size = H.shape[0]
-    if size == 10:
-        return H, V
-    project = np.zeros((10, size))
-    project[:, :10] = np.eye(10)
-    project[:, 10:] = -np.ascontiguousarray(H[:10, 10:]) @ inverse_scaled(np.ascontiguousarray(H[10:, 10:]))
-    return project @ np.ascontiguousarray(H[:, :10]), project @ V @ project.T
+    least = max(OPEN, UNSEEN * values[-1])
+    seen, open_end, rank, weakest = np.zeros((10, 10)), np.zeros(10), 0, np.inf
+    for k in range(10):
+        if values[k] > RANK_INFORMATION:
+            rank += 1
+            weakest = min(weakest, values[k])
+        for i in range(10):
+            if values[k] < least:
+                open_end[i] += directions[i, k] ** 2 / OPEN
+            else:
+                seen[i, k] = directions[i, k] / values[k]
+    bread = product_transposed(seen, into)
+    half, std = product(bread, G), np.empty(10)
+    for i in range(10):
+        variance = 0.0
+        for j in range(10):
+            variance += half[i, j] * bread[i, j]
+        std[i] = np.inf if open_end[i] > sizes[i] ** 2 else np.sqrt(max(variance, 0.0) + open_end[i])
+    return rank, np.sqrt(values[-1] / weakest) if rank else np.inf, std, sizes
 
 
 @numba.njit(cache=True)
@@ -196,11 +212,13 @@ def _weighed(
     linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
 ) -> tuple[Array, Array, Array, float, Array]:
     """Return the residual map K, the information H, what noise adds to its score, the cost and sum r^2 (6,)."""
-    K = residual_map_of(T, linear)
+    K = noise_cost.residual_map_of(T, linear)
     H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
     cost, square = noise_cost.value(K, scatter, acceleration, wrench), np.zeros(6)
     for c in range(scatter.shape[0]):
-        square += ((K @ scatter[c]) * K).sum(1)
+        C = noise_cost.residual_squares(K, scatter[c])
+        for i in range(6):
+            square[i] += C[i, i]
     return K, nonnegative(H, plain), extra, cost, square
 
 

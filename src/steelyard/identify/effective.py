@@ -9,8 +9,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
-from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
-from steelyard.identify.newton import residual_map_of
+from steelyard.identify.dense import product, symmetric, times
+from steelyard.identify.linear import inverse_scaled, nonnegative, right_side, without_bias
 from steelyard.identify.problem import Problem
 
 
@@ -58,38 +58,24 @@ def _effective(
 ) -> tuple[Array, Array, Array, Array]:  # fmt: skip
     """Return the fields of `Effective` at `linear` (p,); an empty `score` means that noise is white."""
     size = len(linear)
-    H, extra, plain, g = _statistics(linear, T, scatter, acceleration, wrench)
-    H = nonnegative(H, plain)
-    V = H + extra if score.shape[0] == 0 else score.copy()
-    if size > 10:
-        g[10:16] += bias_precision @ bias_mean
-        H, bread = H.copy(), np.zeros((size - 10, size - 10))
-        V[10:16, 10:16] += bias_precision
-        H[10:16, 10:16] += bias_precision
-        bread = inverse_scaled(H[10:, 10:])
-    else:
-        bread = np.zeros((0, 0))
-    project = np.zeros((10, size))
-    project[:, :10] = np.eye(10)
-    if size > 10:
-        project[:, 10:] = -np.ascontiguousarray(H[:10, 10:]) @ bread
-    slope = project @ np.ascontiguousarray(H[:, :10])
-    half = slope @ inverse_scaled(project @ V @ project.T)
-    information = half @ slope
-    bias_at = bread @ g[10:]
-    bias_slope = bread @ np.ascontiguousarray(H[10:, :10])
-    return 0.5 * (information + information.T), half @ (project @ g), bias_at, bias_slope
-
-
-@numba.njit(cache=True)
-def _statistics(
-    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Return the information H, what noise adds to it, the plain normal matrix and its right side at `linear` (p,)."""
-    K = residual_map_of(T, linear)
+    K = noise_cost.residual_map_of(T, linear)
     H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
-    weights = np.zeros((scatter.shape[0], 6, 6))
-    for c in range(scatter.shape[0]):
-        weights[c] = noise_cost.weight(K, acceleration[c], wrench[c])
-    _, g = normal_equations(T, scatter, weights)
-    return H, extra, plain, g
+    g = right_side(T, scatter, noise_cost.weights_at(linear, T, acceleration, wrench))
+    H = nonnegative(H, plain)
+    V = np.empty((size, size))
+    for i in range(size):
+        for j in range(size):
+            V[i, j] = score[i, j] if len(score) else H[i, j] + extra[i, j]
+    if size > 10:
+        for i in range(6):
+            for j in range(6):
+                V[10 + i, 10 + j] += bias_precision[i, j]
+                H[10 + i, 10 + j] += bias_precision[i, j]
+                g[10 + i] += bias_precision[i, j] * bias_mean[j]
+    F, G, bias_slope, bread = without_bias(H, V)
+    half = product(F, inverse_scaled(G))
+    bias_at, pull = times(bread, g[10:]), g[:10].copy()
+    for j in range(10):
+        for i in range(size - 10):
+            pull[j] -= bias_slope[i, j] * g[10 + i]
+    return symmetric(product(half, F)), times(half, pull), bias_at, bias_slope

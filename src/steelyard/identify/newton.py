@@ -13,7 +13,8 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.noise_cost import derivatives, value
+from steelyard.identify.dense import cholesky, eigen, inner, moved, product, solved, times, transposed
+from steelyard.identify.noise_cost import derivatives, residual_map_of, value
 
 # Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
 # full steps end at rounding, where a line search could only see noise.
@@ -80,7 +81,12 @@ def jacobian(theta: Array, U: Array) -> Array:
             step = scale * (np.exp(theta[k]) if k <= 3 else 1.0)
             for j in range(4):
                 half[_ROW[k], j] = step * U[j, _COLUMN[k]]
-        out[:, k] = vector_of(half + half.T)
+        for i in range(4):
+            for j in range(i + 1):
+                half[i, j] = half[j, i] = half[i, j] + half[j, i]
+        column = vector_of(half)
+        for i in range(10):
+            out[i, k] = column[i]
     return out
 
 
@@ -141,21 +147,6 @@ def shape_prior(theta: Array, gamma: float, log_size: float, precision: float) -
 
 
 @numba.njit(cache=True)
-def residual_map_of(T: Array, linear: Array) -> Array:
-    """Return K (6, Z) at the linear parameters (p,)."""
-    width = T.shape[2]
-    K = np.zeros((6, width))
-    for i in range(6):
-        K[i, 12 + i] = 1.0
-    for p in range(T.shape[0]):
-        if linear[p] != 0.0:
-            for i in range(6):
-                for j in range(width):
-                    K[i, j] += linear[p] * T[p, i, j]
-    return K
-
-
-@numba.njit(cache=True)
 def linear_of(u: Array) -> Array:
     """Return [phi, bias] (p,) from u = [theta, bias]."""
     out = u.copy()
@@ -165,7 +156,9 @@ def linear_of(u: Array) -> Array:
         for j in range(4):
             for a in range(4):
                 P[i, j] += U[i, a] * U[j, a]
-    out[:10] = vector_of(P)
+    phi = vector_of(P)
+    for k in range(10):
+        out[k] = phi[k]
     return out
 
 
@@ -176,11 +169,21 @@ def cost(
 ) -> float:  # fmt: skip
     """Return Q/2 + priors at u = [theta, bias]; the bias prior has mean (6,) and precision (6, 6)."""
     K = residual_map_of(T, linear_of(u))
-    total = 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u[:10], gamma, log_size, precision)[0]
-    if len(u) > 10:
-        off = u[10:16] - bias
-        total += 0.5 * float(off @ (bias_precision @ off))
-    return total
+    total = 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u, gamma, log_size, precision)[0]
+    return total + _bias_prior(u, bias, bias_precision)[0]
+
+
+@numba.njit(cache=True)
+def _bias_prior(u: Array, mean: Array, precision: Array) -> tuple[float, Array]:
+    """Return the prior of the bias in u = [theta, bias], zero where there is none, and its gradient (6,)."""
+    off, total = np.zeros(6), 0.0
+    for i in range(6):
+        if len(u) > 10:
+            off[i] = u[10 + i] - mean[i]
+    pull = times(precision, off)
+    for i in range(6):
+        total += 0.5 * off[i] * pull[i]
+    return total, pull
 
 
 @numba.njit(cache=True)
@@ -189,61 +192,63 @@ def cost_derivatives(
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
 ) -> tuple[float, Array, Array]:  # fmt: skip
     """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias]."""
-    size = u.shape[0]
-    theta = u[:10]
-    U = factor(theta)
+    size = len(u)
+    U = factor(u)
     Q, g, H = derivatives(residual_map_of(T, linear_of(u)), T, scatter, acceleration, wrench)
-    J = np.eye(size)
-    J[:10, :10] = jacobian(theta, U)
-    prior, prior_gradient, prior_hessian = shape_prior(theta, gamma, log_size, precision)
-    gradient = 0.5 * (J.T @ g)
-    hessian = 0.5 * (J.T @ H @ J)
-    hessian[:10, :10] += 0.5 * _curvature(theta, U, g[:10]) + prior_hessian
-    gradient[:10] += prior_gradient
-    total = 0.5 * Q + prior
-    if size > 10:
-        pull = bias_precision @ (u[10:16] - bias)
-        total += 0.5 * float((u[10:16] - bias) @ pull)
-        gradient[10:16] += pull
-        hessian[10:16, 10:16] += bias_precision
-    return total, gradient, hessian
+    body, J = jacobian(u, U), np.zeros((size, size))
+    for i in range(size):
+        J[i, i] = 1.0
+    for i in range(10):
+        for j in range(10):
+            J[i, j] = body[i, j]
+    back = transposed(J)
+    prior, prior_gradient, prior_hessian = shape_prior(u, gamma, log_size, precision)
+    gradient, hessian = times(back, g), product(product(back, H), J)
+    curvature = _curvature(u, U, g)
+    for i in range(size):
+        gradient[i] *= 0.5
+        for j in range(size):
+            hessian[i, j] *= 0.5
+    for i in range(10):
+        gradient[i] += prior_gradient[i]
+        for j in range(10):
+            hessian[i, j] += 0.5 * curvature[i, j] + prior_hessian[i, j]
+    known, pull = _bias_prior(u, bias, bias_precision)
+    for i in range(size - 10):
+        gradient[10 + i] += pull[i]
+        for j in range(size - 10):
+            hessian[10 + i, 10 + j] += bias_precision[i, j]
+    return 0.5 * Q + prior + known, gradient, hessian
 
 
 @numba.njit(cache=True)
 def _downhill(gradient: Array, hessian: Array) -> Array:
     """Return the Newton step, with negative curvatures turned round (saddle-free) where the Hessian has any."""
     size = len(gradient)
-    hessian = hessian.copy()
-    for k in (0, 7, 8, 9):
-        hessian[k, k] += DAMPING
-    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-300))
-    scaled = hessian * np.outer(scale, scale)
-    low, x = np.zeros((size, size)), np.zeros(size)
+    scale, scaled, g = np.empty(size), np.empty((size, size)), np.empty(size)
     for i in range(size):
-        for j in range(i + 1):
-            total = scaled[i, j]
-            for k in range(j):
-                total -= low[i, k] * low[j, k]
-            if i == j:
-                if total < 1e-9:
-                    values, vectors = np.linalg.eigh(scaled)
-                    curvature = np.maximum(np.abs(values), 1e-9)
-                    turned: Array = -scale * (vectors @ ((vectors.T @ (scale * gradient)) / curvature))
-                    return turned
-                low[i, i] = np.sqrt(total)
-            else:
-                low[i, j] = total / low[j, j]
+        own = hessian[i, i] + (DAMPING if i == 0 or 7 <= i <= 9 else 0.0)
+        scale[i] = 1 / np.sqrt(max(abs(own), 1e-300))
+        scaled[i, i] = own * scale[i] * scale[i]
+        g[i] = -scale[i] * gradient[i]
     for i in range(size):
-        total = -scale[i] * gradient[i]
-        for k in range(i):
-            total -= low[i, k] * x[k]
-        x[i] = total / low[i, i]
-    for i in range(size - 1, -1, -1):
-        total = x[i]
-        for k in range(i + 1, size):
-            total -= low[k, i] * x[k]
-        x[i] = total / low[i, i]
-    return scale * x
+        for j in range(i):
+            scaled[i, j] = scaled[j, i] = hessian[i, j] * scale[i] * scale[j]
+    low, positive = cholesky(scaled, 1e-9)
+    if positive:
+        x = solved(low, g)
+    else:
+        values, vectors = eigen(scaled)
+        x = np.zeros(size)
+        for k in range(size):
+            along = 0.0
+            for i in range(size):
+                along += vectors[i, k] * g[i]
+            for i in range(size):
+                x[i] += vectors[i, k] * along / max(abs(values[k]), 1e-9)
+    for i in range(size):
+        x[i] *= scale[i]
+    return x
 
 
 @numba.njit(cache=True)
@@ -261,23 +266,23 @@ def minimise(
     current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
     for _ in range(iterations):
         step = _downhill(gradient, hessian)
-        decrement = -0.5 * (gradient @ step)
-        if decrement < NEAR:
-            u = u + step
+        fall = -inner(gradient, step)
+        if 0.5 * fall < NEAR:
+            u = moved(u, step, 1.0)
             current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
-            return u + _downhill(gradient, hessian), current, True
-        longest = np.abs(step[:7]).max()
-        if longest > 1.0:
-            step *= 1.0 / longest
-        moved = False
+            return moved(u, _downhill(gradient, hessian), 1.0), current, True
+        longest, better = 1.0, False
+        for k in range(7):
+            longest = max(longest, abs(step[k]))
+        share = 1 / longest
         for _ in range(30):
-            trial = cost(u + step, T, scatter, acceleration, wrench, *prior)
-            if trial < current - 1e-4 * abs(gradient @ step) or trial < current - 1e-10 * abs(current):
-                moved = True
+            trial = cost(moved(u, step, share), T, scatter, acceleration, wrench, *prior)
+            if trial < current - 1e-4 * share * abs(fall) or trial < current - 1e-10 * abs(current):
+                better = True
                 break
-            step *= 0.5
-        if not moved:
-            return u, current, bool(decrement < 1e-3)
-        u = u + step
+            share *= 0.5
+        if not better:
+            return u, current, bool(0.5 * fall < 1e-3)
+        u = moved(u, step, share)
         current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
     return u, current, False
