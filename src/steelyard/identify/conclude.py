@@ -65,13 +65,16 @@ def conclude(
     """Return the Estimate of a solution.
 
     `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
-    Raises CannotAnswer where mass or centre of mass are not fixed, unless `require` is false: a shape may fix them.
+    Raises CannotAnswer where mass or centre of mass are not fixed, and names the inertia that is not, unless `require`
+    is false: a shape may fix them.
     """
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
-    data = (problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    K, H, extra, cost, square = _weighed(solution.linear, *data)
-    rows = problem.samples
+    data, noise = problem.scatter, (problem.acceleration, problem.wrench)
+    K = noise_cost.residual_map_of(problem.T, solution.linear)
+    H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
+    cost, square = noise_cost.value(K, data, *noise)
+    H, rows = nonnegative(H, plain), problem.samples
     chi2 = max(cost / max(6 * rows - len(solution.linear), 1.0), 0.0)
     residual_torque, residual_force = (float(np.sqrt(max(s.mean() / rows, 0))) for s in (square[:3], square[3:]))
     white = max(chi2, 1.0) * (H + extra)
@@ -103,8 +106,7 @@ def conclude(
     left_out = leave_one_out(problem, solution, bread)
     if left_out:
         estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
-    found = _findings(estimate)
-    return _widened(estimate.with_findings(*found) if found else estimate)
+    return _widened(estimate.with_findings(*_findings(estimate)) if require else estimate)
 
 
 def _widened(estimate: Estimate) -> Estimate:
@@ -205,21 +207,6 @@ def _sight(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, Array]:
             variance += half[i, j] * bread[i, j]
         std[i] = np.inf if open_end[i] > sizes[i] ** 2 else np.sqrt(max(variance, 0.0) + open_end[i])
     return rank, np.sqrt(values[-1] / weakest) if rank else np.inf, std, sizes
-
-
-@numba.njit(cache=True)
-def _weighed(
-    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
-) -> tuple[Array, Array, Array, float, Array]:
-    """Return the residual map K, the information H, what noise adds to its score, the cost and sum r^2 (6,)."""
-    K = noise_cost.residual_map_of(T, linear)
-    H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
-    cost, square = noise_cost.value(K, scatter, acceleration, wrench), np.zeros(6)
-    for c in range(scatter.shape[0]):
-        C = noise_cost.residual_squares(K, scatter[c])
-        for i in range(6):
-            square[i] += C[i, i]
-    return K, nonnegative(H, plain), extra, cost, square
 
 
 def _require_answer(sight: Sight, problem: Problem) -> None:

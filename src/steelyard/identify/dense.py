@@ -111,7 +111,7 @@ def mirror(a: Array) -> None:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def cholesky(matrix: Array, least: float) -> tuple[Array, bool]:
-    """Return L (n, n) with L L^T = matrix, and whether all squared pivots are above `least`, as which lower ones count."""
+    """Return L (n, n) with L L^T = matrix, and whether all squared pivots are above `least`; others count as that."""
     n = matrix.shape[0]
     low, positive = np.zeros((n, n)), True
     for i in range(n):

@@ -41,7 +41,7 @@ def mode(
     """Return the mode y (G,), its cost with the prior N(centre, precision^-1), and the Hessian (G, G), by Newton."""
     y, step, share = start, np.zeros(len(start)), 0.0
     best, hessian = np.inf, precision
-    for _ in range(STEPS):
+    for _ in range(STEPS + 1):
         # The first look is at the start itself; each further one is a step that is halved until the cost falls.
         for _ in range(20):
             trial = moved(y, step, share)
@@ -116,7 +116,7 @@ def log_det(matrix: Array) -> float:
 
 @numba.njit(cache=True)
 def apart(P: int, near: float, wide: float) -> Array:
-    """Return the precision (P, P) of log densities that differ by variance `near` about one known to variance `wide`."""
+    """Return the precision (P, P) of log densities with variance `near` about a common one with variance `wide`."""
     out = np.empty((P, P))
     for k in range(P):
         for j in range(P):
@@ -183,7 +183,7 @@ def canonical(group: Integers) -> tuple[Integers, int]:
 
 @numba.njit(cache=True)
 def place_of(row: Integers, known: Integers, count: int) -> int:
-    """Return which of the first `count` rows of `known` (N, P) is `row` (P,), else `count`: there it is then written."""
+    """Return which of the first `count` rows of `known` (N, P) is `row` (P,); else write it there and return `count`."""
     for i in range(count):
         same = True
         for k in range(len(row)):

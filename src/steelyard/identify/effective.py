@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numba
 import numpy as np
@@ -12,6 +13,9 @@ from steelyard.identify import noise_cost
 from steelyard.identify.dense import product, symmetric, times
 from steelyard.identify.linear import inverse_scaled, nonnegative, right_side, without_bias
 from steelyard.identify.problem import Problem
+
+# A direction is shown where its information is above this share of the largest.
+SHOWN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,9 +40,11 @@ class Effective:
 
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
-        shrink = np.linalg.inv(np.eye(10) + self.information @ error)
-        information = shrink @ self.information
-        return replace(self, information=0.5 * (information + information.T), pull=shrink @ self.pull)
+        shrink = self.information @ error
+        shrink.flat[::11] += 1.0
+        found = np.linalg.solve(shrink, np.column_stack([self.information, self.pull]))
+        information = 0.5 * (found[:, :10] + found[:, :10].T)
+        return Effective(information, found[:, 10].copy(), self.bias_at, self.bias_slope)
 
     def linear_at(self, phi: Array) -> Array:
         """Return [phi, bias] (p,) with the bias that fits best beside phi (10,)."""
@@ -46,9 +52,19 @@ class Effective:
 
     def misfit(self, phi: Array) -> float:
         """Return how much worse phi (10,) fits than the best ten numbers, as a chi-square."""
-        best = inverse_scaled(self.information) @ self.pull
-        gap = phi - best
+        gap = phi - self.best
         return max(float(gap @ self.information @ gap), 0.0)
+
+    @cached_property
+    def best(self) -> Array:
+        """The ten numbers (10,) that fit best."""
+        return np.asarray(inverse_scaled(self.information) @ self.pull)
+
+    @cached_property
+    def rank(self) -> int:
+        """How many directions of phi the log shows at all."""
+        values = np.linalg.eigvalsh(self.information)
+        return int((values > SHOWN * values[-1]).sum())
 
 
 @numba.njit(cache=True)

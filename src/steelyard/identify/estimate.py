@@ -121,6 +121,8 @@ class Estimate:
 
     def with_findings(self, *findings: Finding) -> Estimate:
         """Return the estimate with more findings, one of each code and message."""
+        if not findings:
+            return self
         seen = {(f.code, f.message): f for f in (*self.findings, *findings)}
         return replace(self, findings=tuple(seen.values()))
 

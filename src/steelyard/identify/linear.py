@@ -6,7 +6,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.dense import eigen, mirror, product, product_transposed
+from steelyard.identify.dense import cholesky, eigen, inverse_of, mirror, product, product_transposed, times
 from steelyard.identify.noise_cost import add_products, entries, weights_at
 
 # Directions whose information, after scaling the columns to one, is below this share of the largest are left at zero.
@@ -57,20 +57,7 @@ def unit_diagonal(matrix: Array) -> tuple[Array, Array]:
 @numba.njit(cache=True)
 def solve_scaled(H: Array, g: Array) -> Array:
     """Return the least-norm x of H x = g after scaling H to a unit diagonal."""
-    scaled, scale = unit_diagonal(H)
-    values, vectors = eigen(scaled)
-    size = len(g)
-    x = np.zeros(size)
-    for k in range(size):
-        if values[k] > RANK_TOLERANCE * values[-1]:
-            along = 0.0
-            for i in range(size):
-                along += vectors[i, k] * scale[i] * g[i]
-            for i in range(size):
-                x[i] += vectors[i, k] * along / values[k]
-    for i in range(size):
-        x[i] *= scale[i]
-    return x
+    return times(inverse_scaled(H), g)
 
 
 @numba.njit(cache=True)
@@ -96,8 +83,18 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
 def inverse_scaled(matrix: Array) -> Array:
     """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal."""
     scaled, scale = unit_diagonal(matrix)
+    size, trace = len(scale), 0.0
+    low, positive = cholesky(scaled, RANK_TOLERANCE)
+    if positive:
+        out = inverse_of(low)
+        for i in range(size):
+            trace += out[i, i]
+            for j in range(size):
+                out[i, j] *= scale[i] * scale[j]
+        # No eigenvalue is below 1 / trace, none above the number of rows.
+        if trace * size * RANK_TOLERANCE < 1.0:
+            return out
     values, vectors = eigen(scaled)
-    size = len(scale)
     left, right = np.zeros((size, size)), np.empty((size, size))
     for k in range(size):
         for i in range(size):
@@ -121,6 +118,8 @@ def nonnegative(matrix: Array, reference: Array) -> Array:
     for i in range(size):
         for j in range(size):
             scaled[i, j] = 0.5 * (matrix[i, j] + matrix[j, i]) / (scale[i] * scale[j])
+    if cholesky(scaled, RANK_TOLERANCE)[1]:
+        return matrix
     values, vectors = eigen(scaled)
     if values[0] >= 0.0:
         return matrix

@@ -14,7 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.dense import cholesky, eigen, inner, moved, product, solved, times, transposed
-from steelyard.identify.noise_cost import derivatives, residual_map_of, value
+from steelyard.identify.noise_cost import derivatives, residual_map_of
 
 # Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
 # full steps end at rounding, where a line search could only see noise.
@@ -23,6 +23,8 @@ NEAR = 1e-4
 # Mass and centre of mass have no prior: where nothing shows them, this curvature (of a thirty-fold mass, of 30 m) keeps
 # rounding from driving them off. It is no part of the cost.
 DAMPING = 1e-3
+# A step that is halved more often moves nothing.
+HALVINGS = 30
 
 # theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each sits in U.
 _ROW = np.array([0, 0, 1, 2, 0, 1, 0, 0, 1, 2])
@@ -163,17 +165,6 @@ def linear_of(u: Array) -> Array:
 
 
 @numba.njit(cache=True)
-def cost(
-    u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
-) -> float:  # fmt: skip
-    """Return Q/2 + priors at u = [theta, bias]; the bias prior has mean (6,) and precision (6, 6)."""
-    K = residual_map_of(T, linear_of(u))
-    total = 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u, gamma, log_size, precision)[0]
-    return total + _bias_prior(u, bias, bias_precision)[0]
-
-
-@numba.njit(cache=True)
 def _bias_prior(u: Array, mean: Array, precision: Array) -> tuple[float, Array]:
     """Return the prior of the bias in u = [theta, bias], zero where there is none, and its gradient (6,)."""
     off, total = np.zeros(6), 0.0
@@ -261,28 +252,29 @@ def minimise(
     A Hessian that is not positive definite has its negative curvatures turned round (saddle-free Newton); the step is
     kept within a trust length of 1 in log coordinates and halved until the cost falls.
     """
-    u = start.copy()
-    prior = (gamma, log_size, precision, bias, bias_precision)
-    current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
-    for _ in range(iterations):
-        step = _downhill(gradient, hessian)
-        fall = -inner(gradient, step)
-        if 0.5 * fall < NEAR:
-            u = moved(u, step, 1.0)
-            current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
-            return moved(u, _downhill(gradient, hessian), 1.0), current, True
-        longest, better = 1.0, False
+    u, best, step, share, fall = start, np.inf, np.zeros(len(start)), 0.0, 0.0
+    looks, halvings, last = 0, 0, False
+    while True:
+        # The first look is at the start; each further one is at a step, which is halved until the cost falls.
+        trial = moved(u, step, share)
+        now, g, h = cost_derivatives(
+            trial, T, scatter, acceleration, wrench, gamma, log_size, precision, bias, bias_precision
+        )
+        if last:
+            return moved(trial, _downhill(g, h), 1.0), now, True
+        if share > 0.0 and not (now < best - 1e-4 * share * abs(fall) or now < best - 1e-10 * abs(best)):
+            share, halvings = 0.5 * share, halvings + 1
+            if halvings == HALVINGS:
+                return u, best, bool(0.5 * fall < 1e-3)
+            continue
+        u, best, halvings = trial, now, 0
+        if looks == iterations:
+            return u, best, False
+        looks += 1
+        step = _downhill(g, h)
+        fall = -inner(g, step)
+        last = 0.5 * fall < NEAR
+        longest = 1.0
         for k in range(7):
             longest = max(longest, abs(step[k]))
-        share = 1 / longest
-        for _ in range(30):
-            trial = cost(moved(u, step, share), T, scatter, acceleration, wrench, *prior)
-            if trial < current - 1e-4 * share * abs(fall) or trial < current - 1e-10 * abs(current):
-                better = True
-                break
-            share *= 0.5
-        if not better:
-            return u, current, bool(0.5 * fall < 1e-3)
-        u = moved(u, step, share)
-        current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
-    return u, current, False
+        share = 1.0 if last else 1 / longest

@@ -96,22 +96,17 @@ def weights_at(linear: Array, T: Array, acceleration: Array, wrench: Array) -> A
 
 
 @numba.njit(cache=True)
-def residual_squares(K: Array, S: Array) -> Array:
-    """Return C = K S K^T (6, 6), the sum of r r^T over the rows of a scatter matrix (Z, Z)."""
-    return product_transposed(product(K, S), K)
-
-
-@numba.njit(cache=True)
-def value(K: Array, scatter: Array, acceleration: Array, wrench: Array) -> float:
-    """Return Q at K (6, Z) over groups: scatter (C, Z, Z), variances (C, 6) and (C, 6)."""
-    total = 0.0
+def value(K: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[float, Array]:
+    """Return Q at K (6, Z) and the sum of r^2 (6,), over groups: scatter (C, Z, Z), variances (C, 6) and (C, 6)."""
+    total, square = 0.0, np.zeros(6)
     for c in range(scatter.shape[0]):
         W = weight(K, acceleration[c], wrench[c])
-        C = residual_squares(K, scatter[c])
+        C = product_transposed(product(K, scatter[c]), K)
         for i in range(6):
+            square[i] += C[i, i]
             for j in range(6):
                 total += W[i, j] * C[i, j]
-    return total
+    return total, square
 
 
 @numba.njit(cache=True)

@@ -62,12 +62,13 @@ class Problem:
         if moments.noise is None:
             raise BadValue("The statistic must carry its noise; got none. Declare it, or use identify(log).")
         require_rows(int(moments.samples))
-        classes, label = np.unique(moments.noise_class, return_inverse=True)
+        classes = np.flatnonzero(np.bincount(moments.noise_class))
+        label = np.searchsorted(classes, moments.noise_class)
         scatter = np.stack([moments.scatter[label == k].sum(0) for k in range(len(classes))])
         acceleration = np.stack([moments.noise[c].acceleration for c in classes])
         # A reading scatters at least as much as its noise: more noise than that was declared for another motion, and
         # would reward the fit for inertia about axes that nothing turns.
-        seen = np.einsum("cii->ci", scatter)[:, :6] / scatter[:, 18, 18, None]
+        seen = scatter.diagonal(axis1=1, axis2=2)[:, :6] / scatter[:, 18, 18, None]
         acceleration = np.minimum(acceleration, seen)
         wrench = np.stack([moments.noise[c].wrench for c in classes])
         if (wrench <= 0).any():

@@ -39,6 +39,8 @@ class ShapeError:
 
     def grasp_steps(self) -> list[Pose]:
         """Return displacements of one standard deviation along and about each axis that has one."""
+        if not (self.grasp_m or self.grasp_rad):
+            return []
         steps = [Pose(Rotation.identity(), self.grasp_m * axis) for axis in np.eye(3) if self.grasp_m]
         return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
 
