@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify import noise_cost
-from steelyard.identify.dense import eigen, product, product_transposed, transposed
+from steelyard.identify.dense import eigen, product, product_transposed
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
 from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations, without_bias
@@ -39,24 +39,15 @@ RANK_INFORMATION = 4.0
 OPEN, UNSEEN = 0.1, 1e-12
 
 
-@numba.njit(cache=True)
 def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
     """Return the covariance (p, p) of the linear parameters, the prior counted as data of its own strength."""
-    size = H.shape[0]
-    J = np.zeros((size, size))
-    for i in range(size):
-        J[i, i] = 1.0
-    for i in range(10):
-        for j in range(10):
-            J[i, j] = jacobian[i, j]
-    back = transposed(J)
-    A, score = product(product(back, H), J), product(product(back, V), J)
-    for i in range(10):
-        for j in range(10):
-            A[i, j] += prior[i, j]
-            score[i, j] += prior[i, j]
-    bread = product(J, inverse_scaled(A))
-    return product_transposed(product(bread, score), bread)
+    J = np.eye(len(H))
+    J[:10, :10] = jacobian
+    A, score = J.T @ H @ J, J.T @ V @ J
+    A[:10, :10] += prior
+    score[:10, :10] += prior
+    bread = J @ inverse_scaled(A)
+    return np.asarray(bread @ score @ bread.T)
 
 
 def conclude(
@@ -87,7 +78,8 @@ def conclude(
     covariance = _sandwich(bread, meat, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
     seen = meat if solution.weights is None else problem.plus_bias_prior(white)
-    sight = Sight(*_sight(problem.plus_bias_prior(H), seen, solution.linear[:10]))
+    F, G, _, _ = without_bias(problem.plus_bias_prior(H), seen)
+    sight = Sight(*_sight(F, G, solution.linear[:10]))
     if require:
         _require_answer(sight, problem)
     estimate = Estimate(
@@ -118,7 +110,7 @@ def _widened(estimate: Estimate) -> Estimate:
     if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS or not known.any():
         return estimate
     # A channel that holds exact zeros has no noise at all, and nothing to be a multiple of.
-    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector)
+    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
     factor = float(np.median(jackknife[known] / np.maximum(estimate.std, least)[known]))
     if factor < WORTH_WIDENING:
         return estimate
@@ -168,13 +160,12 @@ def identified(std: Array, sizes: Array) -> Mask:
 
 
 @numba.njit(cache=True)
-def _sight(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, Array]:
-    """Return the fields of `Sight` from the information H and the score variance V (p, p), the bias projected out.
+def _sight(F: Array, G: Array, phi: Array) -> tuple[int, float, Array, Array]:
+    """Return the fields of `Sight` from information and score variance (10, 10) of phi, the bias projected out.
 
     In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
     """
     sizes = natural_sizes(phi)
-    F, G, _, _ = without_bias(H, V)
     natural, scaled = np.empty(10), np.empty((10, 10))
     for i in range(10):
         natural[i] = sizes[i] if i == 0 else sizes[0] * sizes[1] * (1.0 if i < 4 else sizes[1])

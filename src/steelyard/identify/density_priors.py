@@ -114,26 +114,18 @@ def log_det(matrix: Array) -> float:
     return total
 
 
-@numba.njit(cache=True)
 def apart(P: int, near: float, wide: float) -> Array:
     """Return the precision (P, P) of log densities with variance `near` about a common one with variance `wide`."""
-    out = np.empty((P, P))
-    for k in range(P):
-        for j in range(P):
-            out[k, j] = (1 / near if k == j else 0.0) - wide / (near * (near + P * wide))
-    return out
+    return np.eye(P) / near - wide / (near * (near + P * wide))
 
 
-@numba.njit(cache=True)
 def common_density(A: Array, b: Array, volume: Array, start: Array) -> tuple[Array, Array, Array]:
     """Return masses (S, P), log evidence (S,) and mass covariance (S, P, P) over the ladder of sigma, widest first."""
-    P, S = len(volume), len(LADDER)
-    masses, evidence, spread = np.zeros((S, P)), np.zeros(S), np.zeros((S, P, P))
-    own, centre, y = np.arange(P), np.empty(P), start
-    for k in range(P):
-        centre[k] = CENTRE
+    P, S, wide = len(volume), len(LADDER), WIDTH**2
+    masses, evidence, spread = np.empty((S, P)), np.empty(S), np.empty((S, P, P))
+    own, centre, y = np.arange(P), np.full(P, CENTRE), start
     for s in range(S - 1, -1, -1):
-        near, wide = LADDER[s] ** 2, WIDTH**2
+        near = float(LADDER[s] ** 2)
         y, cost, hessian = mode(A, b, volume, own, apart(P, near, wide), centre, y)
         prior = (P - 1) * np.log(near) + np.log(near + P * wide)
         evidence[s] = -cost - 0.5 * (prior + log_det(hessian)) - np.log(S)
@@ -183,7 +175,7 @@ def canonical(group: Integers) -> tuple[Integers, int]:
 
 @numba.njit(cache=True)
 def place_of(row: Integers, known: Integers, count: int) -> int:
-    """Return which of the first `count` rows of `known` (N, P) is `row` (P,); else write it there and return `count`."""
+    """Return which of the first `count` rows of `known` (N, P) is `row` (P,), else `count`, and write it there."""
     for i in range(count):
         same = True
         for k in range(len(row)):

@@ -91,7 +91,7 @@ class Estimate:
     @cached_property
     def people_covariance(self) -> Array:
         """Covariance (10, 10) of mass, com, inertia about the CoM (first order)."""
-        jacobian = people_jacobian(self.parameters.vector)
+        jacobian = people_jacobian(self.parameters.vector.copy())
         return np.asarray(jacobian @ self.covariance @ jacobian.T)
 
     @cached_property

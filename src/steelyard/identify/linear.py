@@ -6,11 +6,12 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.dense import cholesky, eigen, inverse_of, mirror, product, product_transposed, times
+from steelyard.identify.dense import cholesky, eigen, inverse_of, mirror, product_transposed, times
 from steelyard.identify.noise_cost import add_products, entries, weights_at
 
 # Directions whose information, after scaling the columns to one, is below this share of the largest are left at zero.
 RANK_TOLERANCE = 1e-12
+_DIAGONAL = np.arange(10)
 # Sizes [kg, m] that no held body exceeds by much: they keep what a log does not excite from running away.
 HEAVIEST, LIGHTEST, FARTHEST, LOOSEST_RADIUS = 1000.0, 0.05, 2.0, 0.5
 
@@ -60,21 +61,16 @@ def solve_scaled(H: Array, g: Array) -> Array:
     return times(inverse_scaled(H), g)
 
 
-@numba.njit(cache=True)
 def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, passes: int) -> Array:
     """Return the linear parameters (p,) of `passes` weighted solutions, W renewed from each for the next.
 
     The first pass knows no parameters, so that W is that of the wrench noise alone.
     """
-    linear = np.zeros(T.shape[0])
+    linear = np.zeros(len(T))
     for _ in range(passes):
         H, g = normal_equations(T, scatter, weights_at(linear, T, acceleration, wrench))
-        mass = max(abs(linear[0]), LIGHTEST)
-        H[0, 0] += HEAVIEST**-2
-        for k in range(1, 4):
-            H[k, k] += (mass * FARTHEST) ** -2
-        for k in range(4, 10):
-            H[k, k] += (mass * LOOSEST_RADIUS**2) ** -2
+        mass = max(abs(float(linear[0])), LIGHTEST)
+        H[_DIAGONAL, _DIAGONAL] += np.repeat([HEAVIEST, mass * FARTHEST, mass * LOOSEST_RADIUS**2], [1, 3, 6]) ** -2
         linear = solve_scaled(H, g)
     return linear
 
@@ -131,31 +127,14 @@ def nonnegative(matrix: Array, reference: Array) -> Array:
     return product_transposed(left, right)
 
 
-@numba.njit(cache=True)
 def without_bias(H: Array, V: Array) -> tuple[Array, Array, Array, Array]:
     """Return information and score variance (10, 10) of phi with the bias projected out, of H and V (p, p).
 
     Then how the bias of b = p - 10 numbers follows phi (b, 10), and its own covariance (b, b) at a given phi.
     """
-    size = H.shape[0]
-    rest = size - 10
-    across, own = np.zeros((rest, 10)), np.zeros((rest, rest))
-    for i in range(rest):
-        for j in range(10):
-            across[i, j] = H[10 + i, j]
-        for j in range(rest):
-            own[i, j] = H[10 + i, 10 + j]
-    if rest:
-        own = inverse_scaled(own)
-    follow = product(own, across)
-    project = np.zeros((10, size))
-    for j in range(10):
-        project[j, j] = 1.0
-        for i in range(rest):
-            project[j, 10 + i] = -follow[i, j]
-    F = np.empty((10, 10))
-    whole = product(project, H)
-    for i in range(10):
-        for j in range(10):
-            F[i, j] = whole[i, j]
-    return F, product_transposed(product(project, V), project), follow, own
+    if len(H) == 10:
+        return H, V, np.zeros((0, 10)), np.zeros((0, 0))
+    own = inverse_scaled(H[10:, 10:].copy())
+    follow = own @ H[10:, :10]
+    project = np.concatenate([np.eye(10), -follow.T], 1)
+    return np.ascontiguousarray((project @ H)[:, :10]), project @ V @ project.T, follow, own

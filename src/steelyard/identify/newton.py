@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.dense import cholesky, eigen, inner, moved, product, solved, times, transposed
+from steelyard.identify.dense import cholesky, eigen, solved
 from steelyard.identify.noise_cost import derivatives, residual_map_of
 
 # Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
@@ -164,52 +164,30 @@ def linear_of(u: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True)
-def _bias_prior(u: Array, mean: Array, precision: Array) -> tuple[float, Array]:
-    """Return the prior of the bias in u = [theta, bias], zero where there is none, and its gradient (6,)."""
-    off, total = np.zeros(6), 0.0
-    for i in range(6):
-        if len(u) > 10:
-            off[i] = u[10 + i] - mean[i]
-    pull = times(precision, off)
-    for i in range(6):
-        total += 0.5 * off[i] * pull[i]
-    return total, pull
-
-
-@numba.njit(cache=True)
 def cost_derivatives(
     u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
 ) -> tuple[float, Array, Array]:  # fmt: skip
-    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias]."""
-    size = len(u)
+    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias].
+
+    The bias prior has mean (6,) and precision (6, 6).
+    """
     U = factor(u)
     Q, g, H = derivatives(residual_map_of(T, linear_of(u)), T, scatter, acceleration, wrench)
-    body, J = jacobian(u, U), np.zeros((size, size))
-    for i in range(size):
-        J[i, i] = 1.0
-    for i in range(10):
-        for j in range(10):
-            J[i, j] = body[i, j]
-    back = transposed(J)
+    J = np.eye(len(u))
+    J[:10, :10] = jacobian(u, U)
     prior, prior_gradient, prior_hessian = shape_prior(u, gamma, log_size, precision)
-    gradient, hessian = times(back, g), product(product(back, H), J)
-    curvature = _curvature(u, U, g)
-    for i in range(size):
-        gradient[i] *= 0.5
-        for j in range(size):
-            hessian[i, j] *= 0.5
-    for i in range(10):
-        gradient[i] += prior_gradient[i]
-        for j in range(10):
-            hessian[i, j] += 0.5 * curvature[i, j] + prior_hessian[i, j]
-    known, pull = _bias_prior(u, bias, bias_precision)
-    for i in range(size - 10):
-        gradient[10 + i] += pull[i]
-        for j in range(size - 10):
-            hessian[10 + i, 10 + j] += bias_precision[i, j]
-    return 0.5 * Q + prior + known, gradient, hessian
+    gradient, hessian = 0.5 * (J.T @ g), 0.5 * (J.T @ H @ J)
+    gradient[:10] += prior_gradient
+    hessian[:10, :10] += 0.5 * _curvature(u, U, g) + prior_hessian
+    total = 0.5 * Q + prior
+    if len(u) > 10:
+        off = u[10:16] - bias
+        pull = bias_precision @ off
+        total += 0.5 * float(off @ pull)
+        gradient[10:16] += pull
+        hessian[10:16, 10:16] += bias_precision
+    return total, gradient, hessian
 
 
 @numba.njit(cache=True)
@@ -242,7 +220,6 @@ def _downhill(gradient: Array, hessian: Array) -> Array:
     return x
 
 
-@numba.njit(cache=True)
 def minimise(
     start: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array, iterations: int,
@@ -252,29 +229,23 @@ def minimise(
     A Hessian that is not positive definite has its negative curvatures turned round (saddle-free Newton); the step is
     kept within a trust length of 1 in log coordinates and halved until the cost falls.
     """
-    u, best, step, share, fall = start, np.inf, np.zeros(len(start)), 0.0, 0.0
-    looks, halvings, last = 0, 0, False
-    while True:
-        # The first look is at the start; each further one is at a step, which is halved until the cost falls.
-        trial = moved(u, step, share)
-        now, g, h = cost_derivatives(
-            trial, T, scatter, acceleration, wrench, gamma, log_size, precision, bias, bias_precision
-        )
-        if last:
-            return moved(trial, _downhill(g, h), 1.0), now, True
-        if share > 0.0 and not (now < best - 1e-4 * share * abs(fall) or now < best - 1e-10 * abs(best)):
-            share, halvings = 0.5 * share, halvings + 1
-            if halvings == HALVINGS:
-                return u, best, bool(0.5 * fall < 1e-3)
-            continue
-        u, best, halvings = trial, now, 0
-        if looks == iterations:
-            return u, best, False
-        looks += 1
-        step = _downhill(g, h)
-        fall = -inner(g, step)
-        last = 0.5 * fall < NEAR
-        longest = 1.0
-        for k in range(7):
-            longest = max(longest, abs(step[k]))
-        share = 1.0 if last else 1 / longest
+    data = (T, scatter, acceleration, wrench, gamma, log_size, precision, bias, bias_precision)
+    u = start
+    current, gradient, hessian = cost_derivatives(u, *data)
+    for _ in range(iterations):
+        step = _downhill(gradient, hessian)
+        fall = -float(gradient @ step)
+        if 0.5 * fall < NEAR:
+            current, gradient, hessian = cost_derivatives(u + step, *data)
+            return u + step + _downhill(gradient, hessian), current, True
+        share = 1 / max(1.0, float(np.abs(step[:7]).max()))
+        for _ in range(HALVINGS):
+            trial, least = u + share * step, current - 1e-4 * share * abs(fall)
+            now, gradient, hessian = cost_derivatives(trial, *data)
+            if now < least or now < current - 1e-10 * abs(current):
+                break
+            share *= 0.5
+        else:
+            return u, current, 0.5 * fall < 1e-3
+        u, current = trial, now
+    return u, current, False

@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.dense import cholesky, inner, moved, product, solved, times, transposed
+from steelyard.identify.dense import cholesky, moved, product, solved, times, transposed
 from steelyard.identify.density_priors import log_det
 from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import Integers
@@ -51,7 +51,6 @@ def tilted(weight: Array, features: Array, per_mass: Array, tilt: Array) -> tupl
     return b, slope
 
 
-@numba.njit(cache=True, nogil=True)
 def fitted(
     information: Array, pull: Array, B: Array, volume: Array, precision: Array, centre: float,
     free: Integers, variance: Array, weight: Array, features: Array, per_mass: Array, y: Array, tilts: Array,
@@ -62,34 +61,27 @@ def fitted(
     B (10, P) per kilogram of even parts; `free` (f,) rows of the free ones, and of these the `variance` (F f,) of
     tilts, and points: weight (f, N), features (f, N, F), per_mass (f, N, 10). y, tilts: where to start.
     """
-    P, q = len(volume), len(volume) + len(variance)
-    x = np.empty(q)
-    for k in range(q):
-        x[k] = y[k] if k < P else tilts[k - P]
-    cost, gradient, curve, hessian, J, phi = _cost(
-        information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass, x
-    )
+    P = len(volume)
+    data = (information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass)
+    longest = np.repeat([LONGEST_DENSITY, LONGEST_TILT], [P, len(variance)])
+    x = np.concatenate([y, tilts])
+    found = _cost(*data, x)
     for _ in range(STEPS):
+        before, gradient, curve, hessian = found[:4]
         step = _solve(hessian, curve, gradient)
-        if -inner(gradient, step) < FALL:
+        if -(gradient @ step) < FALL:
             break
-        longest, before = 1.0, cost
-        for k in range(q):
-            longest = max(longest, abs(step[k]) / (LONGEST_DENSITY if k < P else LONGEST_TILT))
-        share = 1 / longest
+        step /= max(1.0, float((np.abs(step) / longest).max()))
         for _ in range(HALVINGS):
-            trial = moved(x, step, share)
-            found = _cost(
-                information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass, trial
-            )
-            if found[0] < before:
-                x = trial
-                cost, gradient, curve, hessian, J, phi = found
+            trial = _cost(*data, x + step)
+            if trial[0] < before:
+                x, found = x + step, trial
                 break
-            share *= 0.5
-        if before - cost < FALL:
+            step *= 0.5
+        if before - found[0] < FALL:
             break
-    return x[:P], x[P:], cost, curve, hessian, J, phi
+    cost, _, curve, hessian, J, phi = found
+    return x[:P].copy(), x[P:].copy(), cost, curve, hessian, J, phi
 
 
 @numba.njit(cache=True, nogil=True)
@@ -148,21 +140,16 @@ def _solve(hessian: Array, curve: Array, gradient: Array) -> Array:
     return solved(cholesky(full, 1e-9)[0], moved(np.zeros(len(gradient)), gradient, -1.0))
 
 
-@numba.njit(cache=True, nogil=True)
 def evidence_of(
     cost: float, hessian: Array, curve: Array, spread: float, wide: float, parts: int, variance: Array
 ) -> float:
     """Return Laplace's log evidence of a mode: densities `spread` apart about a common one known to `wide`."""
-    prior = (parts - 1) * np.log(spread) + np.log(spread + parts * wide)
-    for f in range(len(variance)):
-        prior += np.log(variance[f])
+    prior = (parts - 1) * np.log(spread) + np.log(spread + parts * wide) + np.log(variance).sum()
     full = hessian.copy()
-    for k in range(parts):
-        full[k, k] += curve[k]
-    return -cost - 0.5 * (prior + log_det(full))
+    full[range(parts), range(parts)] += curve
+    return float(-cost - 0.5 * (prior + log_det(full)))
 
 
-@numba.njit(cache=True, nogil=True)
 def scores(
     information: Array, pull: Array, phi: Array, J: Array, hessian: Array, masses: Array, slopes: Array, widths: Array
 ) -> Array:
@@ -171,22 +158,11 @@ def scores(
     The state is a mode: phi (10,), J (10, q), hessian (q, q) without what masses bend it by. Of the parts asked about:
     masses (P,), slopes (P, 10, F) per kilogram; `widths` (W, F) are standard deviations.
     """
-    W, F = widths.shape
-    seen = product(information, J)
-    known = product(product(seen, inverse_scaled(hessian)), transposed(seen))
-    for i in range(10):
-        for j in range(10):
-            known[i, j] = information[i, j] - known[i, j]
-    rest = moved(times(information, phi), pull, -1.0)
-    out, scaled, h = np.zeros((W, len(masses))), np.empty((F, F)), np.empty(F)
-    for k in range(len(masses)):
-        back = transposed(slopes[k])
-        A, g = product(back, product(known, slopes[k])), times(back, rest)
-        for w in range(W):
-            for i in range(F):
-                h[i] = widths[w, i] * masses[k] * g[i]
-                for j in range(F):
-                    scaled[i, j] = widths[w, i] * widths[w, j] * masses[k] ** 2 * A[i, j] + (1.0 if i == j else 0.0)
-            x = solved(cholesky(scaled, 1e-9)[0], h)
-            out[w, k] = 0.5 * inner(h, x) - 0.5 * log_det(scaled)
-    return out
+    seen = information @ J
+    known = information - seen @ inverse_scaled(hessian) @ seen.T
+    back = masses[:, None, None] * slopes.transpose(0, 2, 1)
+    A, g = back @ known @ back.transpose(0, 2, 1), back @ (information @ phi - pull)
+    scaled = np.eye(widths.shape[1]) + (widths[:, :, None] * widths[:, None, :])[:, None] * A
+    h = (widths[:, None] * g)[..., None]
+    gain = (h * np.linalg.solve(scaled, h)).sum((2, 3))
+    return np.asarray(0.5 * gain - 0.5 * np.linalg.slogdet(scaled)[1])

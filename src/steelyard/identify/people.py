@@ -1,6 +1,7 @@
 """The numbers that people read (mass, centre of mass, inertia about it) and the ten parameters: slopes both ways.
 
-Compiled for one body: every estimate needs them a few times, and the plain forms cost more than the solve.
+Compiled for one body: every estimate needs them a few times, and the plain forms cost more than the solve. Compiled
+once, for arrays that may be written to: hand over a copy of one that may not.
 """
 
 from __future__ import annotations

@@ -110,6 +110,14 @@ class Problem:
         out[10:16, 10:16] += self.bias_prior.precision
         return out
 
+    def plus_bias_pull(self, g: Array) -> Array:
+        """Return the right side g (p,) that goes with `plus_bias_prior`."""
+        if not self.with_bias:
+            return g
+        out = g.copy()
+        out[10:16] += self.bias_prior.precision @ self.bias_prior.mean
+        return out
+
     def noise_weights(self, K: Array) -> Array:
         """Return W (C, 6, 6), the inverse of each class's noise at the residual map K (6, Z)."""
         return np.stack([weight(K, a, w) for a, w in zip(self.acceleration, self.wrench, strict=True)])
@@ -122,10 +130,7 @@ class Problem:
     def normal_equations(self, weights: Array) -> tuple[Array, Array]:
         """Return H (p, p) and g (p,) of the rows weighted by `weights` (C, 6, 6), with what is known of the bias."""
         H, g = normal_equations(self.T, self.scatter, weights)
-        if self.with_bias:
-            H[10:16, 10:16] += self.bias_prior.precision
-            g[10:16] += self.bias_prior.precision @ self.bias_prior.mean
-        return H, g
+        return self.plus_bias_prior(H), self.plus_bias_pull(g)
 
     @property
     def with_bias(self) -> bool:

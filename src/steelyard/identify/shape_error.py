@@ -46,9 +46,9 @@ class ShapeError:
 
     def covariance(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
-        variance = np.zeros(10)
-        variance[1:4], variance[4:] = self.com_m**2, (self.inertia_share * half_trace_com(body.vector)) ** 2
-        back = parameter_jacobian(body.vector)
+        phi, variance = body.vector.copy(), np.zeros(10)
+        variance[1:4], variance[4:] = self.com_m**2, (self.inertia_share * half_trace_com(phi)) ** 2
+        back = parameter_jacobian(phi)
         return np.asarray((back * variance) @ back.T)
 
     def with_grasp(self, body: InertialParameters) -> Array:
