@@ -92,16 +92,6 @@ def moved(x: Array, step: Array, share: float) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def symmetric(a: Array) -> Array:
-    """Return (a + a^T) / 2."""
-    out = np.empty(a.shape)
-    for i in range(a.shape[0]):
-        for j in range(a.shape[0]):
-            out[i, j] = 0.5 * (a[i, j] + a[j, i])
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
 def mirror(a: Array) -> None:
     """Copy what is below the diagonal above it, in place."""
     for i in range(a.shape[0]):

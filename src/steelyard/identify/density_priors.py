@@ -243,7 +243,7 @@ def _grouped(
         centre[g], precision[g, g] = CENTRE, WIDTH**-2
     y, cost, hessian = mode(A, b, volume, group, precision, centre, y)
     spread_masses(volume, group, y, hessian, masses, spread)
-    return -cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + partition_prior(group, G)
+    return float(-cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + partition_prior(group, G))
 
 
 def first_partitions(start: Array) -> Integers:

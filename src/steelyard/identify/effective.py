@@ -46,9 +46,9 @@ class Effective:
 
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
-        shrink = self.information @ error
+        shrink: Array = self.information @ error
         shrink.flat[::11] += 1.0
-        found = np.linalg.solve(shrink, np.column_stack([self.information, self.pull]))
+        found = np.asarray(np.linalg.solve(shrink, np.column_stack([self.information, self.pull])), np.float64)
         information = 0.5 * (found[:, :10] + found[:, :10].T)
         return Effective(information, found[:, 10].copy(), self.bias_at, self.bias_slope)
 
