@@ -11,10 +11,10 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify import noise_cost
+from steelyard.identify.dense import eigen, product, product_transposed
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
-from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
-from steelyard.identify.newton import residual_map_of
+from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.people import people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
@@ -39,17 +39,15 @@ RANK_INFORMATION = 4.0
 OPEN, UNSEEN = 0.1, 1e-12
 
 
-@numba.njit(cache=True)
 def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
     """Return the covariance (p, p) of the linear parameters, the prior counted as data of its own strength."""
-    size = H.shape[0]
-    J = np.eye(size)
+    J = np.eye(len(H))
     J[:10, :10] = jacobian
     A, score = J.T @ H @ J, J.T @ V @ J
     A[:10, :10] += prior
     score[:10, :10] += prior
     bread = J @ inverse_scaled(A)
-    return bread @ score @ bread.T
+    return np.asarray(bread @ score @ bread.T)
 
 
 def conclude(
@@ -58,13 +56,16 @@ def conclude(
     """Return the Estimate of a solution.
 
     `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
-    Raises CannotAnswer where mass or centre of mass are not fixed, unless `require` is false: a shape may fix them.
+    Raises CannotAnswer where mass or centre of mass are not fixed, and names the inertia that is not, unless `require`
+    is false: a shape may fix them.
     """
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
-    data = (problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    K, H, extra, cost, square = _weighed(solution.linear, *data)
-    rows = problem.samples
+    data, noise = problem.scatter, (problem.acceleration, problem.wrench)
+    K = noise_cost.residual_map_of(problem.T, solution.linear)
+    H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
+    cost, square = noise_cost.value(K, data, *noise)
+    H, rows = nonnegative(H, plain), problem.samples
     chi2 = max(cost / max(6 * rows - len(solution.linear), 1.0), 0.0)
     residual_torque, residual_force = (float(np.sqrt(max(s.mean() / rows, 0))) for s in (square[:3], square[3:]))
     white = max(chi2, 1.0) * (H + extra)
@@ -77,7 +78,8 @@ def conclude(
     covariance = _sandwich(bread, meat, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
     seen = meat if solution.weights is None else problem.plus_bias_prior(white)
-    sight = Sight(*_sight(problem.plus_bias_prior(H), seen, solution.linear[:10]))
+    F, G, _, _ = without_bias(problem.plus_bias_prior(H), seen)
+    sight = Sight(*_sight(F, G, solution.linear[:10]))
     if require:
         _require_answer(sight, problem)
     estimate = Estimate(
@@ -96,8 +98,7 @@ def conclude(
     left_out = leave_one_out(problem, solution, bread)
     if left_out:
         estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
-    found = _findings(estimate)
-    return _widened(estimate.with_findings(*found) if found else estimate)
+    return _widened(estimate.with_findings(*_findings(estimate)) if require else estimate)
 
 
 def _widened(estimate: Estimate) -> Estimate:
@@ -109,7 +110,7 @@ def _widened(estimate: Estimate) -> Estimate:
     if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS or not known.any():
         return estimate
     # A channel that holds exact zeros has no noise at all, and nothing to be a multiple of.
-    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector)
+    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
     factor = float(np.median(jackknife[known] / np.maximum(estimate.std, least)[known]))
     if factor < WORTH_WIDENING:
         return estimate
@@ -144,8 +145,12 @@ def natural_sizes(phi: Array) -> Array:
     mass = max(abs(phi[0]), 1e-6)
     square = phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]
     trace = abs((phi[4] + phi[7] + phi[9]) / 2 - square / mass)
-    out = np.full(10, max(trace, mass * SMALLEST_RADIUS**2))
-    out[0], out[1:4] = mass, max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    out = np.empty(10)
+    out[0] = mass
+    for i in range(1, 4):
+        out[i] = max(np.sqrt(trace / mass / 3), SMALLEST_RADIUS)
+    for i in range(4, 10):
+        out[i] = max(trace, mass * SMALLEST_RADIUS**2)
     return out
 
 
@@ -155,53 +160,44 @@ def identified(std: Array, sizes: Array) -> Mask:
 
 
 @numba.njit(cache=True)
-def _sight(H: Array, V: Array, phi: Array) -> tuple[int, float, Array, Array]:
-    """Return the fields of `Sight` from the information H and the score variance V (p, p), the bias projected out.
+def _sight(F: Array, G: Array, phi: Array) -> tuple[int, float, Array, Array]:
+    """Return the fields of `Sight` from information and score variance (10, 10) of phi, the bias projected out.
 
     In natural units (mass m, length r, the radius of gyration) an eigenvalue 1 fixes a direction to its own size.
     """
     sizes = natural_sizes(phi)
-    mass, radius = sizes[0], sizes[1]
-    natural = np.full(10, mass * radius * radius)
-    natural[0], natural[1:4] = mass, mass * radius
-    F, G = _without_bias(H, V)
-    values, vectors = np.linalg.eigh(F * np.outer(natural, natural))
-    directions = people_jacobian(phi) @ (natural.reshape(-1, 1) * vectors)
+    natural, scaled = np.empty(10), np.empty((10, 10))
+    for i in range(10):
+        natural[i] = sizes[i] if i == 0 else sizes[0] * sizes[1] * (1.0 if i < 4 else sizes[1])
+    for i in range(10):
+        for j in range(10):
+            scaled[i, j] = F[i, j] * natural[i] * natural[j]
+    values, vectors = eigen(scaled)
+    into = np.empty((10, 10))
+    for i in range(10):
+        for k in range(10):
+            into[i, k] = natural[i] * vectors[i, k]
+    directions = product(people_jacobian(phi), into)
     # Directions that the data leave open may be off by several times their natural size, not by anything at all.
-    hidden = values < max(OPEN, UNSEEN * values[-1])
-    inverse = np.where(hidden, 0.0, 1 / np.where(hidden, 1.0, values))
-    bread = (directions * inverse) @ np.ascontiguousarray(vectors.T) * natural
-    variance = ((bread @ G) * bread).sum(1)
-    open_end = (np.where(hidden, directions, 0.0) ** 2).sum(1) / OPEN
-    std = np.where(open_end > sizes**2, np.inf, np.sqrt(np.maximum(variance, 0.0) + open_end))
-    fixed = values > RANK_INFORMATION
-    condition = np.sqrt(values[-1] / values[fixed][0]) if fixed.any() else np.inf
-    return int(fixed.sum()), condition, std, sizes
-
-
-@numba.njit(cache=True)
-def _without_bias(H: Array, V: Array) -> tuple[Array, Array]:
-    """Return information and score variance (10, 10) of phi with the bias projected out."""
-    size = H.shape[0]
-    if size == 10:
-        return H, V
-    project = np.zeros((10, size))
-    project[:, :10] = np.eye(10)
-    project[:, 10:] = -np.ascontiguousarray(H[:10, 10:]) @ inverse_scaled(np.ascontiguousarray(H[10:, 10:]))
-    return project @ np.ascontiguousarray(H[:, :10]), project @ V @ project.T
-
-
-@numba.njit(cache=True)
-def _weighed(
-    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
-) -> tuple[Array, Array, Array, float, Array]:
-    """Return the residual map K, the information H, what noise adds to its score, the cost and sum r^2 (6,)."""
-    K = residual_map_of(T, linear)
-    H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
-    cost, square = noise_cost.value(K, scatter, acceleration, wrench), np.zeros(6)
-    for c in range(scatter.shape[0]):
-        square += ((K @ scatter[c]) * K).sum(1)
-    return K, nonnegative(H, plain), extra, cost, square
+    least = max(OPEN, UNSEEN * values[-1])
+    seen, open_end, rank, weakest = np.zeros((10, 10)), np.zeros(10), 0, np.inf
+    for k in range(10):
+        if values[k] > RANK_INFORMATION:
+            rank += 1
+            weakest = min(weakest, values[k])
+        for i in range(10):
+            if values[k] < least:
+                open_end[i] += directions[i, k] ** 2 / OPEN
+            else:
+                seen[i, k] = directions[i, k] / values[k]
+    bread = product_transposed(seen, into)
+    half, std = product(bread, G), np.empty(10)
+    for i in range(10):
+        variance = 0.0
+        for j in range(10):
+            variance += half[i, j] * bread[i, j]
+        std[i] = np.inf if open_end[i] > sizes[i] ** 2 else np.sqrt(max(variance, 0.0) + open_end[i])
+    return rank, np.sqrt(values[-1] / weakest) if rank else np.inf, std, sizes
 
 
 def _require_answer(sight: Sight, problem: Problem) -> None:

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.identify.dense import cholesky, eigen, inner, moved, solved, times
 from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import Integers
 
@@ -23,6 +24,8 @@ CENTRE, WIDTH = float(np.log(2500.0)), 1.3
 # How much densities of "one" material differ: from one part made of one piece to anything at all.
 LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
 STEPS, FALL = 30, 1e-7
+# Curvatures below this count as this: the prior alone gives a free density half of one.
+FLATTEST = 1e-6
 MOST_MODELS = 600
 SWEEPS = 3
 # The search from all parts apart is dear, and among many parts never the one that wins.
@@ -36,25 +39,42 @@ def mode(
     A: Array, b: Array, volume: Array, group: Integers, precision: Array, centre: Array, start: Array
 ) -> tuple[Array, float, Array]:
     """Return the mode y (G,), its cost with the prior N(centre, precision^-1), and the Hessian (G, G), by Newton."""
-    y = start.copy()
-    G = len(y)
-    cost, gradient, hessian = _cost(A, b, volume, group, precision, centre, y)
-    for _ in range(STEPS):
-        values, vectors = np.linalg.eigh(hessian)
-        step = -(vectors @ ((vectors.T @ gradient) / np.maximum(np.abs(values), 1e-6)))
-        fall = -(gradient @ step)
-        if fall < FALL:
-            break
-        longest = np.abs(step).max()
-        if longest > 1.0:
-            step = step / longest
+    y, step, share = start, np.zeros(len(start)), 0.0
+    best, hessian = np.inf, precision
+    for _ in range(STEPS + 1):
+        # The first look is at the start itself; each further one is a step that is halved until the cost falls.
         for _ in range(20):
-            now, g, h = _cost(A, b, volume, group, precision, centre, y + step)
-            if now < cost + 1e-12 * abs(cost):
+            trial = moved(y, step, share)
+            now, g, h = _cost(A, b, volume, group, precision, centre, trial)
+            if share == 0.0 or now < best + 1e-12 * abs(best):
                 break
-            step = 0.5 * step
-        y, cost, gradient, hessian = y + step, now, g, h
-    return y, cost, hessian.reshape(G, G)
+            share *= 0.5
+        y, best, hessian = trial, now, h
+        step = _newton(g, h)
+        if -inner(g, step) < FALL:
+            break
+        longest = 1.0
+        for k in range(len(y)):
+            longest = max(longest, abs(step[k]))
+        share = 1 / longest
+    return y, best, hessian
+
+
+@numba.njit(cache=True)
+def _newton(gradient: Array, hessian: Array) -> Array:
+    """Return the Newton step, with negative curvatures turned round (saddle-free) where the Hessian has any."""
+    low, positive = cholesky(hessian, FLATTEST)
+    step = np.zeros(len(gradient))
+    if positive:
+        return moved(step, solved(low, gradient), -1.0)
+    values, vectors = eigen(hessian)
+    for k in range(len(values)):
+        along = 0.0
+        for i in range(len(values)):
+            along += vectors[i, k] * gradient[i]
+        for i in range(len(values)):
+            step[i] -= vectors[i, k] * along / max(abs(values[k]), FLATTEST)
+    return step
 
 
 @numba.njit(cache=True)
@@ -62,50 +82,66 @@ def _cost(
     A: Array, b: Array, volume: Array, group: Integers, precision: Array, centre: Array, y: Array
 ) -> tuple[float, Array, Array]:
     """Return data cost plus prior at log densities y (G,), gradient and Hessian."""
-    P, G = len(volume), len(y)
+    P, cost = len(volume), 0.0
     mass = np.empty(P)
     for k in range(P):
         mass[k] = volume[k] * np.exp(min(y[group[k]], 20.0))
-    Am = A @ mass
-    cost = float(0.5 * (mass @ Am) - b @ mass)
-    off = y - centre
-    pull = precision @ off
-    cost += float(0.5 * (off @ pull))
-    gradient, hessian = pull.copy(), precision.copy()
+    Am, off = times(A, mass), moved(y, centre, -1.0)
+    gradient, hessian = times(precision, off), precision.copy()
+    for g in range(len(y)):
+        cost += 0.5 * off[g] * gradient[g]
     for k in range(P):
+        cost += mass[k] * (0.5 * Am[k] - b[k])
         slope = mass[k] * (Am[k] - b[k])
         gradient[group[k]] += slope
         hessian[group[k], group[k]] += slope
         for j in range(P):
             hessian[group[k], group[j]] += mass[k] * A[k, j] * mass[j]
-    return cost, gradient, hessian.reshape(G, G)
+    return cost, gradient, hessian
 
 
 @numba.njit(cache=True)
 def log_det(matrix: Array) -> float:
     """Return log det of a symmetric matrix, with eigenvalues kept above zero."""
+    low, positive = cholesky(matrix, FLATTEST)
     total = 0.0
-    for value in np.linalg.eigvalsh(matrix):
-        total += np.log(max(value, 1e-9))
+    if positive:
+        for k in range(len(low)):
+            total += 2 * np.log(low[k, k])
+    else:
+        for value in eigen(matrix)[0]:
+            total += np.log(max(value, 1e-9))
     return total
 
 
-@numba.njit(cache=True)
+def apart(P: int, near: float, wide: float) -> Array:
+    """Return the precision (P, P) of log densities with variance `near` about a common one with variance `wide`."""
+    return np.eye(P) / near - wide / (near * (near + P * wide))
+
+
 def common_density(A: Array, b: Array, volume: Array, start: Array) -> tuple[Array, Array, Array]:
     """Return masses (S, P), log evidence (S,) and mass covariance (S, P, P) over the ladder of sigma, widest first."""
-    P, S = len(volume), len(LADDER)
-    masses, evidence, spread = np.zeros((S, P)), np.zeros(S), np.zeros((S, P, P))
-    own = np.arange(P)
-    y = start.copy()
+    P, S, wide = len(volume), len(LADDER), WIDTH**2
+    masses, evidence, spread = np.empty((S, P)), np.empty(S), np.empty((S, P, P))
+    own, centre, y = np.arange(P), np.full(P, CENTRE), start
     for s in range(S - 1, -1, -1):
-        near, wide = LADDER[s] ** 2, WIDTH**2
-        precision = np.eye(P) / near - wide / (near * (near + P * wide))
-        y, cost, hessian = mode(A, b, volume, own, precision, np.full(P, CENTRE), y)
+        near = float(LADDER[s] ** 2)
+        y, cost, hessian = mode(A, b, volume, own, apart(P, near, wide), centre, y)
         prior = (P - 1) * np.log(near) + np.log(near + P * wide)
-        evidence[s] = -cost - 0.5 * (prior + log_det(hessian))
-        masses[s] = volume * np.exp(y)
-        spread[s] = np.outer(masses[s], masses[s]) * inverse_scaled(hessian)
-    return masses, evidence - np.log(S), spread
+        evidence[s] = -cost - 0.5 * (prior + log_det(hessian)) - np.log(S)
+        spread_masses(volume, own, y, hessian, masses[s], spread[s])
+    return masses, evidence, spread
+
+
+@numba.njit(cache=True)
+def spread_masses(volume: Array, group: Integers, y: Array, hessian: Array, masses: Array, spread: Array) -> None:
+    """Write masses (P,) and their covariance (P, P) at a mode."""
+    inverse = inverse_scaled(hessian)
+    for k in range(len(volume)):
+        masses[k] = volume[k] * np.exp(y[group[k]])
+    for k in range(len(volume)):
+        for j in range(len(volume)):
+            spread[k, j] = masses[k] * masses[j] * inverse[group[k], group[j]]
 
 
 @numba.njit(cache=True)
@@ -127,14 +163,29 @@ def partition_prior(group: Integers, G: int) -> float:
 @numba.njit(cache=True)
 def canonical(group: Integers) -> tuple[Integers, int]:
     """Return the partition with groups numbered in the order of their first part, and their number."""
-    out, seen = np.full(len(group), -1), np.full(len(group) + 1, -1)
+    out, seen = np.empty(len(group), np.int64), np.zeros(len(group) + 1, np.int64)
     G = 0
     for k in range(len(group)):
-        if seen[group[k]] < 0:
-            seen[group[k]] = G
+        if seen[group[k]] == 0:
             G += 1
-        out[k] = seen[group[k]]
+            seen[group[k]] = G
+        out[k] = seen[group[k]] - 1
     return out, G
+
+
+@numba.njit(cache=True)
+def place_of(row: Integers, known: Integers, count: int) -> int:
+    """Return which of the first `count` rows of `known` (N, P) is `row` (P,), else `count`, and write it there."""
+    for i in range(count):
+        same = True
+        for k in range(len(row)):
+            same = same and known[i, k] == row[k]
+        if same:
+            return i
+    if count < len(known):
+        for k in range(len(row)):
+            known[count, k] = row[k]
+    return count
 
 
 @numba.njit(cache=True)
@@ -146,61 +197,53 @@ def equal_groups(
     From each of the partitions `starts` (K, P) every part is tried in every other group and in one of its own, sweep by
     sweep, as long as the evidence rises; everything looked at counts in the average.
     """
-    P = len(volume)
-    masses, evidence = np.zeros((MOST_MODELS, P)), np.full(MOST_MODELS, -np.inf)
-    spread, known = np.zeros((MOST_MODELS, P, P)), np.full((MOST_MODELS, P), -1)
+    P, N = len(volume), MOST_MODELS
+    masses, evidence, spread = np.zeros((N, P)), np.zeros(N), np.zeros((N, P, P))
+    known = np.zeros((N, P), np.int64)
     count = 0
     for k0 in range(len(starts)):
-        current, _ = canonical(starts[k0])
+        current, most = canonical(starts[k0])
         best = -np.inf
         for sweep in range(SWEEPS + 1):
             improved = False
             for k in range(P if sweep else 1):
-                base = current.copy()
-                G = base.max() + 1
-                for g in range(G + 1 if sweep else 1):
+                base = current
+                for g in range(most + 1 if sweep else 1):
                     trial = base.copy()
                     if sweep:
                         trial[k] = g
                     trial, groups = canonical(trial)
-                    place = -1
-                    for i in range(count):
-                        if (known[i] == trial).all():
-                            place = i
-                            break
-                    if place < 0:
-                        if count == MOST_MODELS:
+                    place = place_of(trial, known, count)
+                    if place == count:
+                        if count == N:
                             return masses, evidence, spread, known, count
-                        place = count
                         count += 1
-                        known[place] = trial
-                        masses[place], evidence[place], spread[place] = _grouped(A, b, volume, trial, groups, start)
+                        evidence[place] = _grouped(A, b, volume, trial, groups, start, masses[place], spread[place])
                     if evidence[place] > best + 1e-9:
-                        best, current, improved = evidence[place], trial.copy(), True
+                        best, current, improved = evidence[place], trial, True
+                most = 0
+                for i in range(P):
+                    most = max(most, current[i] + 1)
             if sweep and not improved:
                 break
     return masses, evidence, spread, known, count
 
 
 @numba.njit(cache=True)
-def _grouped(A: Array, b: Array, volume: Array, group: Integers, G: int, start: Array) -> tuple[Array, float, Array]:
-    """Return masses (P,), log evidence and covariance (P, P) of one partition."""
-    P = len(volume)
-    y, weight = np.zeros(G), np.zeros(G)
-    for k in range(P):
+def _grouped(
+    A: Array, b: Array, volume: Array, group: Integers, G: int, start: Array, masses: Array, spread: Array
+) -> float:
+    """Return the log evidence of one partition; write masses (P,) and their covariance (P, P)."""
+    y, weight, centre, precision = np.zeros(G), np.zeros(G), np.empty(G), np.zeros((G, G))
+    for k in range(len(volume)):
         y[group[k]] += volume[k] * start[k]
         weight[group[k]] += volume[k]
-    y /= weight
-    y, cost, hessian = mode(A, b, volume, group, np.eye(G) / WIDTH**2, np.full(G, CENTRE), y)
-    evidence = -cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + partition_prior(group, G)
-    inverse = inverse_scaled(hessian)
-    mass, spread = np.empty(P), np.empty((P, P))
-    for k in range(P):
-        mass[k] = volume[k] * np.exp(y[group[k]])
-    for k in range(P):
-        for j in range(P):
-            spread[k, j] = mass[k] * mass[j] * inverse[group[k], group[j]]
-    return mass, evidence, spread
+    for g in range(G):
+        y[g] /= weight[g]
+        centre[g], precision[g, g] = CENTRE, WIDTH**-2
+    y, cost, hessian = mode(A, b, volume, group, precision, centre, y)
+    spread_masses(volume, group, y, hessian, masses, spread)
+    return float(-cost - 0.5 * (2 * G * np.log(WIDTH) + log_det(hessian)) + partition_prior(group, G))
 
 
 def first_partitions(start: Array) -> Integers:

@@ -2,16 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
-import numba
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
-from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations
-from steelyard.identify.newton import residual_map_of
+from steelyard.identify.linear import inverse_scaled, nonnegative, right_side, without_bias
 from steelyard.identify.problem import Problem
+
+# A direction is shown where its information is above this share of the largest.
+SHOWN = 1e-9
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,15 +32,25 @@ class Effective:
         H is the information with the noise of the acceleration taken out of the scatter, so that H phi = g is
         consistent; V adds what that noise does to the score, or is `score` where the log's own correlation is known.
         """
-        data = (linear, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-        score = np.zeros((0, 0)) if score is None else score
-        return cls(*_effective(*data, problem.bias_prior.mean, problem.bias_prior.precision, score))
+        data, noise = (problem.T, problem.scatter), (problem.acceleration, problem.wrench)
+        weights = noise_cost.weights_at(linear, problem.T, *noise)
+        H, extra, plain = noise_cost.information(noise_cost.residual_map_of(problem.T, linear), *data, *noise)
+        H = nonnegative(H, plain)
+        V = problem.plus_bias_prior(H + extra if score is None else score)
+        g = problem.plus_bias_pull(right_side(*data, weights))
+        F, G, follow, own = without_bias(problem.plus_bias_prior(H), V)
+        half = F @ inverse_scaled(G)
+        information = half @ F
+        pull = half @ (g[:10] - g[10:] @ follow)
+        return cls(0.5 * (information + information.T), pull, own @ g[10:], follow)
 
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
-        shrink = np.linalg.inv(np.eye(10) + self.information @ error)
-        information = shrink @ self.information
-        return replace(self, information=0.5 * (information + information.T), pull=shrink @ self.pull)
+        shrink: Array = self.information @ error
+        shrink.flat[::11] += 1.0
+        found = np.asarray(np.linalg.solve(shrink, np.column_stack([self.information, self.pull])), np.float64)
+        information = 0.5 * (found[:, :10] + found[:, :10].T)
+        return Effective(information, found[:, 10].copy(), self.bias_at, self.bias_slope)
 
     def linear_at(self, phi: Array) -> Array:
         """Return [phi, bias] (p,) with the bias that fits best beside phi (10,)."""
@@ -46,50 +58,16 @@ class Effective:
 
     def misfit(self, phi: Array) -> float:
         """Return how much worse phi (10,) fits than the best ten numbers, as a chi-square."""
-        best = inverse_scaled(self.information) @ self.pull
-        gap = phi - best
+        gap = phi - self.best
         return max(float(gap @ self.information @ gap), 0.0)
 
+    @cached_property
+    def best(self) -> Array:
+        """The ten numbers (10,) that fit best."""
+        return np.asarray(inverse_scaled(self.information) @ self.pull)
 
-@numba.njit(cache=True)
-def _effective(
-    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    bias_mean: Array, bias_precision: Array, score: Array,
-) -> tuple[Array, Array, Array, Array]:  # fmt: skip
-    """Return the fields of `Effective` at `linear` (p,); an empty `score` means that noise is white."""
-    size = len(linear)
-    H, extra, plain, g = _statistics(linear, T, scatter, acceleration, wrench)
-    H = nonnegative(H, plain)
-    V = H + extra if score.shape[0] == 0 else score.copy()
-    if size > 10:
-        g[10:16] += bias_precision @ bias_mean
-        H, bread = H.copy(), np.zeros((size - 10, size - 10))
-        V[10:16, 10:16] += bias_precision
-        H[10:16, 10:16] += bias_precision
-        bread = inverse_scaled(H[10:, 10:])
-    else:
-        bread = np.zeros((0, 0))
-    project = np.zeros((10, size))
-    project[:, :10] = np.eye(10)
-    if size > 10:
-        project[:, 10:] = -np.ascontiguousarray(H[:10, 10:]) @ bread
-    slope = project @ np.ascontiguousarray(H[:, :10])
-    half = slope @ inverse_scaled(project @ V @ project.T)
-    information = half @ slope
-    bias_at = bread @ g[10:]
-    bias_slope = bread @ np.ascontiguousarray(H[10:, :10])
-    return 0.5 * (information + information.T), half @ (project @ g), bias_at, bias_slope
-
-
-@numba.njit(cache=True)
-def _statistics(
-    linear: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array
-) -> tuple[Array, Array, Array, Array]:
-    """Return the information H, what noise adds to it, the plain normal matrix and its right side at `linear` (p,)."""
-    K = residual_map_of(T, linear)
-    H, extra, plain = noise_cost.information(K, T, scatter, acceleration, wrench)
-    weights = np.zeros((scatter.shape[0], 6, 6))
-    for c in range(scatter.shape[0]):
-        weights[c] = noise_cost.weight(K, acceleration[c], wrench[c])
-    _, g = normal_equations(T, scatter, weights)
-    return H, extra, plain, g
+    @cached_property
+    def rank(self) -> int:
+        """How many directions of phi the log shows at all."""
+        values = np.linalg.eigvalsh(self.information)
+        return int((values > SHOWN * values[-1]).sum())

@@ -91,7 +91,7 @@ class Estimate:
     @cached_property
     def people_covariance(self) -> Array:
         """Covariance (10, 10) of mass, com, inertia about the CoM (first order)."""
-        jacobian = people_jacobian(self.parameters.vector)
+        jacobian = people_jacobian(self.parameters.vector.copy())
         return np.asarray(jacobian @ self.covariance @ jacobian.T)
 
     @cached_property
@@ -121,6 +121,8 @@ class Estimate:
 
     def with_findings(self, *findings: Finding) -> Estimate:
         """Return the estimate with more findings, one of each code and message."""
+        if not findings:
+            return self
         seen = {(f.code, f.message): f for f in (*self.findings, *findings)}
         return replace(self, findings=tuple(seen.values()))
 

@@ -22,6 +22,8 @@ FEWEST_BLOCKS = 4
 
 def leave_one_out(problem: Problem, solution: Solution, H: Array) -> dict[str, Any]:
     """Return the hold-out errors and jackknife deviations of `Evidence` by name, or nothing where blocks are few."""
+    if len(problem.block_number) < FEWEST_BLOCKS:
+        return {}
     numbers = np.unique(problem.block_number[problem.block_number >= 0])
     if len(numbers) < FEWEST_BLOCKS:
         return {}

@@ -6,10 +6,12 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.noise_cost import inner, multiply, weight
+from steelyard.identify.dense import cholesky, eigen, inverse_of, mirror, product_transposed, times
+from steelyard.identify.noise_cost import add_products, entries, weights_at
 
 # Directions whose information, after scaling the columns to one, is below this share of the largest are left at zero.
 RANK_TOLERANCE = 1e-12
+_DIAGONAL = np.arange(10)
 # Sizes [kg, m] that no held body exceeds by much: they keep what a log does not excite from running away.
 HEAVIEST, LIGHTEST, FARTHEST, LOOSEST_RADIUS = 1000.0, 0.05, 2.0, 0.5
 
@@ -18,59 +20,57 @@ HEAVIEST, LIGHTEST, FARTHEST, LOOSEST_RADIUS = 1000.0, 0.05, 2.0, 0.5
 def normal_equations(T: Array, scatter: Array, weights: Array) -> tuple[Array, Array]:
     """Return H (p, p) and g (p,) of sum r^T W r: design T (p, 6, Z), scatter (C, Z, Z), weights (C, 6, 6)."""
     size = T.shape[0]
-    H, g = np.zeros((size, size)), np.zeros(size)
-    wrench = np.zeros((6, T.shape[2]))
-    for i in range(6):
-        wrench[i, 12 + i] = 1.0
+    H = np.zeros((size, size))
+    sparse = entries(T)
     for c in range(scatter.shape[0]):
-        for p in range(size):
-            WTS = multiply(weights[c], multiply(T[p], scatter[c]))
-            g[p] -= inner(WTS, wrench)
-            for q in range(p + 1):
-                H[p, q] += inner(WTS, T[q])
-    for p in range(size):
-        for q in range(p):
-            H[q, p] = H[p, q]
-    return H, g
+        add_products(H, sparse, weights[c], scatter[c], 1.0)
+    mirror(H)
+    return H, right_side(T, scatter, weights)
+
+
+@numba.njit(cache=True)
+def right_side(T: Array, scatter: Array, weights: Array) -> Array:
+    """Return g (p,) of `normal_equations`."""
+    g = np.zeros(T.shape[0])
+    start, row, column, value = entries(T)
+    for c in range(scatter.shape[0]):
+        for p in range(len(g)):
+            for a in range(start[p], start[p + 1]):
+                for i in range(6):
+                    g[p] -= value[a] * weights[c, row[a], i] * scatter[c, column[a], 12 + i]
+    return g
+
+
+@numba.njit(cache=True)
+def unit_diagonal(matrix: Array) -> tuple[Array, Array]:
+    """Return a symmetric matrix scaled to a unit diagonal, and the scale (n,) of rows and columns that does so."""
+    size = matrix.shape[0]
+    scale, out = np.ones(size), np.empty((size, size))
+    for i in range(size):
+        if matrix[i, i] > 0.0:
+            scale[i] = 1 / np.sqrt(matrix[i, i])
+    for i in range(size):
+        for j in range(size):
+            out[i, j] = matrix[i, j] * scale[i] * scale[j]
+    return out, scale
 
 
 @numba.njit(cache=True)
 def solve_scaled(H: Array, g: Array) -> Array:
     """Return the least-norm x of H x = g after scaling H to a unit diagonal."""
-    scale = np.ones(H.shape[0])
-    for i in range(H.shape[0]):
-        if H[i, i] > 0.0:
-            scale[i] = 1 / np.sqrt(H[i, i])
-    values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
-    projected = vectors.T @ (scale * g)
-    for i in range(len(values)):
-        projected[i] = projected[i] / values[i] if values[i] > RANK_TOLERANCE * values[-1] else 0.0
-    return scale * (vectors @ projected)
+    return times(inverse_scaled(H), g)
 
 
-@numba.njit(cache=True)
 def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, passes: int) -> Array:
     """Return the linear parameters (p,) of `passes` weighted solutions, W renewed from each for the next.
 
     The first pass knows no parameters, so that W is that of the wrench noise alone.
     """
-    size, width = T.shape[0], T.shape[2]
-    linear = np.zeros(size)
-    weights = np.zeros((scatter.shape[0], 6, 6))
+    linear = np.zeros(len(T))
     for _ in range(passes):
-        K = np.zeros((6, width))
-        for p in range(size):
-            if linear[p] != 0.0:
-                K += linear[p] * T[p]
-        for c in range(scatter.shape[0]):
-            weights[c] = weight(K, acceleration[c], wrench[c])
-        H, g = normal_equations(T, scatter, weights)
-        mass = max(abs(linear[0]), LIGHTEST)
-        H[0, 0] += HEAVIEST**-2
-        for k in range(1, 4):
-            H[k, k] += (mass * FARTHEST) ** -2
-        for k in range(4, 10):
-            H[k, k] += (mass * LOOSEST_RADIUS**2) ** -2
+        H, g = normal_equations(T, scatter, weights_at(linear, T, acceleration, wrench))
+        mass = max(abs(float(linear[0])), LIGHTEST)
+        H[_DIAGONAL, _DIAGONAL] += np.repeat([HEAVIEST, mass * FARTHEST, mass * LOOSEST_RADIUS**2], [1, 3, 6]) ** -2
         linear = solve_scaled(H, g)
     return linear
 
@@ -78,18 +78,26 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
 @numba.njit(cache=True)
 def inverse_scaled(matrix: Array) -> Array:
     """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal."""
-    size = matrix.shape[0]
-    scale = np.ones(size)
-    for i in range(size):
-        if matrix[i, i] > 0.0:
-            scale[i] = 1 / np.sqrt(matrix[i, i])
-    values, vectors = np.linalg.eigh(matrix * np.outer(scale, scale))
-    inverse = np.zeros(size)
-    for i in range(size):
-        if values[i] > RANK_TOLERANCE * values[-1]:
-            inverse[i] = 1 / values[i]
-    out: Array = (vectors * inverse) @ vectors.T * np.outer(scale, scale)
-    return out
+    scaled, scale = unit_diagonal(matrix)
+    size, trace = len(scale), 0.0
+    low, positive = cholesky(scaled, RANK_TOLERANCE)
+    if positive:
+        out = inverse_of(low)
+        for i in range(size):
+            trace += out[i, i]
+            for j in range(size):
+                out[i, j] *= scale[i] * scale[j]
+        # No eigenvalue is below 1 / trace, none above the number of rows.
+        if trace * size * RANK_TOLERANCE < 1.0:
+            return out
+    values, vectors = eigen(scaled)
+    left, right = np.zeros((size, size)), np.empty((size, size))
+    for k in range(size):
+        for i in range(size):
+            right[i, k] = vectors[i, k] * scale[i]
+            if values[k] > RANK_TOLERANCE * values[-1]:
+                left[i, k] = right[i, k] / values[k]
+    return product_transposed(left, right)
 
 
 @numba.njit(cache=True)
@@ -98,13 +106,35 @@ def nonnegative(matrix: Array, reference: Array) -> Array:
 
     Noise taken out of a scatter matrix leaves directions that the log does not excite slightly below zero.
     """
-    scale = np.ones(matrix.shape[0])
-    for i in range(matrix.shape[0]):
+    size = matrix.shape[0]
+    scale, scaled = np.ones(size), np.empty((size, size))
+    for i in range(size):
         if reference[i, i] > 0.0:
             scale[i] = np.sqrt(reference[i, i])
-    outer = np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(0.5 * (matrix + matrix.T) / outer)
+    for i in range(size):
+        for j in range(size):
+            scaled[i, j] = 0.5 * (matrix[i, j] + matrix[j, i]) / (scale[i] * scale[j])
+    if cholesky(scaled, RANK_TOLERANCE)[1]:
+        return matrix
+    values, vectors = eigen(scaled)
     if values[0] >= 0.0:
         return matrix
-    out: Array = (vectors * np.maximum(values, 0.0)) @ vectors.T * outer
-    return out
+    left, right = np.empty((size, size)), np.empty((size, size))
+    for k in range(size):
+        for i in range(size):
+            right[i, k] = vectors[i, k] * scale[i]
+            left[i, k] = right[i, k] * max(values[k], 0.0)
+    return product_transposed(left, right)
+
+
+def without_bias(H: Array, V: Array) -> tuple[Array, Array, Array, Array]:
+    """Return information and score variance (10, 10) of phi with the bias projected out, of H and V (p, p).
+
+    Then how the bias of b = p - 10 numbers follows phi (b, 10), and its own covariance (b, b) at a given phi.
+    """
+    if len(H) == 10:
+        return H, V, np.zeros((0, 10)), np.zeros((0, 0))
+    own = inverse_scaled(H[10:, 10:].copy())
+    follow = own @ H[10:, :10]
+    project = np.concatenate([np.eye(10), -follow.T], 1)
+    return np.ascontiguousarray((project @ H)[:, :10]), project @ V @ project.T, follow, own

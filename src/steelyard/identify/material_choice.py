@@ -15,8 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.density_priors import canonical, log_det, mode, partition_prior
-from steelyard.identify.linear import inverse_scaled
+from steelyard.identify.density_priors import canonical, log_det, mode, partition_prior, place_of, spread_masses
 from steelyard.logs.log import Integers, Mask
 from steelyard.parts.material import Material
 
@@ -79,22 +78,22 @@ def choose(A: Array, b: Array, volume: Array, materials: Sequence[Material], fre
 
 @numba.njit(cache=True)
 def _one(
-    A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, chosen: Integers
-) -> tuple[Array, float, Array, float]:
-    """Return masses (P,), log evidence, covariance (P, P) and chi-square of one choice."""
+    A: Array, b: Array, volume: Array, centre: Array, tolerance: Array, chosen: Integers, masses: Array, spread: Array
+) -> tuple[float, float]:
+    """Return log evidence and chi-square of one choice; write masses (P,) and their covariance (P, P)."""
     P = len(volume)
-    at, precision, prior = np.empty(P), np.zeros((P, P)), 0.0
+    own, at, precision, prior = np.arange(P), np.empty(P), np.zeros((P, P)), 0.0
     for k in range(P):
         at[k] = centre[chosen[k]]
         precision[k, k] = tolerance[chosen[k]] ** -2
         prior += 2 * np.log(tolerance[chosen[k]])
-    y, cost, hessian = mode(A, b, volume, np.arange(P), precision, at, at)
-    masses = volume * np.exp(y)
+    y, cost, hessian = mode(A, b, volume, own, precision, at, at)
+    spread_masses(volume, own, y, hessian, masses, spread)
     group, groups = canonical(chosen)
     evidence = -cost - 0.5 * (prior + log_det(hessian)) + partition_prior(group, groups)
     for taken in range(groups):
         evidence -= np.log(float(max(len(centre) - taken, 1)))
-    return masses, evidence, np.outer(masses, masses) * inverse_scaled(hessian), 2 * cost
+    return evidence, 2 * cost
 
 
 @numba.njit(cache=True)
@@ -105,7 +104,7 @@ def _all(
     N, P = tried.shape
     masses, evidence, spread, square = np.zeros((N, P)), np.zeros(N), np.zeros((N, P, P)), np.zeros(N)
     for i in range(N):
-        masses[i], evidence[i], spread[i], square[i] = _one(A, b, volume, centre, tolerance, tried[i])
+        evidence[i], square[i] = _one(A, b, volume, centre, tolerance, tried[i], masses[i], spread[i])
     return masses, evidence, spread, square
 
 
@@ -115,36 +114,33 @@ def _search(
 ) -> tuple[Array, Array, Array, Array, Integers, int]:
     """Return what was tried from the starts (S, P): one part, all parts of one material, or two exchanged."""
     P, K = len(volume), len(centre)
-    masses, evidence, spread = np.zeros((MOST, P)), np.full(MOST, -np.inf), np.zeros((MOST, P, P))
-    square, known, count = np.full(MOST, np.inf), np.full((MOST, P), -1), 0
+    masses, evidence, spread = np.zeros((MOST, P)), np.zeros(MOST), np.zeros((MOST, P, P))
+    square, known, count = np.zeros(MOST), np.zeros((MOST, P), np.int64), 0
     for s in range(len(starts)):
-        current, best = starts[s].copy(), -np.inf
+        current, best = starts[s], -np.inf
         for _sweep in range(SWEEPS):
             improved = False
             for move in range(P + K):
-                base = current.copy()
+                base = current
                 for choice in range(K + (P if move < P else 0)):
                     trial = base.copy()
                     if move >= P:
-                        trial[base == move - P] = choice
+                        for k in range(P):
+                            if base[k] == move - P:
+                                trial[k] = choice
                     elif choice < K:
                         trial[move] = choice
                     else:
                         trial[move], trial[choice - K] = base[choice - K], base[move]
-                    place = -1
-                    for i in range(count):
-                        if (known[i] == trial).all():
-                            place = i
-                            break
-                    if place < 0:
+                    place = place_of(trial, known, count)
+                    if place == count:
                         if count == MOST:
                             return masses, evidence, spread, square, known, count
-                        place, count = count, count + 1
-                        known[place] = trial
-                        found = _one(A, b, volume, centre, tolerance, trial)
-                        masses[place], evidence[place], spread[place], square[place] = found
+                        count += 1
+                        found = _one(A, b, volume, centre, tolerance, trial, masses[place], spread[place])
+                        evidence[place], square[place] = found
                     if evidence[place] > best + 1e-9:
-                        best, current, improved = evidence[place], trial.copy(), True
+                        best, current, improved = evidence[place], trial, True
             if not improved:
                 break
     return masses, evidence, spread, square, known, count

@@ -13,7 +13,8 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.noise_cost import derivatives, value
+from steelyard.identify.dense import cholesky, eigen, solved
+from steelyard.identify.noise_cost import derivatives, residual_map_of
 
 # Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
 # full steps end at rounding, where a line search could only see noise.
@@ -22,6 +23,8 @@ NEAR = 1e-4
 # Mass and centre of mass have no prior: where nothing shows them, this curvature (of a thirty-fold mass, of 30 m) keeps
 # rounding from driving them off. It is no part of the cost.
 DAMPING = 1e-3
+# A step that is halved more often moves nothing.
+HALVINGS = 30
 
 # theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each sits in U.
 _ROW = np.array([0, 0, 1, 2, 0, 1, 0, 0, 1, 2])
@@ -80,7 +83,12 @@ def jacobian(theta: Array, U: Array) -> Array:
             step = scale * (np.exp(theta[k]) if k <= 3 else 1.0)
             for j in range(4):
                 half[_ROW[k], j] = step * U[j, _COLUMN[k]]
-        out[:, k] = vector_of(half + half.T)
+        for i in range(4):
+            for j in range(i + 1):
+                half[i, j] = half[j, i] = half[i, j] + half[j, i]
+        column = vector_of(half)
+        for i in range(10):
+            out[i, k] = column[i]
     return out
 
 
@@ -141,21 +149,6 @@ def shape_prior(theta: Array, gamma: float, log_size: float, precision: float) -
 
 
 @numba.njit(cache=True)
-def residual_map_of(T: Array, linear: Array) -> Array:
-    """Return K (6, Z) at the linear parameters (p,)."""
-    width = T.shape[2]
-    K = np.zeros((6, width))
-    for i in range(6):
-        K[i, 12 + i] = 1.0
-    for p in range(T.shape[0]):
-        if linear[p] != 0.0:
-            for i in range(6):
-                for j in range(width):
-                    K[i, j] += linear[p] * T[p, i, j]
-    return K
-
-
-@numba.njit(cache=True)
 def linear_of(u: Array) -> Array:
     """Return [phi, bias] (p,) from u = [theta, bias]."""
     out = u.copy()
@@ -165,45 +158,33 @@ def linear_of(u: Array) -> Array:
         for j in range(4):
             for a in range(4):
                 P[i, j] += U[i, a] * U[j, a]
-    out[:10] = vector_of(P)
+    phi = vector_of(P)
+    for k in range(10):
+        out[k] = phi[k]
     return out
 
 
-@numba.njit(cache=True)
-def cost(
-    u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
-) -> float:  # fmt: skip
-    """Return Q/2 + priors at u = [theta, bias]; the bias prior has mean (6,) and precision (6, 6)."""
-    K = residual_map_of(T, linear_of(u))
-    total = 0.5 * value(K, scatter, acceleration, wrench) + shape_prior(u[:10], gamma, log_size, precision)[0]
-    if len(u) > 10:
-        off = u[10:16] - bias
-        total += 0.5 * float(off @ (bias_precision @ off))
-    return total
-
-
-@numba.njit(cache=True)
 def cost_derivatives(
     u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
 ) -> tuple[float, Array, Array]:  # fmt: skip
-    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias]."""
-    size = u.shape[0]
-    theta = u[:10]
-    U = factor(theta)
+    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias].
+
+    The bias prior has mean (6,) and precision (6, 6).
+    """
+    U = factor(u)
     Q, g, H = derivatives(residual_map_of(T, linear_of(u)), T, scatter, acceleration, wrench)
-    J = np.eye(size)
-    J[:10, :10] = jacobian(theta, U)
-    prior, prior_gradient, prior_hessian = shape_prior(theta, gamma, log_size, precision)
-    gradient = 0.5 * (J.T @ g)
-    hessian = 0.5 * (J.T @ H @ J)
-    hessian[:10, :10] += 0.5 * _curvature(theta, U, g[:10]) + prior_hessian
+    J = np.eye(len(u))
+    J[:10, :10] = jacobian(u, U)
+    prior, prior_gradient, prior_hessian = shape_prior(u, gamma, log_size, precision)
+    gradient, hessian = 0.5 * (J.T @ g), 0.5 * (J.T @ H @ J)
     gradient[:10] += prior_gradient
+    hessian[:10, :10] += 0.5 * _curvature(u, U, g) + prior_hessian
     total = 0.5 * Q + prior
-    if size > 10:
-        pull = bias_precision @ (u[10:16] - bias)
-        total += 0.5 * float((u[10:16] - bias) @ pull)
+    if len(u) > 10:
+        off = u[10:16] - bias
+        pull = bias_precision @ off
+        total += 0.5 * float(off @ pull)
         gradient[10:16] += pull
         hessian[10:16, 10:16] += bias_precision
     return total, gradient, hessian
@@ -213,40 +194,32 @@ def cost_derivatives(
 def _downhill(gradient: Array, hessian: Array) -> Array:
     """Return the Newton step, with negative curvatures turned round (saddle-free) where the Hessian has any."""
     size = len(gradient)
-    hessian = hessian.copy()
-    for k in (0, 7, 8, 9):
-        hessian[k, k] += DAMPING
-    scale = 1 / np.sqrt(np.maximum(np.abs(np.diag(hessian)), 1e-300))
-    scaled = hessian * np.outer(scale, scale)
-    low, x = np.zeros((size, size)), np.zeros(size)
+    scale, scaled, g = np.empty(size), np.empty((size, size)), np.empty(size)
     for i in range(size):
-        for j in range(i + 1):
-            total = scaled[i, j]
-            for k in range(j):
-                total -= low[i, k] * low[j, k]
-            if i == j:
-                if total < 1e-9:
-                    values, vectors = np.linalg.eigh(scaled)
-                    curvature = np.maximum(np.abs(values), 1e-9)
-                    turned: Array = -scale * (vectors @ ((vectors.T @ (scale * gradient)) / curvature))
-                    return turned
-                low[i, i] = np.sqrt(total)
-            else:
-                low[i, j] = total / low[j, j]
+        own = hessian[i, i] + (DAMPING if i == 0 or 7 <= i <= 9 else 0.0)
+        scale[i] = 1 / np.sqrt(max(abs(own), 1e-300))
+        scaled[i, i] = own * scale[i] * scale[i]
+        g[i] = -scale[i] * gradient[i]
     for i in range(size):
-        total = -scale[i] * gradient[i]
-        for k in range(i):
-            total -= low[i, k] * x[k]
-        x[i] = total / low[i, i]
-    for i in range(size - 1, -1, -1):
-        total = x[i]
-        for k in range(i + 1, size):
-            total -= low[k, i] * x[k]
-        x[i] = total / low[i, i]
-    return scale * x
+        for j in range(i):
+            scaled[i, j] = scaled[j, i] = hessian[i, j] * scale[i] * scale[j]
+    low, positive = cholesky(scaled, 1e-9)
+    if positive:
+        x = solved(low, g)
+    else:
+        values, vectors = eigen(scaled)
+        x = np.zeros(size)
+        for k in range(size):
+            along = 0.0
+            for i in range(size):
+                along += vectors[i, k] * g[i]
+            for i in range(size):
+                x[i] += vectors[i, k] * along / max(abs(values[k]), 1e-9)
+    for i in range(size):
+        x[i] *= scale[i]
+    return x
 
 
-@numba.njit(cache=True)
 def minimise(
     start: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array, iterations: int,
@@ -256,28 +229,23 @@ def minimise(
     A Hessian that is not positive definite has its negative curvatures turned round (saddle-free Newton); the step is
     kept within a trust length of 1 in log coordinates and halved until the cost falls.
     """
-    u = start.copy()
-    prior = (gamma, log_size, precision, bias, bias_precision)
-    current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
+    data = (T, scatter, acceleration, wrench, gamma, log_size, precision, bias, bias_precision)
+    u = start
+    current, gradient, hessian = cost_derivatives(u, *data)
     for _ in range(iterations):
         step = _downhill(gradient, hessian)
-        decrement = -0.5 * (gradient @ step)
-        if decrement < NEAR:
-            u = u + step
-            current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
-            return u + _downhill(gradient, hessian), current, True
-        longest = np.abs(step[:7]).max()
-        if longest > 1.0:
-            step *= 1.0 / longest
-        moved = False
-        for _ in range(30):
-            trial = cost(u + step, T, scatter, acceleration, wrench, *prior)
-            if trial < current - 1e-4 * abs(gradient @ step) or trial < current - 1e-10 * abs(current):
-                moved = True
+        fall = -float(gradient @ step)
+        if 0.5 * fall < NEAR:
+            current, gradient, hessian = cost_derivatives(u + step, *data)
+            return u + step + _downhill(gradient, hessian), current, True
+        share = 1 / max(1.0, float(np.abs(step[:7]).max()))
+        for _ in range(HALVINGS):
+            trial, least = u + share * step, current - 1e-4 * share * abs(fall)
+            now, gradient, hessian = cost_derivatives(trial, *data)
+            if now < least or now < current - 1e-10 * abs(current):
                 break
-            step *= 0.5
-        if not moved:
-            return u, current, bool(decrement < 1e-3)
-        u = u + step
-        current, gradient, hessian = cost_derivatives(u, T, scatter, acceleration, wrench, *prior)
+            share *= 0.5
+        else:
+            return u, current, 0.5 * fall < 1e-3
+        u, current = trial, now
     return u, current, False

@@ -14,7 +14,9 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.identify.dense import moved, times
 from steelyard.identify.linear import inverse_scaled, solve_scaled
+from steelyard.logs.log import Mask
 
 # The whole weighs at least this much [kg].
 LIGHTEST = 1e-6
@@ -30,35 +32,61 @@ def nonnegative_masses(A: Array, b: Array) -> Array:
     """Return m >= 0 (P,) that minimises m^T A m / 2 - b^T m, for A (P, P) positive semidefinite."""
     P = len(b)
     m, free = np.zeros(P), np.zeros(P, np.bool_)
-    least = FLAT * np.abs(b).max()
+    least = 0.0
+    for k in range(P):
+        least = max(least, FLAT * abs(b[k]))
     for _ in range(5 * P):
-        slope = b - A @ m
-        enters, steepest = -1, least
+        drawn, enters, steepest = times(A, m), -1, least
         for k in range(P):
-            if not free[k] and slope[k] > steepest:
-                enters, steepest = k, slope[k]
+            if not free[k] and b[k] - drawn[k] > steepest:
+                enters, steepest = k, b[k] - drawn[k]
         if enters < 0:
             break
         free[enters] = True
         for _ in range(P):
-            aim, step = np.zeros(P), 1.0
-            chosen = np.flatnonzero(free)
-            aim[chosen] = solve_scaled(A[chosen][:, chosen], b[chosen])
-            for j in chosen:
-                if aim[j] <= 0.0 and m[j] > aim[j]:
-                    step = min(step, m[j] / (m[j] - aim[j]))
-            m = m + step * (aim - m)
-            if step == 1.0 and aim[chosen].min() > 0.0:
+            aim, step, lowest = _free_masses(A, b, free), 1.0, np.inf
+            for j in range(P):
+                if free[j]:
+                    lowest = min(lowest, aim[j])
+                    if aim[j] <= 0.0 and m[j] > aim[j]:
+                        step = min(step, m[j] / (m[j] - aim[j]))
+            heaviest = -np.inf
+            for j in range(P):
+                m[j] += step * (aim[j] - m[j])
+                heaviest = max(heaviest, m[j])
+            if step == 1.0 and lowest > 0.0:
                 break
-            for j in chosen:
-                if aim[j] <= 0.0 and m[j] <= 1e-12 * m.max():
+            for j in range(P):
+                if free[j] and aim[j] <= 0.0 and m[j] <= 1e-12 * heaviest:
                     free[j], m[j] = False, 0.0
             if not free[enters]:
                 break
         if not free[enters]:
             # Rounding alone made its slope: no step along it is downhill.
             break
-    return np.maximum(m, 0.0)
+    for k in range(P):
+        m[k] = max(m[k], 0.0)
+    return m
+
+
+@numba.njit(cache=True)
+def _free_masses(A: Array, b: Array, free: Mask) -> Array:
+    """Return the masses (P,) that fit best among the `free` (P,), the others zero."""
+    P = len(b)
+    n, place = 0, np.empty(P, np.int64)
+    for k in range(P):
+        if free[k]:
+            place[n] = k
+            n += 1
+    chosen, pull, out = np.empty((n, n)), np.empty(n), np.zeros(P)
+    for i in range(n):
+        pull[i] = b[place[i]]
+        for j in range(n):
+            chosen[i, j] = A[place[i], place[j]]
+    found = solve_scaled(chosen, pull)
+    for i in range(n):
+        out[place[i]] = found[i]
+    return out
 
 
 @numba.njit(cache=True)
@@ -67,15 +95,19 @@ def spread_about(A: Array, b: Array, masses: Array) -> Array:
 
     No part weighs more than about the whole, which bounds what the data leave open.
     """
-    P = len(b)
-    most = max(masses.sum(), LIGHTEST)
-    bounded = A + np.eye(P) / most**2
-    pull = b + masses / most**2
+    P, whole = len(b), 0.0
+    for k in range(P):
+        whole += masses[k]
+    loose = max(whole, LIGHTEST) ** -2
+    bounded, pull = A.copy(), b.copy()
+    for k in range(P):
+        bounded[k, k] += loose
+        pull[k] += loose * masses[k]
     covariance = inverse_scaled(bounded)
-    held, shift = np.zeros(P), np.zeros(P)
-    mean = covariance @ pull
+    held, shift, column = np.zeros(P), np.zeros(P), np.empty(P)
+    mean = times(covariance, pull)
     for _ in range(SWEEPS):
-        before = mean
+        before, settled = mean, True
         for k in range(P):
             variance = covariance[k, k]
             precision = 1 / variance - held[k]
@@ -86,13 +118,20 @@ def spread_about(A: Array, b: Array, masses: Array) -> Array:
             change = 1 / cut_variance - precision - held[k]
             held[k] += change
             shift[k] = cut_mean / cut_variance - at * precision
-            column = covariance[:, k].copy()
-            covariance -= change / (1 + change * variance) * np.outer(column, column)
-            mean = covariance @ (pull + shift)
-        if (np.abs(mean - before) < SETTLED * np.sqrt(np.diag(covariance))).all():
+            for i in range(P):
+                column[i] = covariance[i, k]
+            for i in range(P):
+                for j in range(P):
+                    covariance[i, j] -= change / (1 + change * variance) * column[i] * column[j]
+            mean = times(covariance, moved(pull, shift, 1.0))
+        for k in range(P):
+            settled = settled and abs(mean[k] - before[k]) < SETTLED * np.sqrt(covariance[k, k])
+        if settled:
             break
-    off = mean - masses
-    return covariance + np.outer(off, off)
+    for i in range(P):
+        for j in range(P):
+            covariance[i, j] += (mean[i] - masses[i]) * (mean[j] - masses[j])
+    return covariance
 
 
 @numba.njit(cache=True)

@@ -54,9 +54,7 @@ def part_findings(
 
 def misfit_limit(data: Effective, parts: int, chance: float = MISFIT_CHANCE) -> float:
     """Return the chi-square that a right shape exceeds with that chance: once in 100 000 logs."""
-    values = np.linalg.eigvalsh(data.information)
-    seen = int((values > 1e-9 * values[-1]).sum())
-    return float(2 * gammaincinv(max(seen - min(parts, seen - 1), 1) / 2, 1 - chance))
+    return float(2 * gammaincinv(max(data.rank - min(parts, data.rank - 1), 1) / 2, 1 - chance))
 
 
 def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:

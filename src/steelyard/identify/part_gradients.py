@@ -110,7 +110,7 @@ class Search:
         tilts = tilts.ravel()
         for level in range(len(density_priors.LADDER) - 1, -1, -1):
             near = density_priors.LADDER[level] ** 2
-            precision = np.eye(P) / near - wide / (near * (near + P * wide))
+            precision = density_priors.apart(P, near, wide)
             y, tilts, cost, curve, hessian, J, phi = part_tilts.fitted(
                 *data, precision, density_priors.CENTRE, np.array(free, np.int64), variance, *points, y, tilts
             )

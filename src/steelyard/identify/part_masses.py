@@ -22,7 +22,7 @@ from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias
-from steelyard.identify.linear import inverse_scaled, reweighted
+from steelyard.identify.linear import reweighted
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import (
@@ -150,7 +150,7 @@ class PartMasses:
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
-        body = InertialParameters(inverse_scaled(data.information) @ data.pull)
+        body = InertialParameters(data.best)
         limit = misfit_limit(data, len(self.parts))
         for doubling in range(1, DOUBLINGS):
             error = self.shape_error.scaled(2.0**doubling).covariance(self._sane(body))
@@ -238,7 +238,6 @@ class PartMasses:
             part_covariance=masses.covariance,
             parts=self._found(masses),
             identified=np.ones(10, np.bool_),
-            findings=tuple(f for f in estimate.findings if f.code != "inertia-not-identified"),
         )
 
     def _found(self, masses: Masses) -> tuple[PartMass, ...]:

@@ -12,6 +12,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.identify.dense import cholesky, moved, product, solved, times, transposed
 from steelyard.identify.density_priors import log_det
 from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import Integers
@@ -26,15 +27,30 @@ STEEPEST = 30.0
 @numba.njit(cache=True, nogil=True)
 def tilted(weight: Array, features: Array, per_mass: Array, tilt: Array) -> tuple[Array, Array]:
     """Return b (10,) per kilogram of points (N, 10) tilted by u (F,), and db/du (10, F)."""
-    power = np.minimum(np.maximum(features @ tilt, -STEEPEST), STEEPEST)
-    share = weight * np.exp(power - power.max())
-    share /= share.sum()
-    b, mean = share @ per_mass, share @ features
-    slope = (per_mass.T * share) @ features - np.outer(b, mean)
+    N, F = features.shape
+    share, highest, whole = times(features, tilt), -STEEPEST, 0.0
+    for n in range(N):
+        share[n] = min(max(share[n], -STEEPEST), STEEPEST)
+        highest = max(highest, share[n])
+    for n in range(N):
+        share[n] = weight[n] * np.exp(share[n] - highest)
+        whole += share[n]
+    b, mean, slope = np.zeros(10), np.zeros(F), np.zeros((10, F))
+    for n in range(N):
+        part = share[n] / whole
+        for f in range(F):
+            mean[f] += part * features[n, f]
+        for j in range(10):
+            moment = part * per_mass[n, j]
+            b[j] += moment
+            for f in range(F):
+                slope[j, f] += moment * features[n, f]
+    for j in range(10):
+        for f in range(F):
+            slope[j, f] -= b[j] * mean[f]
     return b, slope
 
 
-@numba.njit(cache=True, nogil=True)
 def fitted(
     information: Array, pull: Array, B: Array, volume: Array, precision: Array, centre: float,
     free: Integers, variance: Array, weight: Array, features: Array, per_mass: Array, y: Array, tilts: Array,
@@ -45,69 +61,72 @@ def fitted(
     B (10, P) per kilogram of even parts; `free` (f,) rows of the free ones, and of these the `variance` (F f,) of
     tilts, and points: weight (f, N), features (f, N, F), per_mass (f, N, 10). y, tilts: where to start.
     """
-    P, size = len(volume), len(variance)
-    F = features.shape[2]
-    y, tilts = y.copy(), tilts.copy()
-    cost, gradient, curve, hessian, J, phi = _cost(
-        information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass, y, tilts, F
-    )
+    P = len(volume)
+    data = (information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass)
+    longest = np.repeat([LONGEST_DENSITY, LONGEST_TILT], [P, len(variance)])
+    x = np.concatenate([y, tilts])
+    found = _cost(*data, x)
     for _ in range(STEPS):
+        before, gradient, curve, hessian = found[:4]
         step = _solve(hessian, curve, gradient)
-        fall = -(gradient @ step)
-        if fall < FALL:
+        if -(gradient @ step) < FALL:
             break
-        longest = max(np.abs(step[:P]).max() / LONGEST_DENSITY, np.abs(step[P:]).max() / LONGEST_TILT if size else 0.0)
-        if longest > 1.0:
-            step = step / longest
-        before = cost
+        step /= max(1.0, float((np.abs(step) / longest).max()))
         for _ in range(HALVINGS):
-            found = _cost(
-                information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass,
-                y + step[:P], tilts + step[P:], F,
-            )  # fmt: skip
-            if found[0] < before:
-                y, tilts = y + step[:P], tilts + step[P:]
-                cost, gradient, curve, hessian, J, phi = found
+            trial = _cost(*data, x + step)
+            if trial[0] < before:
+                x, found = x + step, trial
                 break
-            step = 0.5 * step
-        if before - cost < FALL:
+            step *= 0.5
+        if before - found[0] < FALL:
             break
-    return y, tilts, cost, curve, hessian, J, phi
+    cost, _, curve, hessian, J, phi = found
+    return x[:P].copy(), x[P:].copy(), cost, curve, hessian, J, phi
 
 
 @numba.njit(cache=True, nogil=True)
 def _cost(
     information: Array, pull: Array, B: Array, volume: Array, precision: Array, centre: float, free: Integers,
-    variance: Array, weight: Array, features: Array, per_mass: Array, y: Array, tilts: Array, F: int,
+    variance: Array, weight: Array, features: Array, per_mass: Array, x: Array,
 ) -> tuple[float, Array, Array, Array, Array, Array]:  # fmt: skip
-    """Return the cost, its gradient (q,), what masses bend it by (P,), the Gauss-Newton Hessian, d phi and phi."""
-    P, size = len(volume), len(variance)
-    q = P + size
-    J = np.zeros((10, q))
-    mass = volume * np.exp(np.minimum(y, 20.0))
+    """Return the cost at x = [y, tilts] (q,), its gradient (q,), what masses bend it by (P,), the Gauss-Newton Hessian,
+    d phi and phi.
+    """
+    P, F, q = len(volume), features.shape[2], len(x)
+    J, phi, mass = np.zeros((10, q)), np.zeros(10), np.empty(P)
     for k in range(P):
+        mass[k] = volume[k] * np.exp(min(x[k], 20.0))
         for j in range(10):
             J[j, k] = mass[k] * B[j, k]
     for f in range(len(free)):
-        k = free[f]
-        b, slope = tilted(weight[f], features[f], per_mass[f], tilts[f * F : (f + 1) * F])
+        k, first = free[f], P + f * F
+        b, slope = tilted(weight[f], features[f], per_mass[f], x[first : first + F])
         for j in range(10):
             J[j, k] = mass[k] * b[j]
             for i in range(F):
-                J[j, P + f * F + i] = mass[k] * slope[j, i]
-    phi = J[:, :P].sum(1)
-    seen = information @ phi
-    rest = seen - pull
-    off = y - centre
-    drawn = precision @ off
-    cost = float(phi @ (0.5 * seen - pull) + 0.5 * (off @ drawn) + 0.5 * (tilts**2 / variance).sum())
-    gradient = J.T @ rest
+                J[j, first + i] = mass[k] * slope[j, i]
+    for j in range(10):
+        for k in range(P):
+            phi[j] += J[j, k]
+    seen, cost = times(information, phi), 0.0
+    for j in range(10):
+        cost += phi[j] * (0.5 * seen[j] - pull[j])
+    back = transposed(J)
+    gradient, hessian = times(back, moved(seen, pull, -1.0)), product(back, product(information, J))
     curve = gradient[:P].copy()
-    gradient[:P] += drawn
-    gradient[P:] += tilts / variance
-    hessian = J.T @ (information @ J)
-    hessian[:P, :P] += precision
-    for i in range(size):
+    off = np.empty(P)
+    for k in range(P):
+        off[k] = x[k] - centre
+    drawn = times(precision, off)
+    for k in range(P):
+        cost += 0.5 * off[k] * drawn[k]
+        gradient[k] += drawn[k]
+        for j in range(P):
+            hessian[k, j] += precision[k, j]
+    for i in range(q - P):
+        pulled = x[P + i] / variance[i]
+        cost += 0.5 * x[P + i] * pulled
+        gradient[P + i] += pulled
         hessian[P + i, P + i] += 1 / variance[i]
     return cost, gradient, curve, hessian, J, phi
 
@@ -115,43 +134,22 @@ def _cost(
 @numba.njit(cache=True, nogil=True)
 def _solve(hessian: Array, curve: Array, gradient: Array) -> Array:
     """Return the step -(H + max(curve, 0))^-1 g, by Cholesky."""
-    q = len(gradient)
-    L, x = hessian.copy(), -gradient
+    full = hessian.copy()
     for k in range(len(curve)):
-        L[k, k] += max(curve[k], 0.0)
-    for j in range(q):
-        for k in range(j):
-            L[j, j] -= L[j, k] * L[j, k]
-        L[j, j] = np.sqrt(max(L[j, j], 1e-9))
-        for i in range(j + 1, q):
-            total = L[i, j]
-            for k in range(j):
-                total -= L[i, k] * L[j, k]
-            L[i, j] = total / L[j, j]
-    for i in range(q):
-        for k in range(i):
-            x[i] -= L[i, k] * x[k]
-        x[i] /= L[i, i]
-    for i in range(q - 1, -1, -1):
-        for k in range(i + 1, q):
-            x[i] -= L[k, i] * x[k]
-        x[i] /= L[i, i]
-    return x
+        full[k, k] += max(curve[k], 0.0)
+    return solved(cholesky(full, 1e-9)[0], moved(np.zeros(len(gradient)), gradient, -1.0))
 
 
-@numba.njit(cache=True, nogil=True)
 def evidence_of(
     cost: float, hessian: Array, curve: Array, spread: float, wide: float, parts: int, variance: Array
 ) -> float:
     """Return Laplace's log evidence of a mode: densities `spread` apart about a common one known to `wide`."""
     prior = (parts - 1) * np.log(spread) + np.log(spread + parts * wide) + np.log(variance).sum()
     full = hessian.copy()
-    for k in range(parts):
-        full[k, k] += curve[k]
+    full[range(parts), range(parts)] += curve
     return float(-cost - 0.5 * (prior + log_det(full)))
 
 
-@numba.njit(cache=True, nogil=True)
 def scores(
     information: Array, pull: Array, phi: Array, J: Array, hessian: Array, masses: Array, slopes: Array, widths: Array
 ) -> Array:
@@ -160,19 +158,11 @@ def scores(
     The state is a mode: phi (10,), J (10, q), hessian (q, q) without what masses bend it by. Of the parts asked about:
     masses (P,), slopes (P, 10, F) per kilogram; `widths` (W, F) are standard deviations.
     """
-    W, F = widths.shape
     seen = information @ J
     known = information - seen @ inverse_scaled(hessian) @ seen.T
-    rest = information @ phi - pull
-    out = np.zeros((W, len(masses)))
-    for k in range(len(masses)):
-        slope = masses[k] * slopes[k]
-        A, g = slope.T @ (known @ slope), slope.T @ rest
-        for w in range(W):
-            scaled = np.outer(widths[w], widths[w]) * A
-            for i in range(F):
-                scaled[i, i] += 1.0
-            h = widths[w] * g
-            x = _solve(scaled, np.zeros(0), h)
-            out[w, k] = -0.5 * (h @ x) - 0.5 * log_det(scaled)
-    return out
+    back = masses[:, None, None] * slopes.transpose(0, 2, 1)
+    A, g = back @ known @ back.transpose(0, 2, 1), back @ (information @ phi - pull)
+    scaled = np.eye(widths.shape[1]) + (widths[:, :, None] * widths[:, None, :])[:, None] * A
+    h = (widths[:, None] * g)[..., None]
+    gain = (h * np.linalg.solve(scaled, h)).sum((2, 3))
+    return np.asarray(0.5 * gain - 0.5 * np.linalg.slogdet(scaled)[1])

@@ -62,12 +62,13 @@ class Problem:
         if moments.noise is None:
             raise BadValue("The statistic must carry its noise; got none. Declare it, or use identify(log).")
         require_rows(int(moments.samples))
-        classes, label = np.unique(moments.noise_class, return_inverse=True)
+        classes = np.flatnonzero(np.bincount(moments.noise_class))
+        label = np.searchsorted(classes, moments.noise_class)
         scatter = np.stack([moments.scatter[label == k].sum(0) for k in range(len(classes))])
         acceleration = np.stack([moments.noise[c].acceleration for c in classes])
         # A reading scatters at least as much as its noise: more noise than that was declared for another motion, and
         # would reward the fit for inertia about axes that nothing turns.
-        seen = np.einsum("cii->ci", scatter)[:, :6] / scatter[:, 18, 18, None]
+        seen = scatter.diagonal(axis1=1, axis2=2)[:, :6] / scatter[:, 18, 18, None]
         acceleration = np.minimum(acceleration, seen)
         wrench = np.stack([moments.noise[c].wrench for c in classes])
         if (wrench <= 0).any():
@@ -109,6 +110,14 @@ class Problem:
         out[10:16, 10:16] += self.bias_prior.precision
         return out
 
+    def plus_bias_pull(self, g: Array) -> Array:
+        """Return the right side g (p,) that goes with `plus_bias_prior`."""
+        if not self.with_bias:
+            return g
+        out = g.copy()
+        out[10:16] += self.bias_prior.precision @ self.bias_prior.mean
+        return out
+
     def noise_weights(self, K: Array) -> Array:
         """Return W (C, 6, 6), the inverse of each class's noise at the residual map K (6, Z)."""
         return np.stack([weight(K, a, w) for a, w in zip(self.acceleration, self.wrench, strict=True)])
@@ -121,10 +130,7 @@ class Problem:
     def normal_equations(self, weights: Array) -> tuple[Array, Array]:
         """Return H (p, p) and g (p,) of the rows weighted by `weights` (C, 6, 6), with what is known of the bias."""
         H, g = normal_equations(self.T, self.scatter, weights)
-        if self.with_bias:
-            H[10:16, 10:16] += self.bias_prior.precision
-            g[10:16] += self.bias_prior.precision @ self.bias_prior.mean
-        return H, g
+        return self.plus_bias_prior(H), self.plus_bias_pull(g)
 
     @property
     def with_bias(self) -> bool:

@@ -39,14 +39,16 @@ class ShapeError:
 
     def grasp_steps(self) -> list[Pose]:
         """Return displacements of one standard deviation along and about each axis that has one."""
+        if not (self.grasp_m or self.grasp_rad):
+            return []
         steps = [Pose(Rotation.identity(), self.grasp_m * axis) for axis in np.eye(3) if self.grasp_m]
         return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
 
     def covariance(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
-        variance = np.zeros(10)
-        variance[1:4], variance[4:] = self.com_m**2, (self.inertia_share * half_trace_com(body.vector)) ** 2
-        back = parameter_jacobian(body.vector)
+        phi, variance = body.vector.copy(), np.zeros(10)
+        variance[1:4], variance[4:] = self.com_m**2, (self.inertia_share * half_trace_com(phi)) ** 2
+        back = parameter_jacobian(phi)
         return np.asarray((back * variance) @ back.T)
 
     def with_grasp(self, body: InertialParameters) -> Array:

@@ -67,7 +67,7 @@ def without_tool(load: Estimate, tool: Estimate, shared: bool) -> Estimate:
 
 def _own(rest: Estimate, known: Mask) -> Estimate:
     """Return what is left with only that called identified which is so for its own size, not for that of the load."""
-    fixed = known & identified(rest.std, natural_sizes(rest.parameters.vector))
+    fixed = known & identified(rest.std, natural_sizes(rest.parameters.vector.copy()))
     names = ("xx", "xy", "xz", "yy", "yz", "zz")
     lost = [n for n, was, now in zip(names, known[4:], fixed[4:], strict=True) if was and not now]
     rest = replace(rest, identified=fixed)

@@ -111,8 +111,9 @@ class Moments:
         starts = np.concatenate([[0], np.flatnonzero(label[1:] != label[:-1]) + 1, [len(log)]])
         if len(starts) > len(log) / SHORTEST_RUN + 2:
             # Rows of many groups mixed: gather them first, so that products run over long stretches.
-            order = np.argsort(label, kind="stable")
-            alpha, accel, gravity, omega, wrench = (v[order] for v in (alpha, accel, gravity, omega, wrench))
+            # Sixteen bits are sorted by counting.
+            order = np.argsort(label.astype(np.uint16) if len(groups) < 1 << 16 else label, kind="stable")
+            alpha, accel, gravity, omega, wrench = (_taken(v, order) for v in (alpha, accel, gravity, omega, wrench))
             label = label[order]
             starts = np.searchsorted(label, np.arange(len(groups) + 1))
         out = np.zeros((len(groups), SIZE, SIZE))
@@ -189,6 +190,13 @@ class Moments:
             elif isinstance(error, KeyError):
                 reason = str(error.args[0])
             raise BadFile(f"{path} does not hold saved moments ({reason}). Write one with Moments.save.") from None
+
+
+def _taken(values: Array, rows: Integers) -> Array:
+    """Return the rows, read-only like those of a log: the pass is compiled for one kind of array."""
+    out = values.take(rows, 0)
+    out.flags.writeable = False
+    return out
 
 
 def features(log: MotionLog) -> Array:
