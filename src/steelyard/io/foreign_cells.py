@@ -42,7 +42,7 @@ def in_cells_of(mesher: str, mesh: TetMesh, *, patience_s: float = PATIENCE_S) -
         given, made = Path(scratch) / "surface.npz", Path(scratch) / "cells.npz"
         corners, triangles = np.unique(mesh.surface, return_inverse=True)
         np.savez(given, vertices=mesh.vertices[corners], triangles=triangles.reshape(-1, 3).astype(np.int32))
-        _run([sys.executable, "-m", "steelyard.io.mesher", mesher, str(given), str(made)], mesher, patience_s)
+        _run(mesher, given, made, patience_s)
         with np.load(made, allow_pickle=False) as arrays:
             filled = _facing_out(arrays["vertices"], arrays["tets"].astype(np.int64))
     off = filled.volume / mesh.volume - 1
@@ -54,10 +54,14 @@ def in_cells_of(mesher: str, mesh: TetMesh, *, patience_s: float = PATIENCE_S) -
     return filled
 
 
-def _run(command: list[str], mesher: str, patience_s: float) -> None:
-    """Run the mesher to its end; raises CannotAnswer where it fails, crashes or takes too long."""
+def _run(mesher: str, given: Path, made: Path, patience_s: float) -> None:
+    """Run the mesher to its end; raises CannotAnswer where it fails, crashes or takes too long.
+
+    It runs in the scratch folder, since fTetWild leaves files where it stands.
+    """
+    command = [sys.executable, "-m", "steelyard.io.mesher", mesher, str(given), str(made)]
     try:
-        done = subprocess.run(command, capture_output=True, text=True, timeout=patience_s, check=False)
+        done = subprocess.run(command, cwd=made.parent, capture_output=True, text=True, timeout=patience_s, check=False)
     except subprocess.TimeoutExpired:
         raise CannotAnswer(f"{mesher} was stopped after {patience_s:g} s. Use the default cells.") from None
     if done.returncode:
