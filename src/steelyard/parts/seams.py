@@ -27,6 +27,7 @@ from steelyard.shape.tets import TetMesh
 
 STRAIGHT, CREASED = 0.05, 0.25  # mean turn [rad] across a border that is no seam, and that is one
 NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cube cut in half has 1.6
+POINT = 0.02  # the same where two clusters only touch in a point or along an edge
 PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part
 FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surface are worth a part of their own
 _BLUNT = (
@@ -137,7 +138,9 @@ def _support(row: Any, smaller: float, limits: tuple[float, float, float, float]
     """Return how much of a seam, 0..1, the contact `row` (16,) is: creased around, a neck of the smaller cluster."""
     straight_most, creased, neck_most, flank = limits
     area, length = row[_AREA], row[_LENGTH] + row[_LENGTH + 1] + row[_LENGTH + 2]
-    if area <= 0 or length <= 0:
+    if area <= POINT * smaller ** (2 / 3):
+        return 1.0 / FAR
+    if length <= 0:
         return 0.0
     neck = (flank - area / smaller ** (2 / 3)) / (flank - neck_most)
     if neck <= 0:
@@ -172,7 +175,7 @@ def _price(hull: float, support: float, va: float, vb: float, paint: float, stag
     if stage == 1:
         return _STAGE + paint / FAR, paint / FAR
     hollow = max(0.0, hull - va - vb)
-    seam = hollow * support
+    seam = min(hollow, paint) * support
     price = hollow * (0.1 + support) + _SIZE * (va + vb)
     return (price, seam) if stage == 0 else (2 * _STAGE + price + paint, seam + paint)
 

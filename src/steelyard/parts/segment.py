@@ -197,7 +197,7 @@ def _cell_of_its_colour(
 ) -> Integers:
     """Return the cell (N,) of every point: of the nearest few the first of its colour, the nearest where none is.
 
-    Cells reach through thin walls and layers to what lies behind; the nearest is often of another colour than the point.
+    Cells reach through thin walls and layers to what is behind; the nearest is often of another colour than the point.
     """
     from scipy.spatial import cKDTree
 
