@@ -25,7 +25,7 @@ from steelyard.shape.hull import hull_volume, hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
-STRAIGHT, CREASED = 0.05, 0.25  # mean turn [rad] across a border that is no seam, and that is one
+STRAIGHT, CREASED = 0.07, 0.25  # mean turn [rad] across a border that is no seam, and that is one
 NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cube cut in half has 1.6
 POINT = 0.02  # the same where two clusters only touch in a point or along an edge
 PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part

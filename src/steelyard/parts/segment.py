@@ -19,6 +19,7 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.parts.colours import colour_modes
 from steelyard.parts.description import Cuts, cuts_of
+from steelyard.parts.doubt import doubts
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.parts.pieces import cell_colours, inner_faces, pieces_of, with_points
@@ -30,7 +31,7 @@ from steelyard.shape.mesh import Colours, Integers
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import cross
 
-PER_PART = 0.1  # worth of a part: a hollow of a tenth of the volume at a full seam, or a hundredth of the surface
+PER_PART = 0.08  # worth of a part: a hollow of a twelfth of the volume at a full seam, or 0.8 % of the surface
 
 AROUND = 16  # cells nearest to a point among which there is one of its colour, if it belongs to any
 
@@ -46,7 +47,7 @@ class Segmentation:
     rgb         (P, 3) mean colour 0..255 of the points of each part, None where the cloud has no colours
     point_part  (N,) the part of every point of the cloud: that of the nearest tet of the point's colour
     names       (P,) what each part is called
-    findings    what a reader must know
+    findings    what a reader must know of the cut that was chosen; none of a cut asked for
     """
 
     mesh: TetMesh
@@ -92,7 +93,7 @@ class Segmentation:
         count = int(ordered.max()) + 1
         rgb = _mean_colours(self.cloud.rgb, point_part, count)
         names = tuple(f"part {k}" for k in range(count))
-        return replace(self, labels=ordered, rgb=rgb, point_part=point_part, names=names)
+        return replace(self, labels=ordered, rgb=rgb, point_part=point_part, names=names, findings=())
 
     def merged(self, groups: Sequence[Sequence[int]]) -> Segmentation:
         """Return parts joined: each group lists the parts that are one; it takes the name of its first part."""
@@ -172,7 +173,9 @@ def parts_of_pieces(pieces: Pieces, *, parts: int | None = None, per_part: float
     whole = Segmentation(
         pieces.mesh, one, tree.hierarchy, cuts, None, one[pieces.nearest], ("part 0",), pieces.cloud, pieces.nearest
     )
-    return whole.cut(cuts.count if parts is None else parts)
+    if parts is not None:
+        return whole.cut(parts)
+    return replace(whole.cut(cuts.count), findings=doubts(cuts, pieces.colour))
 
 
 def nearest_cell(points: Array, centroids: Array) -> Integers:
