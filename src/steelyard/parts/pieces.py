@@ -22,11 +22,29 @@ _UNCREASED = 0.05  # of a face's area, what is left of its pull where it ends in
 
 def cell_colours(mesh: TetMesh, label: Integers) -> Integers:
     """Return the colour (T,) of every tet: of most of its corners, in a tie that of the corner nearest its centroid."""
-    corners = label[mesh.tets]
-    votes = (corners[:, :, None] == corners[:, None, :]).sum(2).astype(np.float64)
-    gap = np.linalg.norm(mesh.vertices[mesh.tets] - mesh.centroids[:, None], axis=2)
-    best = np.argmax(votes - 0.5 * gap / gap.max(1, keepdims=True), axis=1)
-    return np.asarray(corners[np.arange(len(mesh)), best])
+    return _cell_colours(mesh.vertices, mesh.tets, mesh.centroids, np.asarray(label, dtype=np.int64))
+
+
+@numba.njit(cache=True, nogil=True)
+def _cell_colours(vertices: Array, tets: Any, centroids: Array, label: Any) -> Any:
+    found, gap = np.empty(len(tets), np.int64), np.empty(4)
+    for t in range(len(tets)):
+        far = 0.0
+        for i in range(4):
+            gap[i] = 0.0
+            for d in range(3):
+                gap[i] += (vertices[tets[t, i], d] - centroids[t, d]) ** 2
+            gap[i] = np.sqrt(gap[i])
+            far = max(far, gap[i])
+        most = -1.0
+        for i in range(4):
+            votes = -0.5 * gap[i] / far
+            for j in range(4):
+                if label[tets[t, j]] == label[tets[t, i]]:
+                    votes += 1.0
+            if votes > most:
+                most, found[t] = votes, label[tets[t, i]]
+    return found
 
 
 def inner_faces(mesh: TetMesh) -> tuple[Integers, Integers]:

@@ -57,14 +57,14 @@ def seam_tree(
 ) -> SeamTree:
     """Return the tree of pieces (T,) with colours (N,); pairs and corners as `pieces.inner_faces` gives them."""
     count = len(colour)
-    used = np.unique(mesh.tets)
-    middle, scale = mesh.vertices[used].mean(0), mesh.volume ** (1 / 3)
+    corner = np.zeros((count, len(mesh.vertices)), dtype=bool)  # which vertices each piece has
+    corner[np.repeat(piece, 4), mesh.tets.ravel()] = True
+    middle, scale = mesh.vertices[corner.any(0)].mean(0), mesh.volume ** (1 / 3)
     xyz = np.ascontiguousarray((mesh.vertices - middle) / scale)
     contact = _contacts(xyz, skin, piece, count, pairs, corners, scale)
     touch = contact[:, :, _AREA] > 0
-    _join_by_corners(mesh, piece, touch)
-    key = np.unique(np.repeat(piece, 4) * len(xyz) + mesh.tets.ravel())
-    owner, member = np.divmod(key, len(xyz))
+    _join_by_corners(corner, touch)
+    owner, member = np.nonzero(corner)
     start = np.searchsorted(owner, np.arange(count + 1))
     share = np.bincount(piece[skin.cell], skin.areas, count) / max(float(skin.areas.sum()), 1e-300)
     volume = np.bincount(piece, mesh.volumes, count) / mesh.volume
@@ -118,19 +118,16 @@ def _contacts(
     return table
 
 
-def _join_by_corners(mesh: TetMesh, piece: Integers, touch: Any) -> None:
-    """Mark pieces of bodies without a common face as touching where they share a corner."""
+def _join_by_corners(corner: Any, touch: Any) -> None:
+    """Mark pieces of bodies without a common face as touching where they share one of the corners (N, V)."""
     from scipy.sparse.csgraph import connected_components
 
     bodies, body = connected_components(touch, directed=False)
     if bodies == 1:
         return
-    corner, owner = np.unique(np.stack([mesh.tets.ravel(), np.repeat(piece, 4)], axis=1), axis=0).T
-    for step in range(1, 8):
-        same = corner[step:] == corner[:-step]
-        i, j = owner[step:][same], owner[:-step][same]
-        apart = body[i] != body[j]
-        touch[i[apart], j[apart]] = touch[j[apart], i[apart]] = True
+    meeting = corner[:, corner.sum(0) > 1].astype(np.float32)
+    shared = meeting @ meeting.T > 0
+    touch |= shared & (body[:, None] != body)
 
 
 @numba.njit(cache=True, nogil=True)
