@@ -22,7 +22,7 @@ _UNCREASED = 0.05  # of a face's area, what is left of its pull where it ends in
 
 def cell_colours(mesh: TetMesh, label: Integers) -> Integers:
     """Return the colour (T,) of every tet: of most of its corners, in a tie that of the corner nearest its centroid."""
-    return _cell_colours(mesh.vertices, mesh.tets, mesh.centroids, np.asarray(label, dtype=np.int64))
+    return np.asarray(_cell_colours(mesh.vertices, mesh.tets, mesh.centroids, np.asarray(label, dtype=np.int64)))
 
 
 @numba.njit(cache=True, nogil=True)
