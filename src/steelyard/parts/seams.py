@@ -34,6 +34,7 @@ _BLUNT = (
     0.005  # hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them
 )
 _SIZE = 0.02  # small clusters first (as in clustering.Hollow)
+_NEARER = 1e-3  # of all bits equally dear to join, the nearest: per cube root of the volume between their middles
 _STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
 # Columns of the table of contacts between two clusters.
 _AREA, _VECTOR, _LENGTH, _TURN = 0, 1, 4, 10  # scalar, 3, 6 and 6 numbers
@@ -68,11 +69,15 @@ def seam_tree(
     start = np.searchsorted(owner, np.arange(count + 1))
     share = np.bincount(piece[skin.cell], skin.areas, count) / max(float(skin.areas.sum()), 1e-300)
     volume = np.bincount(piece, mesh.volumes, count) / mesh.volume
+    weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
+    moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
+    centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
     merges, cost, seam, node_volume, hull, faults = _merge(
         xyz,
         start,
         member.astype(np.int64),
         volume,
+        centre,
         share,
         colour.astype(np.int64),
         contact,
@@ -189,8 +194,8 @@ def _best_partner(a: int, price: Array, alive: Any) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _merge(
-    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_share: Array, leaf_colour: Any, contact: Any,
-    touch: Any, tolerance: float, limits: tuple[float, float, float, float],
+    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_middle: Array, leaf_share: Array, leaf_colour: Any,
+    contact: Any, touch: Any, tolerance: float, limits: tuple[float, float, float, float],
 ) -> tuple[Any, Array, Array, Array, Array, int]:  # fmt: skip
     """Return merges, cost, seam, volume and hull of every node, and faults. Clusters live in the rows of `contact`.
 
@@ -220,6 +225,7 @@ def _merge(
     known, exact = np.zeros((n, n)), np.zeros((n, n), np.bool_)
     price, best = np.full((n, n), np.inf), np.full(n, -1, np.int64)
     changed = np.ones(n, np.bool_)
+    middle = leaf_middle.copy()
     made = 0
     while made < n - 1:
         for a in range(n):
@@ -237,6 +243,8 @@ def _merge(
                 support = _support(contact[a, b], min(volume[a], volume[b]), limits)
                 paint = PAINT * min(share[a], share[b])
                 price[a, b] = _price(known[a, b], support, volume[a], volume[b], paint, stage)[0]
+                if stage == 1:
+                    price[a, b] += _NEARER * np.sqrt(((middle[a] - middle[b]) ** 2).sum())
         for a in range(n):
             if alive[a]:
                 if changed[a] or best[a] < 0 or not alive[best[a]] or changed[best[a]]:
@@ -308,6 +316,7 @@ def _merge(
         alive[q] = False
         if colour[p] != colour[q]:
             colour[p] = -1
+        middle[p] = (volume[p] * middle[p] + volume[q] * middle[q]) / (volume[p] + volume[q])
         volume[p] += volume[q]
         share[p] += share[q]
         hull[p], node[p] = h, n + made
