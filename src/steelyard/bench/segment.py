@@ -55,7 +55,7 @@ TABLE_II: dict[str, tuple[float, float, float, int]] = {
 # Table I: means over its twenty objects, USE, GCE, seconds.
 TABLE_I = {"htc_cold": (0.10, 0.05, 9.73), "htc_warm": (0.10, 0.07, 3.48)}
 RULES = (
-    "Labels unseen. A point has the part of the nearest tet centroid. impurity is the paper's USE, gce the "
+    "Labels unseen. A point has the part of the nearest tet of its colour, by centroids. impurity is the paper's USE, gce the "
     "textbook one (Martin 2001); n_true counts parts with points. volume_ratio over the true solids; volume_iou "
     "on 150 000 points in the padded box; Hausdorff on points of what is seen of both surfaces, the true "
     "diagonal scaled to 1000 mm. htc_cold and htc_warm: the paper's clustering (eq. 8, cut at depth 2 of the "
