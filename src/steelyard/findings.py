@@ -42,6 +42,7 @@ REMEDIES: dict[str, str] = {
     "normals-flipped": "Turn the normals outward, or leave them out so that they are found.",
     "parts-overlap": "Cut one part out of the other, so that they only touch and no volume counts twice.",
     "part-unseen": "Nothing to do if the part is hidden inside; give its shape, since no scan can see it.",
+    "parts-unsure": "Give --parts if you know how many, join parts of one material, or let a log of forces decide.",
     "part-not-homogeneous": "Split the part where its material changes, or check the shape and the grasp pose.",
     "materials-tied": "Move faster, add poses, or shorten the list of materials.",
     "materials-impossible": "Add the missing material to the list, or check the shape and its units.",

@@ -12,6 +12,7 @@ from steelyard.errors import BadValue
 from steelyard.evaluate.segments import score_segments
 from steelyard.io.object_folders import read_object
 from steelyard.parts.description import cuts_of
+from steelyard.parts.doubt import doubts
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.segment import segment
 from steelyard.shape.cloud import Cloud
@@ -102,6 +103,41 @@ def test_turned_and_in_another_order_the_parts_are_the_same():
     again = segment(cloud, TetMesh(mesh.vertices, mesh.tets))
     np.testing.assert_array_equal(found.labels, again.labels)
     np.testing.assert_array_equal(found.hierarchy.merges, again.hierarchy.merges)
+
+
+def test_bits_of_one_colour_and_walls_that_touch_do_not_hang_on_the_order_of_points():
+    # Three like bits of one colour on a body of another: which two join first must not be the one that is listed first.
+    boxes = [((0, 0, 0), (0.1, 0.02, 0.02)), *[((x, 0, 0.02), (x + 0.01, 0.02, 0.03)) for x in (0.0, 0.03, 0.09)]]
+    cloud, mesh = made(boxes, [STEEL, RUBBER, RUBBER, RUBBER])
+    found = segment(cloud, mesh)
+    for seed in range(3):
+        rng = np.random.default_rng(seed)
+        order, cells = rng.permutation(len(cloud)), rng.permutation(len(mesh))
+        moved = cloud.chosen(order)
+        other = segment(moved, TetMesh(moved.xyz, np.argsort(order)[mesh.tets][cells]))
+        for count in (len(found), 2, 3, 4):
+            same = score_segments(found.cut(count).point_part[order], other.cut(count).point_part)
+            assert same.ari == pytest.approx(1.0)
+
+
+def test_every_part_has_points_and_each_point_a_part_of_its_colour():
+    cloud, mesh = made([((0, 0, 0), (0.1, 0.02, 0.001)), ((0, 0, 0.001), (0.1, 0.02, 0.01))], [RUBBER, STEEL])
+    found = segment(cloud, mesh)
+    assert len(found) == 2
+    assert len(np.unique(found.point_part)) == 2
+    assert score_segments(cloud.labels, found.point_part).impurity < 0.01
+
+
+def test_a_number_in_doubt_is_named_with_what_tells_the_parts_apart():
+    merges = np.array([[0, 1], [2, 3]])
+    tree = Hierarchy(np.arange(3), merges, np.arange(2.0))
+    close, clear = cuts_of(tree, np.array([0.1, 0.1]), 0.1), cuts_of(tree, np.array([0.5, 0.5]), 0.1)
+    np.testing.assert_allclose(clear.sureness[1] / clear.sureness[2], np.exp(-4.0))
+    assert doubts(clear, np.array([0, 0, 1])) == ()
+    (finding,) = doubts(close, np.array([0, 1, 2]))
+    assert finding.code == "parts-unsure"
+    assert "by colour alone" in finding.message
+    assert "by shape alone" in doubts(close, np.array([0, 0, 0]))[0].message
 
 
 def test_scale_changes_nothing():

@@ -16,16 +16,35 @@ PIECE = 1 / 200  # of the volume: a tenth of the finest part that is looked for
 TINY = 1 / 2000  # of the volume: less is no part ...
 TINY_SKIN = 1 / 1000  # ... unless it is seen, as foil is: this share of the boundary
 _CREASE = 0.6  # a turn [rad] that is certainly a crease
+_OTHER_COLOUR = 1e-3  # pull of a face between two colours, for a piece that holds no point
 _UNCREASED = 0.05  # of a face's area, what is left of its pull where it ends in creases only
 
 
 def cell_colours(mesh: TetMesh, label: Integers) -> Integers:
     """Return the colour (T,) of every tet: of most of its corners, in a tie that of the corner nearest its centroid."""
-    corners = label[mesh.tets]
-    votes = (corners[:, :, None] == corners[:, None, :]).sum(2).astype(np.float64)
-    gap = np.linalg.norm(mesh.vertices[mesh.tets] - mesh.centroids[:, None], axis=2)
-    best = np.argmax(votes - 0.5 * gap / gap.max(1, keepdims=True), axis=1)
-    return np.asarray(corners[np.arange(len(mesh)), best])
+    return np.asarray(_cell_colours(mesh.vertices, mesh.tets, mesh.centroids, np.asarray(label, dtype=np.int64)))
+
+
+@numba.njit(cache=True, nogil=True)
+def _cell_colours(vertices: Array, tets: Any, centroids: Array, label: Any) -> Any:
+    found, gap = np.empty(len(tets), np.int64), np.empty(4)
+    for t in range(len(tets)):
+        far = 0.0
+        for i in range(4):
+            gap[i] = 0.0
+            for d in range(3):
+                gap[i] += (vertices[tets[t, i], d] - centroids[t, d]) ** 2
+            gap[i] = np.sqrt(gap[i])
+            far = max(far, gap[i])
+        most = -1.0
+        for i in range(4):
+            votes = -0.5 * gap[i] / far
+            for j in range(4):
+                if label[tets[t, j]] == label[tets[t, i]]:
+                    votes += 1.0
+            if votes > most:
+                most, found[t] = votes, label[tets[t, i]]
+    return found
 
 
 def inner_faces(mesh: TetMesh) -> tuple[Integers, Integers]:
@@ -60,6 +79,29 @@ def pieces_of(
     count, colours = int(piece.max()) + 1, int(colour.max()) + 1
     volume = np.bincount(piece * colours + colour, mesh.volumes, count * colours).reshape(count, colours)
     return piece, volume.argmax(1)
+
+
+def with_points(
+    mesh: TetMesh, piece: Integers, colour: Integers, pairs: Integers, areas: Array, nearest: Integers
+) -> tuple[Integers, Integers]:
+    """Return pieces (T,) and their colours with those that hold no point joined to a neighbour, rather of their colour.
+
+    Nothing is known of a piece that nobody sees: it is no part of its own.
+
+    colour   (N,) of every piece
+    nearest  (points,) the tet of every point of the cloud
+    """
+    points = np.bincount(nearest, minlength=len(mesh)).astype(np.float64)
+    seen = np.bincount(piece, points) > 0
+    if seen.all():
+        return piece, colour
+    alike = colour[piece[pairs[:, 0]]] == colour[piece[pairs[:, 1]]]
+    whole = _absorbed(piece, points, pairs, np.where(alike, 1, _OTHER_COLOUR) * areas, 1.0)
+    whole = _specks_to_nearest(mesh, whole, points)
+    count, colours, known = int(whole.max()) + 1, int(colour.max()) + 1, seen[piece]
+    key = whole[known] * colours + colour[piece[known]]
+    volume = np.bincount(key, mesh.volumes[known], count * colours).reshape(count, colours)
+    return whole, volume.argmax(1)
 
 
 def _absorbed(piece: Integers, size: Array, pairs: Integers, pull: Array, least: float) -> Integers:

@@ -25,14 +25,16 @@ from steelyard.shape.hull import hull_volume, hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
-STRAIGHT, CREASED = 0.05, 0.25  # mean turn [rad] across a border that is no seam, and that is one
+STRAIGHT, CREASED = 0.07, 0.25  # mean turn [rad] across a border that is no seam, and that is one
 NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cube cut in half has 1.6
+POINT = 0.02  # the same where two clusters only touch in a point or along an edge
 PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part
 FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surface are worth a part of their own
 _BLUNT = (
     0.005  # hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them
 )
 _SIZE = 0.02  # small clusters first (as in clustering.Hollow)
+_NEARER = 1e-3  # of all bits equally dear to join, the nearest: per cube root of the volume between their middles
 _STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
 # Columns of the table of contacts between two clusters.
 _AREA, _VECTOR, _LENGTH, _TURN = 0, 1, 4, 10  # scalar, 3, 6 and 6 numbers
@@ -56,22 +58,26 @@ def seam_tree(
 ) -> SeamTree:
     """Return the tree of pieces (T,) with colours (N,); pairs and corners as `pieces.inner_faces` gives them."""
     count = len(colour)
-    used = np.unique(mesh.tets)
-    middle, scale = mesh.vertices[used].mean(0), mesh.volume ** (1 / 3)
+    corner = np.zeros((count, len(mesh.vertices)), dtype=bool)  # which vertices each piece has
+    corner[np.repeat(piece, 4), mesh.tets.ravel()] = True
+    middle, scale = mesh.vertices[corner.any(0)].mean(0), mesh.volume ** (1 / 3)
     xyz = np.ascontiguousarray((mesh.vertices - middle) / scale)
     contact = _contacts(xyz, skin, piece, count, pairs, corners, scale)
     touch = contact[:, :, _AREA] > 0
-    _join_by_corners(mesh, piece, touch)
-    key = np.unique(np.repeat(piece, 4) * len(xyz) + mesh.tets.ravel())
-    owner, member = np.divmod(key, len(xyz))
+    _join_by_corners(corner, touch)
+    owner, member = np.nonzero(corner)
     start = np.searchsorted(owner, np.arange(count + 1))
     share = np.bincount(piece[skin.cell], skin.areas, count) / max(float(skin.areas.sum()), 1e-300)
     volume = np.bincount(piece, mesh.volumes, count) / mesh.volume
+    weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
+    moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
+    centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
     merges, cost, seam, node_volume, hull, faults = _merge(
         xyz,
         start,
         member.astype(np.int64),
         volume,
+        centre,
         share,
         colour.astype(np.int64),
         contact,
@@ -117,19 +123,16 @@ def _contacts(
     return table
 
 
-def _join_by_corners(mesh: TetMesh, piece: Integers, touch: Any) -> None:
-    """Mark pieces of bodies without a common face as touching where they share a corner."""
+def _join_by_corners(corner: Any, touch: Any) -> None:
+    """Mark pieces of bodies without a common face as touching where they share one of the corners (N, V)."""
     from scipy.sparse.csgraph import connected_components
 
     bodies, body = connected_components(touch, directed=False)
     if bodies == 1:
         return
-    corner, owner = np.unique(np.stack([mesh.tets.ravel(), np.repeat(piece, 4)], axis=1), axis=0).T
-    for step in range(1, 8):
-        same = corner[step:] == corner[:-step]
-        i, j = owner[step:][same], owner[:-step][same]
-        apart = body[i] != body[j]
-        touch[i[apart], j[apart]] = touch[j[apart], i[apart]] = True
+    meeting = corner[:, corner.sum(0) > 1].astype(np.float32)
+    shared = meeting @ meeting.T > 0
+    touch |= shared & (body[:, None] != body)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -137,7 +140,9 @@ def _support(row: Any, smaller: float, limits: tuple[float, float, float, float]
     """Return how much of a seam, 0..1, the contact `row` (16,) is: creased around, a neck of the smaller cluster."""
     straight_most, creased, neck_most, flank = limits
     area, length = row[_AREA], row[_LENGTH] + row[_LENGTH + 1] + row[_LENGTH + 2]
-    if area <= 0 or length <= 0:
+    if area <= POINT * smaller ** (2 / 3):
+        return 1.0 / FAR
+    if length <= 0:
         return 0.0
     neck = (flank - area / smaller ** (2 / 3)) / (flank - neck_most)
     if neck <= 0:
@@ -172,7 +177,7 @@ def _price(hull: float, support: float, va: float, vb: float, paint: float, stag
     if stage == 1:
         return _STAGE + paint / FAR, paint / FAR
     hollow = max(0.0, hull - va - vb)
-    seam = hollow * support
+    seam = min(hollow, paint) * support
     price = hollow * (0.1 + support) + _SIZE * (va + vb)
     return (price, seam) if stage == 0 else (2 * _STAGE + price + paint, seam + paint)
 
@@ -189,8 +194,8 @@ def _best_partner(a: int, price: Array, alive: Any) -> int:
 
 @numba.njit(cache=True, nogil=True)
 def _merge(
-    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_share: Array, leaf_colour: Any, contact: Any,
-    touch: Any, tolerance: float, limits: tuple[float, float, float, float],
+    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_middle: Array, leaf_share: Array, leaf_colour: Any,
+    contact: Any, touch: Any, tolerance: float, limits: tuple[float, float, float, float],
 ) -> tuple[Any, Array, Array, Array, Array, int]:  # fmt: skip
     """Return merges, cost, seam, volume and hull of every node, and faults. Clusters live in the rows of `contact`.
 
@@ -220,6 +225,7 @@ def _merge(
     known, exact = np.zeros((n, n)), np.zeros((n, n), np.bool_)
     price, best = np.full((n, n), np.inf), np.full(n, -1, np.int64)
     changed = np.ones(n, np.bool_)
+    middle = leaf_middle.copy()
     made = 0
     while made < n - 1:
         for a in range(n):
@@ -237,6 +243,8 @@ def _merge(
                 support = _support(contact[a, b], min(volume[a], volume[b]), limits)
                 paint = PAINT * min(share[a], share[b])
                 price[a, b] = _price(known[a, b], support, volume[a], volume[b], paint, stage)[0]
+                if stage == 1:
+                    price[a, b] += _NEARER * np.sqrt(((middle[a] - middle[b]) ** 2).sum())
         for a in range(n):
             if alive[a]:
                 if changed[a] or best[a] < 0 or not alive[best[a]] or changed[best[a]]:
@@ -308,6 +316,7 @@ def _merge(
         alive[q] = False
         if colour[p] != colour[q]:
             colour[p] = -1
+        middle[p] = (volume[p] * middle[p] + volume[q] * middle[q]) / (volume[p] + volume[q])
         volume[p] += volume[q]
         share[p] += share[q]
         hull[p], node[p] = h, n + made

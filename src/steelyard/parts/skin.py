@@ -118,7 +118,9 @@ def skin_of(mesh: TetMesh) -> Skin:
     ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     low, high = ends.min(1), ends.max(1)
     key = low * len(mesh.vertices) + high
-    order = np.argsort(key, kind="stable")
+    a, b, c = (mesh.vertices[triangles[:, k]] for k in range(3))
+    area = np.linalg.norm(cross(b - a, c - a), axis=1)
+    order = np.lexsort((np.repeat(area, 3), key))
     key = key[order]
     place = np.arange(len(key)) - np.searchsorted(key, key)
     first = np.flatnonzero((place[:-1] % 2 == 0) & (key[1:] == key[:-1]))

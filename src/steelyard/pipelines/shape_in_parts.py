@@ -24,9 +24,8 @@ from steelyard.shape.volume import Solid, enclose
 
 # A finer cut than this is not offered to a log: ten numbers cannot tell so many masses.
 MOST_PARTS = 16
-# Description length ranks the numbers of parts and is no measured frequency: it counts half against the forces, and
-# never rules out what they ask for.
-TRUST, LEAST_SURE = 0.5, 1e-3
+# What shape and colour say never rules out what the forces ask for.
+LEAST_SURE = 0.03
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,7 +72,7 @@ class Shape:
         wanted = {max(1, chosen // 2), chosen - 1, chosen, chosen + 1}
         numbers = tuple(sorted({min(k, most) for k in wanted if k >= 1}))
         sure = np.maximum(made.sureness[[k - 1 for k in numbers]], LEAST_SURE)
-        return Cuts(numbers, tuple(made.cut(k).parts for k in numbers), TRUST * np.log(sure))
+        return Cuts(numbers, tuple(made.cut(k).parts for k in numbers), np.log(sure))
 
 
 @dataclass(frozen=True, eq=False)
