@@ -22,6 +22,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.parts.edge_heap import remove, settle
 from steelyard.parts.hierarchy import Hierarchy
+from steelyard.shape.borrowed import integer
 from steelyard.shape.hull import TOLERANCE, hull_volume, hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
@@ -220,7 +221,7 @@ def _merge_all(
     key, tie = np.empty(edges), np.empty(edges)
     head = np.full(nodes, -1, np.int32)
     following = np.empty(2 * edges, np.int32)
-    heap, place, heaped = np.empty(edges, np.int32), np.full(edges, -1, np.int32), 0
+    heap, place, heaped = np.empty(edges, np.int32), np.full(edges, -1, np.int32), integer(0)
     for e in range(edges):
         a, b = end[e, 0], end[e, 1]
         known[e] = max(hull[a], hull[b])
@@ -244,13 +245,13 @@ def _merge_all(
                 if alive[e]:
                     heaped = settle(heap, place, key, tie, heaped, e)
             continue
-        e = heap[0]
+        e = integer(heap[0])
         a, b = end[e, 0], end[e, 1]
         if not exact[e]:
             stamp += 1
             count = vertices_of_both(pool, offset, length, a, b, mark, stamp, rows)
             if count == 5:
-                known[e], kept = _five_points(xyz, rows), 5
+                known[e], kept = _five_points(xyz, rows), integer(5)
                 vertex[:5, 2] = rows[:5]
             else:
                 known[e], kept = hull_volume(xyz, rows, count, tolerance, work)
@@ -258,7 +259,7 @@ def _merge_all(
                 points += count
                 if kept < 0:
                     faults += 1
-                    kept = 0
+                    kept = integer(0)
             pool = _stored(pool, filled, vertex, kept)
             spot[e], held[e] = filled, kept
             filled += kept
@@ -281,14 +282,14 @@ def _merge_all(
         alive[e] = False
         heaped = remove(heap, place, key, tie, heaped, e)
         for node in (a, b):
-            half = head[node]
+            half = integer(head[node])
             while half >= 0:
-                after = following[half]
+                after = integer(following[half])
                 f = half >> 1
                 if alive[f]:
                     other = end[f, 1 - (half & 1)]
                     if latest_merge[other] == made:
-                        g = latest[other]
+                        g = integer(latest[other])
                         known[g] = max(known[g], known[f])
                         alive[f] = False
                         heaped = remove(heap, place, key, tie, heaped, f)
@@ -297,7 +298,7 @@ def _merge_all(
                         end[f, half & 1] = c
                         following[half], head[c] = head[c], half
                 half = after
-        half = head[c]
+        half = integer(head[c])
         while half >= 0:
             f = half >> 1
             other = end[f, 1 - (half & 1)]
@@ -307,7 +308,7 @@ def _merge_all(
             tie[f] = volume[c] + volume[other]
             if across or group[c] == group[other]:
                 heaped = settle(heap, place, key, tie, heaped, f)
-            half = following[half]
+            half = integer(following[half])
         made += 1
 
     # Separate bodies: the two of least volume, until one is left.
@@ -323,7 +324,7 @@ def _merge_all(
         cost[made], volume[c], hull[c] = np.inf, va + vb, h
         if kept < 0:
             faults += 1
-            kept = 0
+            kept = integer(0)
         pool = _stored(pool, filled, vertex, kept)
         offset[c], length[c] = filled, kept
         filled += kept

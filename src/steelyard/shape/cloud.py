@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import Colours, Integers
+from steelyard.shape.spacing import Neighbours
 from steelyard.spatial import Pose
 
 
@@ -55,6 +57,11 @@ class Cloud:
     def diagonal(self) -> float:
         """Diagonal of the box around the points along the axes of their frame [m]."""
         return float(np.linalg.norm(np.ptp(self.xyz, axis=0)))
+
+    @cached_property
+    def near(self) -> Neighbours:
+        """The nearest other points of each point [m]."""
+        return Neighbours.of(self.xyz)
 
     def chosen(self, rows: Any) -> Cloud:
         """Return the points of `rows`, numbers or a mask."""

@@ -169,14 +169,14 @@ def _longer(sums: Any, last: Any) -> Any:
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def pixel_of(camera: Any, R: Any, p: Any, x: float, y: float, h: float) -> Any:
-    """Return depth [m] and the nearest pixel (u, v) of a point seen by a camera at (R, p)."""
-    x, y, h = x - p[0], y - p[1], h - p[2]
-    z = R[0, 2] * x + R[1, 2] * y + R[2, 2] * h
+def pixel_of(camera: Any, R: Any, p: Any, k: int, x: float, y: float, h: float) -> Any:
+    """Return depth [m] and the nearest pixel (u, v) of a point seen by camera k of those at (R, p)."""
+    x, y, h = x - p[k, 0], y - p[k, 1], h - p[k, 2]
+    z = R[k, 0, 2] * x + R[k, 1, 2] * y + R[k, 2, 2] * h
     if z <= 1e-6:
         return 0.0, -1, -1
-    u = camera[2] + camera[0] * (R[0, 0] * x + R[1, 0] * y + R[2, 0] * h) / z
-    v = camera[3] + camera[1] * (R[0, 1] * x + R[1, 1] * y + R[2, 1] * h) / z
+    u = camera[2] + camera[0] * (R[k, 0, 0] * x + R[k, 1, 0] * y + R[k, 2, 0] * h) / z
+    v = camera[3] + camera[1] * (R[k, 0, 1] * x + R[k, 1, 1] * y + R[k, 2, 1] * h) / z
     return z, int(np.floor(u + 0.5)), int(np.floor(v + 0.5))
 
 
@@ -198,7 +198,7 @@ def looked(
         cosine = -(dx * n[0] + dy * n[1] + dh * n[2]) / far
         if cosine < FACING:
             continue
-        z, u, v = pixel_of(camera, R[k], p[k], x[0], x[1], x[2])
+        z, u, v = pixel_of(camera, R, p, k, x[0], x[1], x[2])
         if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
             continue
         measured = depth[k, v, u] * unit
@@ -289,7 +289,7 @@ def seen_past(
     out = np.zeros(len(points), np.int64)
     for i in range(len(points)):
         for k in range(depth.shape[0]):
-            z, u, v = pixel_of(camera, R[k], p[k], points[i, 0], points[i, 1], points[i, 2])
+            z, u, v = pixel_of(camera, R, p, k, points[i, 0], points[i, 1], points[i, 2])
             if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
                 continue
             if depth[k, v, u] * unit > z + margin + 3 * noise * z * z:

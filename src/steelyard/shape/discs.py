@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from steelyard.shape.mesh import Integers
-from steelyard.shape.winding import FOUR_PI, ONE, Sight, Tree, seen, with_leaves
+from steelyard.shape.winding import FOUR_PI, ONE, Sight, Tree, seen, single, sums
 
 Array = Any  # single precision here, double at the border
 
@@ -40,44 +40,92 @@ class Discs:
     def on(cls, tree: Tree, normals: Array, area: Array, depth: float, soft: float) -> Discs:
         """Return discs of unit normals (N, 3) and areas (N,) in the order given; `depth` in sides of their squares."""
         chosen = np.asarray(area)[tree.order]
-        return cls(
-            tree, _single(np.asarray(normals)[tree.order].T), _single(chosen), _single(depth * chosen**0.5), soft
-        )
+        return cls(tree, single(np.asarray(normals)[tree.order].T), single(chosen), single(depth * chosen**0.5), soft)
 
-    def winding(self, sight: Sight, share: Array | None = None, every: int = 1) -> Array:
-        """Return the winding number (M,) at every `every`-th leaf of the targets; each disc counts by its `share`."""
-        leaves, start, points = sight.chosen(every)
-        area = self.area if share is None else _single(self.area * share)
-        own = np.concatenate([self.tree.points, self.normal, area[None], self.depth[None]])
-        leaf = with_leaves(self.tree, self.normal * area)[1]
-        out = np.empty(points.shape[1], np.float32)
-        _winding(own, leaf, self.tree.start, sight.near[leaves], points, start, np.float32(self.soft**2), out)
+    def winding(self, sight: Sight) -> Array:
+        """Return the winding number (M,) at the targets, which see the tree of the discs."""
+        out = np.zeros(sight.targets.points.shape[1], np.float32)
+        nothing = np.empty(0, np.float32)
+        self._turns(sight, nothing, nothing, np.zeros((1, 2), np.int64), out)
         return out
 
-    def adjoint(self, sight: Sight, weights: Array) -> Array:
-        """Return the sum (N,) over the points of weight times what each disc adds to the point's winding number."""
-        own, leaf = with_leaves(self.tree, _single(weights)[None])
-        out = np.empty(len(self.area), np.float32)
-        tree, soft = self.tree, np.float32(self.soft**2)
-        _adjoint(own, leaf, tree.start, sight.near, tree.points, self.normal, self.depth, soft, out)
-        return out * self.area
+    def response(self, sight: Sight) -> Response:
+        """Return how the winding number at the targets depends on what each disc counts."""
+        size = np.diff(sight.targets.blocks)
+        close = _close(self.tree.start, *sight.near)
+        beyond = np.diff(sight.far[0])
+        at = np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(np.stack([size * close, 3 * size * beyond], 1), 0)])
+        near, far = (np.empty(room, np.float32) for room in at[-1].tolist())
+        self._turns(sight, near, far, at, np.empty(sight.targets.points.shape[1], np.float32))
+        return Response(self, sight, near, far, at)
+
+    def _turns(self, sight: Sight, near: Array, far: Array, at: Integers, out: Array) -> None:
+        own = np.concatenate([self.normal, self.area[None], self.depth[None]])
+        elements = sight.elements(own, self.normal * self.area)
+        points, blocks = sight.targets.points, sight.targets.blocks
+        _turns(*elements, points, blocks, np.float32(self.soft**2), sight.most, near, far, at, out)
 
 
-def _single(values: Any) -> Array:
-    return np.ascontiguousarray(values, np.float32)
+@dataclass(frozen=True, eq=False)
+class Response:
+    """The winding number at targets as a linear function of what each disc counts.
+
+    near  by how much each disc that a target sees by itself turns its number, target by target
+    far   the field (3,) there of a unit dipole at each node that it sees as one
+    at    (B + 1, 2) where the values of each block begin in `near` and in `far`
+    """
+
+    discs: Discs
+    sight: Sight
+    near: Array
+    far: Array
+    at: Integers
+
+    def winding(self, share: Array, every: int = 1) -> Array:
+        """Return the winding number (M,) where the discs count by `share` (N,), ordered as the tree is.
+
+        Only every `every`-th block of targets is looked at, the others have 0.
+        """
+        discs, sight = self.discs, self.sight
+        share = single(share)
+        dipole = sums(discs.normal * (discs.area * share), discs.tree.start)
+        out = np.zeros(sight.targets.points.shape[1], np.float32)
+        where = discs.tree.start, *sight.near, *sight.far, sight.targets.blocks, self.at
+        _apply(self.near, self.far, *where, every, sight.most, share, dipole, out)
+        return out
+
+    def adjoint(self, weights: Array) -> Array:
+        """Return the sum (N,) over targets of weight times what each disc adds to the target's winding number."""
+        discs, sight = self.discs, self.sight
+        out, field = np.zeros(len(discs.area), np.float32), np.zeros((3, 2 * len(discs.tree.start) - 2), np.float32)
+        where = discs.tree.start, *sight.near, *sight.far, sight.targets.blocks, self.at
+        _transposed(self.near, self.far, *where, sight.most, single(weights), discs.normal, discs.area, field, out)
+        return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _close(start: Integers, first: Integers, near: Integers) -> Integers:
+    """Return how many points (B,) every block sees one by one."""
+    out = np.zeros(len(first) - 1, np.int64)
+    for b in range(len(out)):
+        for m in range(first[b], first[b + 1]):
+            out[b] += start[near[m] + 1] - start[near[m]]
+    return out
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _winding(
-    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: Any, out: Array
-) -> None:
-    size = own.shape[1] + leaf.shape[1]
-    all_seen, inverse, turn = np.empty((8, size), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
+def _turns(
+    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    points: Array, blocks: Integers, soft: Any, most: int, close_out: Array, far_out: Array, at: Integers, out: Array,
+) -> None:  # fmt: skip
+    """Write the winding number (M,), and, where there is room, by how much each disc and node turns it."""
+    all_seen, inverse, turn = np.empty((8, most), np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
     area, depth = all_seen[6], all_seen[7]
-    for t in range(len(near)):
-        close, count = seen(near[t], start, own, leaf, all_seen)
-        for i in range(first[t], first[t + 1]):
+    kept, filled = len(at) > 1, 0
+    for b in range(len(blocks) - 1):
+        close, count = seen(own, node, start, first, near, begin, far, b, all_seen)
+        for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(close):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
@@ -90,44 +138,87 @@ def _winding(
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
                 inverse[j] = dx * dx + dy * dy + dz * dz
                 turn[j] = dx * mx[j] + dy * my[j] + dz * mz[j]
-            for j in range(count):
-                inverse[j] = ONE / math.sqrt(inverse[j])
             total = np.float32(0)
             for j in range(count):
-                total += turn[j] * (inverse[j] * inverse[j] * inverse[j])
-            out[i] = -total * FOUR_PI
+                inverse[j] = ONE / math.sqrt(inverse[j])
+            for j in range(count):
+                inverse[j] = -FOUR_PI * inverse[j] * inverse[j] * inverse[j]
+                total += turn[j] * inverse[j]
+            out[i] = total
+            if kept:
+                row = at[b, 0] + (i - blocks[b]) * close
+                for j in range(close):
+                    close_out[row + j] = turn[j] * inverse[j]
+                beyond = count - close
+                for j in range(beyond):
+                    far_out[filled + j] = (x - sx[close + j]) * inverse[close + j]
+                    far_out[filled + beyond + j] = (y - sy[close + j]) * inverse[close + j]
+                    far_out[filled + 2 * beyond + j] = (z - sz[close + j]) * inverse[close + j]
+                filled += 3 * beyond
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _adjoint(
-    own: Array,
-    leaf: Array,
-    start: Integers,
-    near: Array,
-    points: Array,
-    normal: Array,
-    depth: Array,
-    soft: Any,
-    out: Array,
-) -> None:
-    size = own.shape[1] + leaf.shape[1]
-    all_seen, inverse, turn = np.empty((4, size), np.float32), np.empty(size, np.float32), np.empty(size, np.float32)
-    sx, sy, sz, weight = all_seen[0], all_seen[1], all_seen[2], all_seen[3]
-    for t in range(len(near)):
-        count = seen(near[t], start, own, leaf, all_seen)[1]
-        for i in range(start[t], start[t + 1]):
-            x, y, z = points[0, i], points[1, i], points[2, i]
-            nx, ny, nz, set_back = normal[0, i], normal[1, i], normal[2, i], depth[i]
-            for j in range(count):
-                dx, dy, dz = sx[j] - x, sy[j] - y, sz[j] - z
-                height = dx * nx + dy * ny + dz * nz
-                square = height * height
-                back = abs(height) + set_back
-                inverse[j] = dx * dx + dy * dy + dz * dz - square + back * back
-                turn[j] = weight[j] * back * height / math.sqrt(square + soft)
-            for j in range(count):
-                inverse[j] = ONE / math.sqrt(inverse[j])
+def _apply(
+    near_turn: Array, far_field: Array, start: Integers, first: Integers, near: Integers, begin: Integers,
+    far: Integers, blocks: Integers, at: Integers, every: int, most: int, share: Array, dipole: Array, out: Array,
+) -> None:  # fmt: skip
+    ours, theirs = np.empty(most, np.float32), np.empty(3 * most, np.float32)
+    for b in range(0, len(blocks) - 1, every):
+        close, beyond, filled = 0, begin[b + 1] - begin[b], at[b, 1]
+        for m in range(first[b], first[b + 1]):
+            for i in range(start[near[m]], start[near[m] + 1]):
+                ours[close] = share[i]
+                close += 1
+        for row in range(3):
+            for m in range(beyond):
+                theirs[row * beyond + m] = dipole[row, far[begin[b] + m]]
+        for i in range(blocks[b], blocks[b + 1]):
+            row = at[b, 0] + (i - blocks[b]) * close
             total = np.float32(0)
-            for j in range(count):
-                total += turn[j] * (inverse[j] * inverse[j] * inverse[j])
-            out[i] = -total * FOUR_PI
+            for j in range(close):
+                total += near_turn[row + j] * ours[j]
+            for j in range(3 * beyond):
+                total += far_field[filled + j] * theirs[j]
+            filled += 3 * beyond
+            out[i] = total
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _transposed(
+    near_turn: Array, far_field: Array, start: Integers, first: Integers, near: Integers, begin: Integers,
+    far: Integers, blocks: Integers, at: Integers, most: int, weights: Array, normal: Array, area: Array, field: Array,
+    out: Array,
+) -> None:  # fmt: skip
+    ours, theirs = np.empty(most, np.float32), np.empty(3 * most, np.float32)
+    filled = 0
+    for b in range(len(blocks) - 1):
+        beyond = begin[b + 1] - begin[b]
+        size = blocks[b + 1] - blocks[b]
+        close = (at[b + 1, 0] - at[b, 0]) // max(size, 1)
+        ours[:close] = 0
+        theirs[: 3 * beyond] = 0
+        for i in range(blocks[b], blocks[b + 1]):
+            weight, row = weights[i], at[b, 0] + (i - blocks[b]) * close
+            for j in range(close):
+                ours[j] += weight * near_turn[row + j]
+            for j in range(3 * beyond):
+                theirs[j] += weight * far_field[filled + j]
+            filled += 3 * beyond
+        j = 0
+        for m in range(first[b], first[b + 1]):
+            for i in range(start[near[m]], start[near[m] + 1]):
+                out[i] += ours[j]
+                j += 1
+        for row in range(3):
+            for m in range(beyond):
+                field[row, far[begin[b] + m]] += theirs[row * beyond + m]
+    leaves = len(start) - 1
+    for k in range(2, 2 * leaves):
+        for row in range(3):
+            field[row, k] += field[row, k >> 1]
+    for k in range(leaves):
+        for i in range(start[k], start[k + 1]):
+            along = np.float32(0)
+            for row in range(3):
+                along += field[row, leaves + k] * normal[row, i]
+            out[i] += along * area[i]

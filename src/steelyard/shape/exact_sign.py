@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.borrowed import integer
 
 # Rounding of the double-double determinant, of the sum of its terms: 2^-98 holds its dozen roundings of 2^-102.
 _ROUNDING = 2.0**-98
@@ -94,7 +95,7 @@ def _exact_determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
         sides[1, k, 0], sides[1, k, 1] = _difference(xyz[c, k], xyz[a, k])
         sides[2, k, 0], sides[2, k, 1] = _difference(xyz[p, k], xyz[a, k])
     parts = np.empty(200)  # of the sum so far, by rising size, none overlapping: 6 x 8 products of 4 parts at most
-    used = 0
+    used = integer(0)
     for turn in range(6):
         i = turn % 3
         j, k = ((i + 1) % 3, (i + 2) % 3) if turn < 3 else ((i + 2) % 3, (i + 1) % 3)

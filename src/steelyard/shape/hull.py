@@ -21,6 +21,7 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.shape.borrowed import borrowed, integer
 from steelyard.shape.hull_faces import (
     FAR,
     FIRST,
@@ -58,7 +59,8 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
     Points flatter than the tolerance have volume 0, and all of them are kept. Numbers that are not finite, or whose
     product is not, are a fault.
     """
-    xyz, point, plane, face, stack, rim = work
+    xyz, point, plane = borrowed(work.xyz), borrowed(work.point), borrowed(work.plane)
+    face, stack, rim = borrowed(work.face), borrowed(work.stack), borrowed(work.rim)
     low_x = low_y = low_z = np.inf
     high_x = high_y = high_z = -np.inf
     nothing = 0.0
@@ -80,14 +82,15 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
         for k in range(count):
             point[k, KEPT] = rows[k]
         return 0.0, count
-    used, free = 4, 0
-    waiting = share_out(xyz, point, plane, face, stack, loose, 4, 0, used, noise)
+    # Whole numbers of one type, plain constants being another: else what they are passed to is compiled twice.
+    used, free, waiting = integer(4), integer(0), integer(0)
+    waiting = share_out(xyz, point, plane, face, stack, loose, used, waiting, used, noise)
     while waiting > 0:
         waiting -= 1
-        f = stack[waiting, QUEUE]
+        f = integer(stack[waiting, QUEUE])
         face[f, QUEUED] = 0
         if face[f, FIRST] >= 0:
-            p = face[f, FAR]
+            p = integer(face[f, FAR])
             faces, edges = look(xyz, plane, face, stack, rim, f, p, noise)
             loose, free = clear(point, face, stack, faces, p, free)
             used, free = cone(xyz, point, plane, face, stack, rim, p, edges, used, free, tolerance, noise)

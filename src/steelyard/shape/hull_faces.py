@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.borrowed import integer
 from steelyard.shape.exact_sign import determinant
 
 # Columns of the tables below.
@@ -60,7 +61,7 @@ def hull_work(points: int) -> HullWork:
     )
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _place(xyz: Array, plane: Array, face: Any, f: int, a: int, b: int, c: int, tolerance: float) -> None:
     """Make face f of three points, and its plane; no point lies above it yet."""
     face[f, 0], face[f, 1], face[f, 2] = a, b, c
@@ -76,7 +77,7 @@ def _place(xyz: Array, plane: Array, face: Any, f: int, a: int, b: int, c: int, 
     face[f, _STATE] = _HULL
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _sees(xyz: Array, plane: Array, face: Any, f: int, p: int, noise: float) -> bool:
     """Return whether point p lies strictly above face f."""
     height = plane[f, 0] * xyz[p, 0] + plane[f, 1] * xyz[p, 1] + plane[f, 2] * xyz[p, 2] - plane[f, _OFFSET]
@@ -85,7 +86,7 @@ def _sees(xyz: Array, plane: Array, face: Any, f: int, p: int, noise: float) -> 
     return bool(determinant(xyz, face[f, 0], face[f, 1], face[f, 2], p) > 0)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _simplex(xyz: Array, count: int, axis: int, tolerance: float, noise: float) -> tuple[int, int, int, int]:
     """Return four points far apart, the first three counter-clockwise seen from outside; -1 last where all are flat."""
     a = b = 0
@@ -114,7 +115,7 @@ def _simplex(xyz: Array, count: int, axis: int, tolerance: float, noise: float) 
     return (a, c, b, d) if height > 0 else (a, b, c, d)
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def start(
     xyz: Array, point: Any, plane: Array, face: Any, stack: Any, count: int, axis: int, tolerance: float, noise: float
 ) -> int:
@@ -122,10 +123,8 @@ def start(
     a, b, c, d = _simplex(xyz, count, axis, tolerance, noise)
     if d < 0:
         return -2
-    _place(xyz, plane, face, 0, a, b, c, tolerance)
-    _place(xyz, plane, face, 1, a, d, b, tolerance)
-    _place(xyz, plane, face, 2, b, d, c, tolerance)
-    _place(xyz, plane, face, 3, c, d, a, tolerance)
+    for f, u, v, w in ((0, a, b, c), (1, a, d, b), (2, b, d, c), (3, c, d, a)):
+        _place(xyz, plane, face, f, u, v, w, tolerance)
     face[0, 3], face[0, 4], face[0, 5] = 1, 2, 3
     face[1, 3], face[1, 4], face[1, 5] = 3, 2, 0
     face[2, 3], face[2, 4], face[2, 5] = 1, 3, 0
@@ -154,7 +153,7 @@ def _face_below(xyz: Array, plane: Array, face: Any, used: int, p: int, noise: f
     return -1, 0.0
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def share_out(
     xyz: Array, point: Any, plane: Array, face: Any, stack: Any,
     loose: int, fresh: int, waiting: int, used: int, noise: float,
@@ -193,7 +192,7 @@ def share_out(
     return waiting
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def look(
     xyz: Array, plane: Array, face: Any, stack: Any, rim: Any, start: int, p: int, noise: float
 ) -> tuple[int, int]:
@@ -221,7 +220,7 @@ def look(
     return faces, edges
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def clear(point: Any, face: Any, stack: Any, faces: int, p: int, free: int) -> tuple[int, int]:
     """Remove the seen faces; return the head of the list of points above them, all but p, and the free slots."""
     loose = -1
@@ -241,7 +240,7 @@ def clear(point: Any, face: Any, stack: Any, faces: int, p: int, free: int) -> t
     return loose, free
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def cone(
     xyz: Array, point: Any, plane: Array, face: Any, stack: Any, rim: Any, p: int, edges: int, used: int, free: int,
     tolerance: float, noise: float,
@@ -250,10 +249,10 @@ def cone(
     if edges > len(point):
         return -1, free
     for k in range(edges):
-        u, v, g = rim[k, 0], rim[k, 1], rim[k, 2]
+        u, v, g = integer(rim[k, 0]), integer(rim[k, 1]), rim[k, 2]
         if free > 0:
             free -= 1
-            f = stack[free, _FREE]
+            f = integer(stack[free, _FREE])
         else:
             f = used
             used += 1
@@ -277,7 +276,7 @@ def cone(
     return used, free
 
 
-@numba.njit(cache=True, nogil=True)
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def total(point: Any, plane: Array, face: Any, rows: Any, used: int) -> tuple[float, int]:
     """Return the volume inside the faces and the number of vertices; -1 where the faces are no sphere."""
     volume, faces, vertices = 0.0, 0, 0

@@ -17,7 +17,7 @@ from steelyard.shape.winding import Sight, Tree
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15
 _WIDEST, _NARROWEST = 2.0, 0.25  # width of the softened dipoles, first and last, in spacings
-_SAMPLED = 4  # one leaf in so many gives the length of a step
+_SAMPLED = 4  # one block of points in so many gives the length of a step
 SLOPE = 0.12  # of the line between neighbours on one sheet against its plane
 _SIGN_STEPS = 10
 _FREE = 4  # steps before signs are driven to plus or minus one
@@ -57,7 +57,7 @@ def orient(cloud: Cloud) -> Array:
 def oriented(cloud: Cloud) -> Oriented:
     """Return the surface elements of a cloud; normals that it carries are kept."""
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
-    near, tree = Neighbours.of(xyz), Tree.of(xyz)
+    near, tree = cloud.near.scaled(1 / cloud.diagonal), Tree.of(xyz)
     spacing = float(np.median(near.spacing))
     normals = cloud.normals
     if normals is None:
@@ -72,12 +72,13 @@ def consistent(sight: Sight, spacing: float) -> Array:
     Each step moves the dipoles toward a winding number of 1/2 at every point, then turns them against the gradient of
     that number, lengths kept; the softening narrows from step to step. Source: Lin, Shi, Liu 2024, algorithm 1.
     """
-    tree = sight.sources
+    tree, sampled = sight.sources, sight.targets.of_blocks(_SAMPLED)
     dipoles: Any = np.zeros((3, len(tree.order)), np.float32)
     found: Any = np.zeros(len(tree.order), np.float32)
     for width in spacing * np.linspace(_WIDEST, _NARROWEST, _STEPS):
         push = sight.adjoint(np.float32(0.5) - found, width)
-        dipoles = dipoles + _length(push, sight.winding(push, width, _SAMPLED)) * push
+        moved = sight.winding_and_gradient(push, width, _SAMPLED)[0]
+        dipoles = dipoles + _length(push, moved[sampled]) * push
         found, gradient = sight.winding_and_gradient(dipoles, width)
         dipoles = -np.linalg.norm(dipoles, axis=0) * _units(gradient)
     return np.asarray(tree.back(_units(dipoles)).T, np.float64)
@@ -90,13 +91,13 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, sight: Sight, spacing:
     toward a winding number of 1/2 at every point and spread along each sheet, in turn. Points on edges take their
     normal from the field of all.
     """
-    tree, order = sight.sources, sight.sources.order
+    tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
     plane, link = sheet_planes(xyz, near.index, SLOPE)
     sign = spread(np.sign((plane * first).sum(1)), near.index, link, _SWEEPS, _KEPT)
-    discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing)
+    discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing).response(sight)
     for step in range(_SIGN_STEPS):
-        push = discs.adjoint(sight, np.float32(0.5) - discs.winding(sight, sign[order]))
-        sign[order] += _length(push, discs.winding(sight, push, _SAMPLED)) * push
+        push = discs.adjoint(np.float32(0.5) - discs.winding(sign[order]))
+        sign[order] += _length(push, discs.winding(push, _SAMPLED)[sampled]) * push
         sign = spread(np.clip(sign, -1, 1), near.index, link, _SWEEPS, _KEPT)
         if step >= _FREE:
             sign = np.clip(2 * sign, -1, 1)

@@ -8,9 +8,8 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape import depth_images as images
 from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.scene import LEAST_VIEWS, Scene, surfels
+from steelyard.shape.scene import LEAST_VIEWS, Scene, settled, surfels
 from steelyard.shape.thinning import spread_to
 
 _STEPS = 3
@@ -47,7 +46,7 @@ def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
     order = np.argsort(-patches[:, 6], kind="stable")
     rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _MODEL, 2 * scene.pixel)
     xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
-    support = images.settled(*scene.images(), xyz, normal, window, scene.noise, 1)
+    support = settled(scene, xyz, normal, window, 1)
     good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
     return xyz[good], normal[good]
 
@@ -55,7 +54,7 @@ def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
 def _disagreement(scene: Scene, patches: Array) -> float:
     """Return the median spread of the views about the surface, in standard deviations of depth."""
     xyz, normal = _model(scene, patches, 0.005)
-    support = images.settled(*scene.images(), xyz, normal, 0.005, scene.noise, 1)
+    support = settled(scene, xyz, normal, 0.005, 1)
     good = support[:, 0] >= LEAST_VIEWS
     return float(np.median(support[good, 2])) / (0.7 * scene.sigma) if good.any() else np.inf
 
@@ -74,7 +73,7 @@ def moved(
     middle = xyz.mean(0)
     for k in range(len(R)):
         for _ in range(_STEPS):
-            H, g = _normal_equations(depth[k], unit, camera, R[k], p[k], xyz, normal, middle, window, noise)
+            H, g = _normal_equations(depth, unit, camera, R, p, k, xyz, normal, middle, window, noise)
             H[np.arange(6), np.arange(6)] += 1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2
             step = np.linalg.solve(H, -g)
             turn = _rotation(step[:3])
@@ -96,35 +95,35 @@ def _rotation(w: Any) -> Any:
 
 @numba.njit(cache=True, nogil=True)
 def _normal_equations(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
+    depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, xyz: Any, normal: Any, middle: Any, window: float,
     noise: float,
 ) -> Any:  # fmt: skip
     """Return the Hessian (6, 6) and gradient (6,) of half the squared distances, in standard deviations of depth."""
-    H, g, row, q = np.zeros((6, 6)), np.zeros(6), np.empty(6), np.empty(3)
+    H, g, row = np.zeros((6, 6)), np.zeros(6), np.empty(6)
     for i in range(len(xyz)):
-        n = normal[i]
-        to = xyz[i] - p
-        cosine = -(to * n).sum() / np.sqrt((to * to).sum())
+        nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
+        dx, dy, dz = xyz[i, 0] - p[k, 0], xyz[i, 1] - p[k, 1], xyz[i, 2] - p[k, 2]
+        cosine = -(dx * nx + dy * ny + dz * nz) / np.sqrt(dx * dx + dy * dy + dz * dz)
         if cosine < FACING:
             continue
-        z, u, v = pixel_of(camera, R, p, xyz[i, 0], xyz[i, 1], xyz[i, 2])
-        if u < 0 or v < 0 or u >= depth.shape[1] or v >= depth.shape[0]:
+        z, u, v = pixel_of(camera, R, p, k, xyz[i, 0], xyz[i, 1], xyz[i, 2])
+        if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
             continue
-        measured = depth[v, u] * unit
+        measured = depth[k, v, u] * unit
         if measured <= 0:
             continue
         a, b = measured * (u - camera[2]) / camera[0], measured * (v - camera[3]) / camera[1]
-        height = 0.0
-        for c in range(3):
-            q[c] = R[c, 0] * a + R[c, 1] * b + R[c, 2] * measured + p[c]
-            height += n[c] * (q[c] - xyz[i, c])
+        x = R[k, 0, 0] * a + R[k, 0, 1] * b + R[k, 0, 2] * measured + p[k, 0]
+        y = R[k, 1, 0] * a + R[k, 1, 1] * b + R[k, 1, 2] * measured + p[k, 1]
+        h = R[k, 2, 0] * a + R[k, 2, 1] * b + R[k, 2, 2] * measured + p[k, 2]
+        height = nx * (x - xyz[i, 0]) + ny * (y - xyz[i, 1]) + nz * (h - xyz[i, 2])
         if abs(height) > window:
             continue
         sigma = noise * z * z * cosine + 1e-4
         weight = 1 / sigma**2 * min(1.0, 2 * sigma / (abs(height) + 1e-12))
-        q -= middle
-        row[0], row[1], row[2] = q[1] * n[2] - q[2] * n[1], q[2] * n[0] - q[0] * n[2], q[0] * n[1] - q[1] * n[0]
-        row[3], row[4], row[5] = n[0], n[1], n[2]
+        x, y, h = x - middle[0], y - middle[1], h - middle[2]
+        row[0], row[1], row[2] = y * nz - h * ny, h * nx - x * nz, x * ny - y * nx
+        row[3], row[4], row[5] = nx, ny, nz
         for r in range(6):
             g[r] += weight * row[r] * height
             for c in range(6):

@@ -16,7 +16,7 @@ from steelyard.shape import depth_images as images
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.registration import agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, object_on_table, scene_of, surface_of, surfels
-from steelyard.shape.thinning import spread, spread_to
+from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.views import TablePlane, Views
 
@@ -118,7 +118,9 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
 
     def empty(points: Array) -> Any:
         at = back.apply(points)
-        past = images.seen_past(*scene.images(), np.ascontiguousarray(at), 0.0, scene.noise, LEAST_VIEWS)
+        order = in_cubes(at, 8 * scene.pixel)
+        past = np.empty(len(at), np.int64)
+        past[order] = images.seen_past(*scene.images(), at[order], 0.0, scene.noise, LEAST_VIEWS)
         return (past >= min(LEAST_VIEWS, len(scene.R))) | bottom.below(at)
 
     return empty

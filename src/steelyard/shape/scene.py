@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape.table_plane import find_table, table_frame
-from steelyard.shape.thinning import spread_to
+from steelyard.shape.thinning import in_cubes, spread_to
 from steelyard.shape.views import TablePlane, Views
 from steelyard.spatial import Pose
 
@@ -25,6 +25,7 @@ _REACH = 0.6  # of the camera's distance: how far from where the cameras look th
 _SEEDS = 4  # points that are settled, for each that stays
 _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the object is sought
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
+_CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
 _MARGIN = 0.008  # of table kept around the object [m]
 
 
@@ -142,12 +143,21 @@ def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
     return np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
 
 
+def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int) -> Array:
+    """Move points (N, 3) along their normals to what the views measure; return support (N, 3), see `images.settled`."""
+    order = in_cubes(xyz, _CUBE * scene.pixel)
+    moved, support = xyz[order], np.empty((len(xyz), 3))
+    support[order] = images.settled(*scene.images(), moved, normal[order], window, scene.noise, rounds)
+    xyz[order] = moved
+    return support
+
+
 def surface_of(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float, points: int) -> tuple[Array, Array]:
     """Return points (N, 3) of the object's surface and normals, settled among the views."""
     order = np.argsort(-patches[:, 6], kind="stable")
     rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _SEEDS * points, scene.pixel)
     xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
-    support = images.settled(*scene.images(), xyz, normal, WINDOW, scene.noise, 2)
+    support = settled(scene, xyz, normal, WINDOW, 2)
     least = min(LEAST_VIEWS, len(scene.R))
     good = (support[:, 0] >= least) & (support[:, 1] <= 0.5 * support[:, 0])
     table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)

@@ -30,6 +30,10 @@ class Neighbours:
         distance, index = cKDTree(xyz).query(xyz, min(count + 1, len(xyz)))
         return cls(index[:, 1:], distance[:, 1:])
 
+    def scaled(self, factor: float) -> Neighbours:
+        """Return the same neighbours with lengths `factor` times as large."""
+        return Neighbours(self.index, factor * self.distance)
+
     @property
     def spacing(self) -> Array:
         """Side (N,) of the square of surface per point, were all close neighbours on one flat sheet."""

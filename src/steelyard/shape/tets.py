@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
+import numba
 import numpy as np
 
 from steelyard import check
@@ -13,7 +14,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.shape.mesh import Integers
-from steelyard.spatial import Pose, Rotation, cross
+from steelyard.spatial import Pose, Rotation
 
 # The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
@@ -26,10 +27,12 @@ class TetMesh:
 
     vertices  (V, 3) [m]
     tets      (T, 4) numbers of the corners; a cell given with negative orientation has two of them exchanged
+    volumes   (T,) of each cell [m^3]
     """
 
     vertices: Array
     tets: Integers
+    volumes: Array = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         vertices = check.vectors("vertices", self.vertices)
@@ -38,19 +41,21 @@ class TetMesh:
             raise BadValue(f"a solid needs vertices (V, 3) and tets (T, 4), T > 0; got {vertices.shape}, {tets.shape}.")
         if tets.min() < 0 or tets.max() >= len(vertices):
             raise BadValue(f"tets must name vertices 0..{len(vertices) - 1}; got {tets.min()}..{tets.max()}.")
-        turned = _volumes(vertices, tets) < 0
-        tets[turned] = tets[turned][:, [0, 1, 3, 2]]
+        volumes = _turned(vertices, tets)
         tets.flags.writeable = False
         object.__setattr__(self, "vertices", vertices)
         object.__setattr__(self, "tets", tets)
+        object.__setattr__(self, "volumes", volumes)
+
+    @classmethod
+    def known(cls, vertices: Array, tets: Integers, volumes: Array, neighbours: Integers) -> TetMesh:
+        """Return cells of positive `volumes` (T,) whose `neighbours` (T, 4) are known; nothing is looked at again."""
+        mesh = cls.__new__(cls)
+        mesh.__dict__.update(vertices=vertices, tets=tets, volumes=volumes, neighbours=neighbours)
+        return mesh
 
     def __len__(self) -> int:
         return len(self.tets)
-
-    @cached_property
-    def volumes(self) -> Array:
-        """Volume (T,) of each cell [m^3]."""
-        return _volumes(self.vertices, self.tets)
 
     @property
     def volume(self) -> float:
@@ -114,13 +119,30 @@ class TetMesh:
 
     def chosen(self, cells: Any) -> TetMesh:
         """Return some of the cells over the same vertices, numbers or a mask."""
-        return TetMesh(self.vertices, self.tets[cells])
+        tets = self.tets[cells]
+        if "neighbours" not in self.__dict__ or not len(tets):
+            return TetMesh(self.vertices, tets)
+        number = np.full(len(self) + 1, -1)  # the last stands for what lies outside
+        number[:-1][cells] = np.arange(len(tets))
+        return TetMesh.known(self.vertices, tets, self.volumes[cells], number[self.neighbours[cells]])
 
     def in_frame(self, X_AB: Pose) -> TetMesh:
         """Return the same solid, given in B, seen from frame A."""
         return TetMesh(X_AB.apply(self.vertices), self.tets)
 
 
-def _volumes(vertices: Array, tets: Integers) -> Array:
-    a, b, c, d = np.moveaxis(vertices[tets], 1, 0)
-    return np.asarray((cross(b - a, c - a) * (d - a)).sum(-1) / 6)
+@numba.njit(cache=True, nogil=True)
+def _turned(vertices: Array, tets: Integers) -> Array:
+    """Return the volume (T,) of every cell; of one that is negative two corners are exchanged."""
+    out = np.empty(len(tets))
+    for t in range(len(tets)):
+        a, b, c, d = tets[t]
+        ax, ay, az = vertices[a, 0], vertices[a, 1], vertices[a, 2]
+        ux, uy, uz = vertices[b, 0] - ax, vertices[b, 1] - ay, vertices[b, 2] - az
+        vx, vy, vz = vertices[c, 0] - ax, vertices[c, 1] - ay, vertices[c, 2] - az
+        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
+        six = x * (vertices[d, 0] - ax) + y * (vertices[d, 1] - ay) + z * (vertices[d, 2] - az)
+        out[t] = abs(six) / 6
+        if six < 0:
+            tets[t, 2], tets[t, 3] = d, c
+    return out

@@ -35,6 +35,17 @@ def spread_to(xyz: Array, normal: Array, order: Integers, count: int, least: flo
     return kept, radius
 
 
+def in_cubes(xyz: Array, edge: float) -> Integers:
+    """Return an order of points (N, 3) in which those of one cube follow one another, and cubes of one column.
+
+    Passes over images read the same pixels for points that lie close: many images together are far larger than the
+    processor's cache.
+    """
+    cell = np.floor((xyz - xyz.min(0)) / edge).astype(np.int64)
+    size = cell.max(0) + 1
+    return np.argsort((cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2], kind="stable")
+
+
 @numba.njit(cache=True, nogil=True)
 def _taken(xyz: Any, normal: Any, order: Any, radius: float, key: Any) -> Any:
     bits = 1

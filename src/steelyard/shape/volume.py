@@ -3,13 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
+from steelyard.shape.cells import cells
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
 from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented
@@ -19,7 +19,6 @@ from steelyard.shape.winding import Sight, Tree
 
 POINTS = 4000
 _NUDGE = 1e-7  # of the diagonal
-_FLAT = 1e-4  # volume of a cell, over that of a box of its edges, below which it is a flat leftover
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
 _BLURRED = 0.36  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
@@ -63,22 +62,23 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
     used, findings = working_cloud(cloud, points)
     surface, turned = _oriented(used)
-    tets, found, votes = _complex(surface)
+    mesh, centres, votes = complex_of(used.xyz, surface)
+    found = _winding_number(surface, centres)
     score = found - 0.5 + votes
     if not (score > 0).any():
         raise BadValue(
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
-    against = _against(surface, tets[score > 0])
+    solid = mesh.chosen(score > 0)
+    against = _against(surface, solid)
     if used.normals is not None and against > _TURNED:
         text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
         again = enclose(replace(used, normals=None), points)
         return replace(again, findings=(*findings, Finding.of("normals-flipped", text), *again.findings))
-    mesh = TetMesh(used.xyz, tets)
     doubt = _doubt(mesh.volumes, found, votes)
     if doubt > _CLEAR:
         doubt += stacked(surface.xyz, surface.normals, surface.near.index, SLOPE)
-    return _solid(used, surface, mesh, score, doubt, (*findings, *turned))
+    return _solid(used, surface, solid, score[score > 0], doubt, (*findings, *turned))
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
@@ -103,30 +103,27 @@ def _directions(count: int) -> Array:
     return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
 
 
-def _complex(surface: Oriented) -> tuple[Any, Array, Array]:
-    """Return the Delaunay cells (T, 4) of the points, winding numbers (T,) in them, and their corners' votes (T,)."""
+def complex_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
+    """Return the Delaunay cells of points (N, 3) [m], their centroids (T, 3) in units of the surface, and votes (T,).
+
+    A vote is how much the normals (-1..1) of its corners say that a cell lies inside.
+    """
     from scipy.spatial import Delaunay
 
     # Qhull spends most of its time on points in one plane: they are moved by less than any measurement notices.
-    xyz = surface.xyz
-    moved = xyz + _NUDGE * np.random.default_rng(0).uniform(-1, 1, xyz.shape)
-    tets = Delaunay(moved).simplices.astype(np.int64)
-    a, b, c, d = np.moveaxis(xyz[tets], 1, 0)
-    u, v, w = b - a, c - a, d - a
-    six = np.abs((np.cross(u, v) * w).sum(1))
-    tets = tets[six > _FLAT * np.sqrt((u**2).sum(1) * (v**2).sum(1) * (w**2).sum(1))]
-    centres = xyz[tets].mean(1)
+    moved = surface.xyz + _NUDGE * np.random.default_rng(0).uniform(-1, 1, surface.xyz.shape)
+    made = Delaunay(moved)
+    tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.neighbors)
+    unit = (np.ptp(xyz, axis=0) ** 2).sum() ** 1.5
+    return TetMesh.known(xyz, tets, volumes * unit, neighbours), centres, votes
+
+
+def _winding_number(surface: Oriented, centres: Array) -> Array:
+    """Return the winding number (T,) of the surface at centroids of cells."""
     targets = Tree.of(centres)
     discs = Discs.on(surface.tree, surface.normals, surface.area, DEPTH, _JUMP * surface.spacing)
     found = targets.back(discs.winding(Sight.of(targets, surface.tree)))
-    return tets, np.clip(found, 0, 2).astype(float), _votes(surface, tets, centres)
-
-
-def _votes(surface: Oriented, tets: Any, centres: Array) -> Array:
-    """Return how much the normals (-1..1) of the corners of cells (T,) say that they lie inside."""
-    away = centres[:, None] - surface.xyz[tets]
-    cosine = np.einsum("tkd,tkd->tk", away, surface.normals[tets]) / np.linalg.norm(away, axis=2)
-    return np.asarray(-cosine.mean(1))
+    return np.asarray(np.clip(found, 0, 2), float)
 
 
 def _doubt(volumes: Array, found: Array, votes: Array) -> float:
@@ -138,9 +135,9 @@ def _doubt(volumes: Array, found: Array, votes: Array) -> float:
     return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
 
 
-def _against(surface: Oriented, inside: Any) -> float:
+def _against(surface: Oriented, solid: TetMesh) -> float:
     """Return the share of the points whose normals disagree with the surface of the cells inside."""
-    skin = TetMesh(surface.xyz, inside).surface
+    skin = solid.surface
     corners = surface.xyz[skin]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
     out = np.stack([np.bincount(skin.ravel(), np.repeat(across[:, k], 3), len(surface.xyz)) for k in range(3)], 1)
@@ -148,10 +145,9 @@ def _against(surface: Oriented, inside: Any) -> float:
 
 
 def _solid(
-    cloud: Cloud, surface: Oriented, mesh: TetMesh, score: Array, doubt: float, findings: tuple[Finding, ...]
+    cloud: Cloud, surface: Oriented, solid: TetMesh, score: Array, doubt: float, findings: tuple[Finding, ...]
 ) -> Solid:
-    inside = score > 0
-    solid, sure = mesh.chosen(inside), np.minimum(2 * score[inside], 1.0)
+    sure = np.minimum(2 * score, 1.0)
     total = float(surface.area.sum())
     gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
     thin, hole = doubt > _BLURRED, gap > _OPEN

@@ -1,7 +1,7 @@
-"""Winding numbers of clouds: sums over oriented elements, those far away taken leaf by leaf of a kd tree.
+"""Winding numbers of clouds: sums over oriented elements, those far away taken node by node of a kd tree.
 
 An element of area a and outward normal n turns the winding number of a point by its solid angle over 4 pi: 1 inside
-the solid in all, 0 outside. Near elements are summed one by one; a leaf of the tree seen from
+the solid in all, 0 outside. Near elements are summed one by one; a node of the tree seen from
 afar counts as one dipole at its centre. All sums are in single precision; lengths are in units of the
 cloud's size.
 """
@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numba
@@ -19,20 +20,20 @@ from steelyard.shape.mesh import Integers
 
 Array = Any  # single precision here, double at the border
 
-_LEAF = 16  # most points of a leaf
-_FAR = 2.5  # a leaf is far beyond this many of its radii: its points then err by about (1 / 2.5)^2 / 6 of a small sum
+_LEAF = 8  # most points of a leaf
+_FAR = 3.5  # a node is far beyond this many of its radii: its points then err by about (1 / 2.5)^2 / 6 of a small sum
 FOUR_PI = np.float32(1 / (4 * math.pi))
 ONE, THREE = np.float32(1), np.float32(3)
 
 
 @dataclass(frozen=True, eq=False)
 class Tree:
-    """Points in the order of the leaves of a kd tree.
+    """Points in the order of the leaves of a kd tree; of 2 L nodes, 1 is the root, k has 2 k and 2 k + 1 under it.
 
     order   (N,) row of the given points that each ordered point is
-    start   (L + 1,) first ordered point of each leaf
+    start   (L + 1,) first ordered point of each leaf; leaf i is node L + i
     points  (3, N) float32, ordered
-    centre  (L, 3) and radius (L,) of the leaves
+    centre  (3, 2 L) float32 and radius (2 L,) of the nodes
     """
 
     order: Integers
@@ -44,10 +45,11 @@ class Tree:
     @classmethod
     def of(cls, xyz: Array) -> Tree:
         """Return the tree of points (N, 3)."""
-        order, start = _ordered(np.ascontiguousarray(xyz), _LEAF)
-        ordered = xyz[order]
-        centre, radius = _leaves(ordered, start)
-        return cls(order, start, _single(ordered.T), centre, radius)
+        xyz = np.ascontiguousarray(xyz, np.float64)
+        order, start = _ordered(xyz, _LEAF)
+        points = single(xyz[order].T)
+        centre, radius = _nodes(points, start)
+        return cls(order, start, points, centre, radius)
 
     def back(self, values: Array) -> Array:
         """Return values (..., N) of the ordered points as those of the given ones."""
@@ -55,71 +57,85 @@ class Tree:
         out[..., self.order] = values
         return out
 
+    @cached_property
+    def blocks(self) -> Integers:
+        """First ordered point (B + 1,) of each pair of leaves: points so near one another see alike."""
+        return np.ascontiguousarray(self.start[::2]) if len(self.start) > 2 else self.start
+
+    def of_blocks(self, every: int) -> Integers:
+        """Return the numbers of the ordered points of every `every`-th block."""
+        block = np.repeat(np.arange(len(self.blocks) - 1), np.diff(self.blocks))
+        return np.flatnonzero(block % every == 0)
+
 
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """How the leaves of a tree of targets see the leaves of a tree of sources: near (T, L) or far."""
+    """How blocks of the points of one tree see the nodes of another.
+
+    targets, sources  the trees
+    near  numbers of the leaves whose points block b sees one by one: near[1][near[0][b]:near[0][b + 1]]
+    far   the same of the nodes that it sees as one
+    """
 
     targets: Tree
     sources: Tree
-    near: Array
+    near: tuple[Integers, Integers]
+    far: tuple[Integers, Integers]
 
     @classmethod
     def of(cls, targets: Tree, sources: Tree) -> Sight:
         """Return which leaves must be summed point by point."""
-        return cls(targets, sources, _near(targets.centre, targets.radius, sources.centre, sources.radius))
-
-    def winding(self, dipoles: Array, width: float, every: int = 1) -> Array:
-        """Return the winding number (M,) at every `every`-th leaf of targets of ordered dipoles (3, N), softened."""
-        leaves, start, points = self.chosen(every)
-        out = np.empty(points.shape[1], np.float32)
-        own, leaf = with_leaves(self.sources, dipoles)
-        _winding(own, leaf, self.sources.start, self.near[leaves], points, start, np.float32(width**2), out)
-        return out
-
-    def winding_and_gradient(self, dipoles: Array, width: float) -> tuple[Array, Array]:
-        """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened."""
-        points = self.targets.points
-        out, gradient = np.empty(points.shape[1], np.float32), np.empty(points.shape, np.float32)
-        own, leaf = with_leaves(self.sources, dipoles)
-        _gradient(
-            own, leaf, self.sources.start, self.near, points, self.targets.start, np.float32(width**2), out, gradient
+        first, near, begin, far = _seen_by(
+            targets.centre, targets.radius, len(targets.blocks) - 1, sources.centre, sources.radius
         )
+        return cls(targets, sources, (first, near), (begin, far))
+
+    @cached_property
+    def most(self) -> int:
+        """The most points and nodes that any block sees."""
+        return int(np.diff(self.near[0]).max()) * _LEAF + int(np.diff(self.far[0]).max())
+
+    def winding_and_gradient(self, dipoles: Array, width: float, every: int = 1) -> tuple[Array, Array]:
+        """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened.
+
+        Only every `every`-th block of targets is looked at, the others have 0.
+        """
+        points = self.targets.points
+        out, gradient = np.zeros(points.shape[1], np.float32), np.zeros(points.shape, np.float32)
+        seen_here = *self.elements(dipoles), points, self.targets.blocks, every, np.float32(width**2), self.most
+        _gradient(*seen_here, out, gradient)
         return out, gradient
 
     def adjoint(self, weights: Array, width: float) -> Array:
         """Return the sum (3, M) over sources of weight times how a dipole at the target turns the source's number."""
         points = self.targets.points
         out = np.empty(points.shape, np.float32)
-        own, leaf = with_leaves(self.sources, weights[None])
-        _adjoint(own, leaf, self.sources.start, self.near, points, self.targets.start, np.float32(width**2), out)
+        seen_here = *self.elements(weights[None]), points, self.targets.blocks, np.float32(width**2), self.most
+        _adjoint(*seen_here, out)
         return out
 
-    def chosen(self, every: int) -> tuple[Integers, Integers, Array]:
-        """Return numbers, starts and points of every `every`-th leaf of targets."""
-        tree = self.targets
-        if every == 1:
-            return np.arange(len(tree.centre)), tree.start, tree.points
-        leaves = np.arange(0, len(tree.centre), every)
-        sizes = np.diff(tree.start)[leaves]
-        rows = np.concatenate([np.arange(tree.start[k], tree.start[k + 1]) for k in leaves.tolist()])
-        return leaves, np.concatenate([[0], np.cumsum(sizes)]), np.ascontiguousarray(tree.points[:, rows])
+    def elements(self, values: Array, counted: Array | None = None) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
+        """Return points with values (3 + K, N), nodes with theirs, starts of the leaves, and what each block sees.
+
+        counted  what a node has the sums of, the values where it is None
+        """
+        tree = self.sources
+        values = single(values)
+        own = np.concatenate([tree.points, values])
+        node = np.concatenate([tree.centre, sums(values if counted is None else single(counted), tree.start)])
+        return own, node, tree.start, *self.near, *self.far
 
 
-def _single(values: Array) -> Array:
+def single(values: Any) -> Array:
+    """Return contiguous values in single precision."""
     return np.ascontiguousarray(values, np.float32)
-
-
-def with_leaves(tree: Tree, values: Array) -> tuple[Array, Array]:
-    """Return positions and values of the points (3 + K, N), and of the leaves, whose values are sums."""
-    sums = np.add.reduceat(values, tree.start[:-1], axis=1, dtype=np.float32)
-    return np.concatenate([tree.points, _single(values)]), np.concatenate([_single(tree.centre.T), sums])
 
 
 @numba.njit(cache=True, nogil=True)
 def _ordered(xyz: Array, most: int) -> tuple[Integers, Integers]:
     """Return points in leaf order and the first of each leaf: boxes halved by count across their longest side."""
     order = np.arange(len(xyz))
+    key = np.empty(len(xyz))
     levels = 0
     while len(xyz) > most << levels:
         levels += 1
@@ -127,100 +143,152 @@ def _ordered(xyz: Array, most: int) -> tuple[Integers, Integers]:
     for level in range(levels):
         step = 1 << (levels - level)
         for first in range(0, 1 << levels, step):
-            a, b = start[first], start[first + step]
-            rows = order[a:b].copy()
-            low, high = xyz[rows[0]].copy(), xyz[rows[0]].copy()
-            for i in rows:
-                for k in range(3):
-                    low[k], high[k] = min(low[k], xyz[i, k]), max(high[k], xyz[i, k])
-            order[a:b] = rows[np.argsort(xyz[rows, np.argmax(high - low)])]
+            a, b, middle = start[first], start[first + step], start[first + step // 2]
+            axis, longest = 0, -1.0
+            for k in range(3):
+                low = high = xyz[order[a], k]
+                for i in range(a + 1, b):
+                    low, high = min(low, xyz[order[i], k]), max(high, xyz[order[i], k])
+                if high - low > longest:
+                    axis, longest = k, high - low
+            for i in range(a, b):
+                key[i] = xyz[order[i], axis]
+            _halved(key, order, a, b - 1, middle)
     return order, start
 
 
 @numba.njit(cache=True, nogil=True)
-def _leaves(xyz: Array, start: Integers) -> tuple[Array, Array]:
-    centre, radius = np.zeros((len(start) - 1, 3)), np.zeros(len(start) - 1)
-    for k in range(len(radius)):
-        for i in range(start[k], start[k + 1]):
-            centre[k] += xyz[i] / (start[k + 1] - start[k])
-        for i in range(start[k], start[k + 1]):
-            radius[k] = max(radius[k], np.sqrt(((xyz[i] - centre[k]) ** 2).sum()))
+def _halved(key: Array, order: Integers, a: int, b: int, middle: int) -> None:
+    """Exchange the rows a..b until none before `middle` has a larger key than one from there on.
+
+    Source: Hoare 1961, algorithm 65, FIND.
+    """
+    while a < b:
+        pivot = key[(a + b) >> 1]
+        i, j = a, b
+        while i <= j:
+            while key[i] < pivot:
+                i += 1
+            while pivot < key[j]:
+                j -= 1
+            if i <= j:
+                key[i], key[j] = key[j], key[i]
+                order[i], order[j] = order[j], order[i]
+                i += 1
+                j -= 1
+        if middle <= j:
+            b = j
+        elif middle >= i:
+            a = i
+        else:
+            return
+
+
+@numba.njit(cache=True, nogil=True)
+def _nodes(points: Array, start: Integers) -> tuple[Array, Array]:
+    """Return centres (3, 2 L) and radii (2 L,) of nodes over ordered points (3, N); node 0 means nothing."""
+    leaves = len(start) - 1
+    centre, radius = np.zeros((3, 2 * leaves), np.float32), np.zeros(2 * leaves, np.float32)
+    step, first = leaves, 1
+    while step > 0:
+        for k in range(first):
+            a, b = start[k * step], start[(k + 1) * step]
+            x, y, z = 0.0, 0.0, 0.0
+            for i in range(a, b):
+                x, y, z = x + points[0, i], y + points[1, i], z + points[2, i]
+            x, y, z = x / (b - a), y / (b - a), z / (b - a)
+            most = 0.0
+            for i in range(a, b):
+                most = max(most, (points[0, i] - x) ** 2 + (points[1, i] - y) ** 2 + (points[2, i] - z) ** 2)
+            centre[0, first + k], centre[1, first + k], centre[2, first + k] = x, y, z
+            radius[first + k] = math.sqrt(most)
+        step //= 2
+        first *= 2
     return centre, radius
 
 
 @numba.njit(cache=True, nogil=True)
-def _near(centre: Array, radius: Array, source: Array, size: Array) -> Array:
-    out = np.empty((len(centre), len(source)), np.bool_)
-    for t in range(len(centre)):
-        for k in range(len(source)):
-            away = (centre[t, 0] - source[k, 0]) ** 2 + (centre[t, 1] - source[k, 1]) ** 2
-            away = math.sqrt(away + (centre[t, 2] - source[k, 2]) ** 2)
-            out[t, k] = away - radius[t] < _FAR * size[k]
+def sums(values: Array, start: Integers) -> Array:
+    """Return the sums (K, 2 L) of values (K, N) of ordered points over the points of every node."""
+    leaves = len(start) - 1
+    out = np.zeros((len(values), 2 * leaves), np.float32)
+    for row in range(len(values)):
+        for k in range(leaves):
+            total = np.float32(0)
+            for i in range(start[k], start[k + 1]):
+                total += values[row, i]
+            out[row, leaves + k] = total
+        for k in range(leaves - 1, 0, -1):
+            out[row, k] = out[row, 2 * k] + out[row, 2 * k + 1]
     return out
 
 
 @numba.njit(cache=True, nogil=True)
-def seen(near: Array, start: Integers, own: Array, leaf: Array, out: Array) -> tuple[int, int]:
-    """Write what one leaf of targets sees into out, near points first; return their number and that of all."""
-    count = 0
-    for k in range(len(near)):
-        if near[k]:
-            for row in range(len(own)):
-                for i in range(start[k], start[k + 1]):
-                    out[row, count + i - start[k]] = own[row, i]
-            count += start[k + 1] - start[k]
-    close = count
-    for k in range(len(near)):
-        if not near[k]:
-            for row in range(len(leaf)):
-                out[row, count] = leaf[row, k]
-            count += 1
+def _seen_by(
+    centre: Array, radius: Array, blocks: int, source: Array, size: Array
+) -> tuple[Integers, Integers, Integers, Integers]:
+    """Return starts and numbers of the leaves that every block sees point by point, and of the nodes it sees as one."""
+    leaves = len(size) // 2
+    first, begin = np.zeros(blocks + 1, np.int64), np.zeros(blocks + 1, np.int64)
+    near, far = np.empty(64 * blocks, np.int64), np.empty(64 * blocks, np.int64)
+    stack = np.empty(128, np.int64)
+    close, away = 0, 0
+    for b in range(blocks):
+        t = blocks + b
+        if close + leaves > len(near):
+            near = np.concatenate((near, np.empty(len(near) + leaves, np.int64)))
+        if away + leaves > len(far):
+            far = np.concatenate((far, np.empty(len(far) + leaves, np.int64)))
+        waiting = 1
+        stack[0] = 1
+        while waiting > 0:
+            waiting -= 1
+            k = stack[waiting]
+            gap = (centre[0, t] - source[0, k]) ** 2 + (centre[1, t] - source[1, k]) ** 2
+            gap = math.sqrt(gap + (centre[2, t] - source[2, k]) ** 2)
+            if gap - radius[t] >= _FAR * size[k]:
+                far[away] = k
+                away += 1
+            elif k >= leaves:
+                near[close] = k - leaves
+                close += 1
+            else:
+                stack[waiting], stack[waiting + 1] = 2 * k + 1, 2 * k
+                waiting += 2
+        first[b + 1], begin[b + 1] = close, away
+    return first, near[:close].copy(), begin, far[:away].copy()
+
+
+@numba.njit(cache=True, nogil=True)
+def seen(
+    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers, b: int,
+    out: Array,
+) -> tuple[int, int]:  # fmt: skip
+    """Write what block b of targets sees into out, near points first; return their number and that of all."""
+    close = 0
+    for m in range(first[b], first[b + 1]):
+        a, size = start[near[m]], start[near[m] + 1] - start[near[m]]
+        for row in range(len(own)):
+            for i in range(size):
+                out[row, close + i] = own[row, a + i]
+        close += size
+    count = close + begin[b + 1] - begin[b]
+    for row in range(len(node)):
+        for m in range(count - close):
+            out[row, close + m] = node[row, far[begin[b] + m]]
     return close, count
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _winding(
-    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: Any, out: Array
-) -> None:
-    all_seen, inverse = (
-        np.empty((6, own.shape[1] + leaf.shape[1]), np.float32),
-        np.empty(len(own.T) + len(leaf.T), np.float32),
-    )
-    for t in range(len(near)):
-        count = seen(near[t], start, own, leaf, all_seen)[1]
-        sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
-        for i in range(first[t], first[t + 1]):
-            x, y, z = points[0, i], points[1, i], points[2, i]
-            for j in range(count):
-                dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
-                inverse[j] = ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
-            total = np.float32(0)
-            for j in range(count):
-                along = (x - sx[j]) * mx[j] + (y - sy[j]) * my[j] + (z - sz[j]) * mz[j]
-                total += along * (inverse[j] * inverse[j] * inverse[j])
-            out[i] = -total * FOUR_PI
-
-
-@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _gradient(
-    own: Array,
-    leaf: Array,
-    start: Integers,
-    near: Array,
-    points: Array,
-    first: Integers,
-    soft: Any,
-    out: Array,
-    gradient: Array,
-) -> None:
-    all_seen, inverse = (
-        np.empty((6, own.shape[1] + leaf.shape[1]), np.float32),
-        np.empty(len(own.T) + len(leaf.T), np.float32),
-    )
-    for t in range(len(near)):
-        count = seen(near[t], start, own, leaf, all_seen)[1]
-        sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
-        for i in range(first[t], first[t + 1]):
+    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    points: Array, blocks: Integers, every: int, soft: Any, most: int, out: Array, gradient: Array,
+) -> None:  # fmt: skip
+    all_seen, inverse = np.empty((6, most), np.float32), np.empty(most, np.float32)
+    sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
+    for b in range(0, len(blocks) - 1, every):
+        count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
+        for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
@@ -242,16 +310,14 @@ def _gradient(
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _adjoint(
-    own: Array, leaf: Array, start: Integers, near: Array, points: Array, first: Integers, soft: Any, out: Array
-) -> None:
-    all_seen, inverse = (
-        np.empty((4, own.shape[1] + leaf.shape[1]), np.float32),
-        np.empty(len(own.T) + len(leaf.T), np.float32),
-    )
-    for t in range(len(near)):
-        count = seen(near[t], start, own, leaf, all_seen)[1]
-        sx, sy, sz, weight = all_seen[0], all_seen[1], all_seen[2], all_seen[3]
-        for i in range(first[t], first[t + 1]):
+    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    points: Array, blocks: Integers, soft: Any, most: int, out: Array,
+) -> None:  # fmt: skip
+    all_seen, inverse = np.empty((4, most), np.float32), np.empty(most, np.float32)
+    sx, sy, sz, weight = all_seen[0], all_seen[1], all_seen[2], all_seen[3]
+    for b in range(len(blocks) - 1):
+        count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
+        for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
                 dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]

@@ -9,6 +9,7 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
+from steelyard.shape.spacing import Neighbours
 
 LEAST = 20  # points that can show a solid
 _TOO_LONG_M = 5.0  # no object that an arm holds is longer
@@ -69,7 +70,7 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     """Return the largest of the pieces that lie far apart."""
     if len(cloud) < LEAST:
         return cloud, []
-    piece, spacing = _pieces(cloud.xyz)
+    piece, spacing = _pieces(cloud.near)
     sizes = np.bincount(piece)
     large = np.flatnonzero(sizes >= max(_PIECE * len(cloud), LEAST))
     if len(sizes) == 1 or not len(large):
@@ -84,18 +85,16 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     return cloud.chosen(piece == main), [Finding.of("several-objects", text)]
 
 
-def _pieces(xyz: Array) -> tuple[Integers, float]:
+def _pieces(near: Neighbours) -> tuple[Integers, float]:
     """Return the piece (N,) of each point, joined where nearest neighbours are not far apart, and the spacing [m]."""
-    from scipy.sparse import coo_matrix
+    from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
-    from scipy.spatial import cKDTree
 
-    k = min(_LINKS, len(xyz) - 1)
-    distance, index = cKDTree(xyz).query(xyz, k + 1)
-    spacing = float(np.median(distance[:, -1])) * float(np.sqrt(np.pi / k))
-    close = distance[:, 1:] < _APART * spacing
-    rows = np.repeat(np.arange(len(xyz)), k)[close.ravel()]
-    graph = coo_matrix((np.ones(len(rows)), (rows, index[:, 1:][close])), (len(xyz), len(xyz)))
+    count, k = len(near.index), min(_LINKS, near.index.shape[1])
+    spacing = float(np.median(near.distance[:, k - 1])) * float(np.sqrt(np.pi / k))
+    close = near.distance[:, :k] < _APART * spacing
+    start = np.concatenate([[0], np.cumsum(close.sum(1))])
+    graph = csr_matrix((np.ones(start[-1]), near.index[:, :k][close], start), (count, count))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64), spacing
 
 
