@@ -57,7 +57,7 @@ class JointTeam:
         else:
             standing = PoseTeam.of(log, self.clocks)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
-            late, order = standing.late, 2
+            late, order = _against(standing.late, log.reference), 2
             found = [*standing.findings, *(rigidity_findings(standing.parts, log.names) if standing.rough else [])]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
@@ -87,6 +87,11 @@ def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEsti
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
     return replace(team, parameters=team.parameters - points)
+
+
+def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:
+    """Return how late every clock is against the reference's."""
+    return {name: seconds - late[reference] for name, seconds in late.items()}
 
 
 def needs_twists(log: TeamLog) -> bool:

@@ -55,9 +55,11 @@ class Stretch:
 def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     """Return every recording with its clocks put right by `late` [s], seconds that each robot's stamps are late.
 
-    Raises BadValue where the corrected clocks no longer overlap.
+    Rows are told by the reference's clock as it is, whatever `late` says of it. Raises BadValue where the corrected clocks no longer overlap.
     """
-    return tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+    made = tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+    own = late.get(log.reference, 0.0)
+    return tuple(replace(part, time=part.time + own) for part in made) if own else made
 
 
 def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
