@@ -15,6 +15,7 @@ from steelyard.spatial import cross_matrix
 from steelyard.team.body_rows import BodyRows
 from steelyard.team.spectra import band_power
 
+
 def motion_noise(
     recordings: Sequence[BodyRows], residuals: Sequence[Array], path: Array, edges: Array, highest_hz: float, order: int
 ) -> Array:

@@ -109,25 +109,30 @@ def _central(fit: PoseFit) -> Array:
 
 def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
-    scores = fit.rows.pull(fit.noise, each=True) @ central
-    window = _window(fit.rows.apart, len(scores))
-    sums = np.cumsum(np.concatenate([np.zeros((1, scores.shape[1])), scores - scores.mean(0)]), axis=0)
-    batches = sums[window:] - sums[:-window]
-    rows = len(scores)
+    scores = fit.rows.pull(fit.noise, each=True)
+    # Sums over an eighth of a window, then over windows that move by as much.
+    part = max(1, _window(fit.rows.apart, len(scores)) // 8)
+    sums = np.add.reduceat(scores, np.arange(0, len(scores), part), axis=0)[: len(scores) // part] @ central
+    sums = np.cumsum(np.concatenate([np.zeros((1, sums.shape[1])), sums - sums.mean(0)]), axis=0)
+    width = min(8, max(1, len(sums) // 4))
+    batches, share = sums[width:] - sums[:-width], width / (len(sums) - 1)
     # Batches of a series whose mean was taken away scatter less than the series does.
-    variance = (batches**2).mean(0) * rows / window / (1 - window / rows)
-    ratio = (variance / np.maximum(information, 1e-300)).reshape(-1, OWN)
-    return np.array([max(float(ratio[:, KIND == k].mean()), 1.0) for k in range(5)])
+    variance = (batches**2).mean(0) / share / (1 - share)
+    # Traces, which no turn of anybody's axes changes.
+    seen, white = (
+        np.array([x.reshape(-1, OWN)[:, k == KIND].sum() for k in range(5)]) for x in (variance, information)
+    )
+    return np.asarray(np.maximum(seen / np.maximum(white, 1e-300), 1.0))
 
 
 def _window(residual: Array, rows: int) -> int:
     """Return the number of rows of a window, from how long residuals stay correlated."""
     flat = residual.reshape(rows, -1)
-    flat = flat[:, flat.any(0)]
+    flat = np.ascontiguousarray(flat[:, flat.any(0)])
     power = np.maximum((flat**2).sum(), 1e-300)
     length, lag = 1.0, 1
     while lag < rows // 4:
-        share = float((flat[lag:] * flat[:-lag]).sum() / power)
+        share = float(flat[lag:].ravel() @ flat[:-lag].ravel() / power)
         if share < 0.05:
             break
         length, lag = length + 2 * share, lag + 1

@@ -13,6 +13,7 @@ Source: own; the paper fits twists of pairs (eq. 1-8) and refines them (section 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
@@ -33,7 +34,7 @@ SHOWN = 5.0
 GUESS = 1e-3
 # The information is taken anew where the noise has changed by this share.
 RENEWED = 0.02
-# Steps after which grasps are near enough for the information to stay as it is.
+# Steps after which grasps are near enough for noise to be judged, and for the information to stay as it is.
 NEAR = 2
 
 
@@ -48,52 +49,67 @@ class Close:
     noise: float
 
 
-EXACT, ROUGH = Close(1e-13, 1e-7), Close(1e-6, 1e-3)
+EXACT, ROUGHLY = Close(1e-13, 1e-7), Close(1e-6, 1e-3)
 
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The rows at one set of grasps and homes, with the motion that fits them.
+    """The rows at one set of grasps, homes and delays, with the motion that fits them.
 
-    apart  (T, N, 6) residuals from predicted to measured, in the payload's axes
+    still   the team, its motion as it was before
+    turns   (T, 3, 3), places (T, 3) the motion that fits
+    apart   (T, N, 6) residuals from predicted to measured, in the payload's axes
     """
 
     data: TeamMotion
-    team: Team
+    still: Team
+    turns: Array
+    places: Array
     apart: Array
 
     @classmethod
-    def settled(cls, data: TeamMotion, team: Team, noise: Array, sweeps: int = 1) -> Rows:
-        """Return the rows when the motion has followed grasps and homes; noise (N, 2) [rad, m]."""
+    def settled(
+        cls, data: TeamMotion, team: Team, noise: Array, sweeps: int = 1, path: tuple[Array, Array] | None = None
+    ) -> Rows:
+        """Return the rows when the motion, or `path`, has followed grasps and homes; noise (N, 2) [rad, m]."""
+        turns, places = path or (team.motion.rotation.matrix, team.motion.position)
+        G, Z = team.grasps, team.homes
+        W, inverse, pattern = _weights(data, team, noise)
         turns, places, apart = pose_rows.settled(
-            data.poses.rotation.matrix, data.poses.position, data.valid, *_raw(team), data.lateness(team.grasps),
-            team.delays, *_weights(data, team, noise), sweeps,
+            data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position,
+            Z.rotation.matrix, Z.position, turns, places, _twist(data), team.delays, W, inverse, pattern, sweeps,
         )  # fmt: skip
-        return cls(data, replace(team, motion=Pose(Rotation(turns), places)), apart)
+        return cls(data, team, turns, places, apart)
+
+    @cached_property
+    def team(self) -> Team:
+        """Where everything is."""
+        return replace(self.still, motion=Pose(Rotation(self.turns), self.places))
 
     @property
     def residual(self) -> Array:
         """Residuals (T, N, 6) in each grasp's own axes."""
         parts = self.apart.reshape(*self.apart.shape[:2], 2, 3)
-        return np.asarray((parts @ self.team.grasps.rotation.matrix).reshape(self.apart.shape))
+        return np.asarray((parts @ self.still.grasps.rotation.matrix).reshape(self.apart.shape))
 
     def noise(self, noise: Array) -> Array:
         """Return the noise (N, 2) that the residuals show, from one to begin with."""
-        along = Pose(Rotation.identity(self.data.count), self.team.grasps.position)
+        along = Pose(Rotation.identity(self.data.count), self.still.grasps.position)
         return pose_noise(self.apart, self.data.valid, adjoint_inverse(along), noise)
 
     def pull(self, noise: Array, each: bool = False) -> Array:
         """Return half the gradient of chi^2 (13 N,), sign turned, or what `each` row (T, 13 N) adds to it."""
+        G, Z = self.still.grasps, self.still.homes
+        W, inverse, pattern = _weights(self.data, self.still, noise)
         out = pose_rows.pulled(
-            self.apart, self.data.valid, *_raw(self.team), self.data.lateness(self.team.grasps),
-            *_weights(self.data, self.team, noise), each,
+            self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position, self.turns,
+            self.places, _twist(self.data), W, inverse, pattern, each,
         )  # fmt: skip
         return out if each else out[0]
 
 
-def _raw(team: Team) -> tuple[Array, ...]:
-    poses = (team.grasps, team.homes, team.motion)
-    return tuple(part for pose in poses for part in (pose.rotation.matrix, pose.position))
+def _twist(data: TeamMotion) -> Array:
+    return np.zeros((0, data.count, 6)) if data.twist is None else data.twist
 
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
@@ -114,12 +130,6 @@ def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
         if seen.any():
             out += pose_rows.information(S, J, W, seen, WHICH, SIGN)
     return out
-
-
-def _raw(team: Team) -> tuple[Array, ...]:
-    poses = (team.grasps, team.homes, team.motion)
-    return tuple(part for pose in poses for part in (pose.rotation.matrix, pose.position))
-
 
 
 @dataclass(frozen=True, eq=False)
@@ -229,7 +239,12 @@ class PoseFit:
     information: Array
     noise: Array
     unknown: Integers
-    solved: Shown
+    solver: Solver
+
+    @cached_property
+    def solved(self) -> Shown:
+        """Covariance of the unknown parameters for white noise, and what is lost."""
+        return self.solver.all_shown()
 
     @property
     def team(self) -> Team:
@@ -247,6 +262,13 @@ class PoseFit:
         return np.repeat(self.noise**-2.0, 3, axis=1)
 
 
+def _informed(data: TeamMotion, grasps: Pose, noise: Array, unknown: Integers) -> tuple[Array, float, Solver]:
+    """Return the information, what holds the sum of delays at zero, and the solver of both."""
+    H = information(data, grasps, noise)
+    common = float(np.diag(H)[OWN - 1 :: OWN].mean())
+    return H, common, Solver.of(_gauged(H, common, unknown), unknown, noise, len(data.valid))
+
+
 def fit_poses(
     data: TeamMotion, start: Team, reference: int, noise: Array | None = None, close: Close = EXACT
 ) -> PoseFit:
@@ -254,32 +276,30 @@ def fit_poses(
 
     Delays, which sum to zero, are estimated where the data have twists.
     """
-    rows, count = data.valid.shape
+    count = data.count
     own = np.arange(OWN if data.twist is not None else OWN - 1)
     unknown = np.concatenate([OWN * i + (own if i != reference else own[OWN - 1 :]) for i in range(count)])
-    timed = unknown % OWN == OWN - 1
-    team, noise = start, np.full((count, 2), GUESS) if noise is None else noise
-    solver, known = None, noise
+    timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
+    team, path = start, None
+    noise = known = np.full((count, 2), GUESS) if noise is None else noise
+    H, common, solver = _informed(data, team.grasps, noise, unknown)
     for step_number in range(STEPS):
-        here = Rows.settled(data, team, noise)
-        new = here.noise(noise)
-        quiet = np.abs(np.log(new / noise)).max() < close.noise
+        here = Rows.settled(data, team, noise, 1, path)
+        # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
+        new = here.noise(noise) if step_number >= near else noise
+        quiet = step_number >= near and bool(np.abs(np.log(new / noise)).max() < close.noise)
         noise = new
-        if solver is None or step_number <= NEAR or np.abs(np.log(noise / known)).max() > RENEWED:
-            H, known = information(data, team.grasps, noise), noise
-            common = float(np.diag(H)[OWN - 1 :: OWN].mean())
-            solver = Solver.of(_gauged(H, common, unknown), unknown, noise, rows)
+        if 0 < step_number <= near or np.abs(np.log(noise / known)).max() > RENEWED:
+            known, (H, common, solver) = noise, _informed(data, team.grasps, noise, unknown)
         pull = here.pull(noise)[unknown] - common * timed * team.delays.sum()
         step = solver.step(pull)
         if quiet and float(step @ pull) < close.chi2:
             break
         full = np.zeros(OWN * count)
         full[unknown] = step
-        each = full.reshape(-1, OWN)
+        each, path = full.reshape(-1, OWN), (here.turns, here.places)
         team = replace(
-            here.team, grasps=team.grasps @ exp(each[:, :6]), homes=team.homes @ exp(each[:, 6:12]),
+            team, grasps=team.grasps @ exp(each[:, :6]), homes=team.homes @ exp(each[:, 6:12]),
             delays=team.delays + each[:, 12],
         )  # fmt: skip
-    H = information(data, team.grasps, noise)
-    last = Solver.of(_gauged(H, common, unknown), unknown, noise, rows).all_shown()
-    return PoseFit(reference, here, H, noise, unknown, last)
+    return PoseFit(reference, here, H, noise, unknown, solver)

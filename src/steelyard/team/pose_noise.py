@@ -10,8 +10,8 @@ from steelyard.logs.log import Mask
 ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
 LEAST = np.array([1e-7, 1e-7])
-# Noise has settled where it changes by less than this share.
-SETTLED = 1e-9
+# Scoring ends where noise changes by less than this share: the step after would change it by about its square.
+SETTLED = 1e-4
 # That robots of a team err alike counts as much as so many rows.
 ALIKE = 1.0
 

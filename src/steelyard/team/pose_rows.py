@@ -16,7 +16,7 @@ from steelyard.logs.log import Integers, Mask
 OWN, FEATURES = 13, 25
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def features(R: Array, p: Array, twist: Array, valid: Mask) -> Array:
     """Return the features (T, N * 25) of measured poses R (T, N, 3, 3), p (T, N, 3); zeros where not valid."""
     T, N = p.shape[:2]
@@ -55,7 +55,7 @@ def _places() -> tuple[Integers, Array]:
 WHICH, SIGN = _places()
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def information(scatter: Array, J: Array, W: Array, valid: Mask, which: Integers, sign: Array) -> Array:
     """Return what the rows of one pattern of robots say of all parameters (13 N, 13 N), the motion eliminated.
 
@@ -95,22 +95,23 @@ def information(scatter: Array, J: Array, W: Array, valid: Mask, which: Integers
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def settled(
     R: Array, p: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array, twist: Array,
     late: Array, W: Array, inverse: Array, pattern: Integers, sweeps: int,
 ) -> tuple[Array, Array, Array]:  # fmt: skip
     """Let the motion follow the grasps and homes; return it (T, 3, 3), (T, 3) and the residuals (T, N, 6).
 
-    R (T, N, 3, 3), p (T, N, 3) measured; G, Z (N,), X (T,) where everything is; twist (T, N, 6) how poses move in the
-    payload's axes per second that late (N,) [s] their clocks are; W (N, 2) weights of rotation and position; inverse
-    (C, 6, 6) of the information about the motion per pattern of robots, pattern (T,); sweeps of Gauss-Newton per row.
+    R (T, N, 3, 3), p (T, N, 3) measured; G, Z (N,), X (T,) where everything is; twist (T, N, 6) how poses move in
+    their own axes per second that late (N,) [s] their clocks are, or (0, N, 6); W (N, 2) weights of turn and place;
+    inverse (C, 6, 6) of the information about the motion per pattern of robots, pattern (T,); sweeps of Gauss-Newton.
     Residuals are rotation vector and position of grasps from predicted to measured, in the payload's axes: from X to
-    Z T G^-1, where robot i sees the payload.
+    Z T G^-1, where robot i sees the payload, less what the last sweep took up.
     """
     T, N = p.shape[:2]
     turns, places, residual = np.empty((T, 3, 3)), np.empty((T, 3)), np.zeros((T, N, 6))
     B, x, f, W6 = np.empty((N, 12)), np.empty(6), np.empty(6), np.repeat(W, 3).reshape(N, 6)
+    shift, timed = np.zeros((N, 6)), len(twist) > 0
     X, place, step, held = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
     for t in range(T):
         X[:] = RX[t]
@@ -119,28 +120,33 @@ def settled(
         for i in range(N):
             if valid[t, i]:
                 _seen(R, p, RG, pG, RZ, pZ, t, i, held, B)
-        for sweep in range(sweeps + 1):
+                if timed:
+                    _into_payload(RG, twist[t], i, late[i], shift)
+        for _ in range(sweeps):
             f[:] = 0.0
             for i in range(N):
                 if not valid[t, i]:
                     continue
                 _apart(X, place, B, pG, i, e)
-                for a in range(6):
-                    e[i, a] -= late[i] * twist[t, i, a]
+                if timed:
+                    for a in range(6):
+                        e[i, a] -= shift[i, a]
                 _pushed(W6, pG, e, i, f)
-            if sweep < sweeps:
-                _times(inverse[pattern[t]], f, x)
-                for a in range(3):
-                    place[a] += X[a, 0] * x[3] + X[a, 1] * x[4] + X[a, 2] * x[5]
-                _turn(x, step)
-                _product(X, step, held)
-                X[:] = held
+            _times(inverse[pattern[t]], f, x)
+            for a in range(3):
+                place[a] += X[a, 0] * x[3] + X[a, 1] * x[4] + X[a, 2] * x[5]
+            _turn(x, step)
+            _product(X, step, held)
+            X[:] = held
+        for i in range(N):
+            if valid[t, i]:
+                _taken(x, pG, i, e)
         turns[t] = X
         places[t] = place
     return turns, places, residual
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def pulled(
     residual: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array, twist: Array,
     W: Array, inverse: Array, pattern: Integers, each: bool,
@@ -154,8 +160,9 @@ def pulled(
     T, N = valid.shape
     out = np.zeros((T if each else 1, N, OWN))
     x, f, W6 = np.empty(6), np.empty(6), np.repeat(W, 3).reshape(N, 6)
+    rate, e, timed = np.zeros((N, 6)), np.empty((N, 6)), len(twist) > 0
     for t in range(T):
-        e, row = residual[t], t if each else 0
+        e[:], row = residual[t], t if each else 0
         f[:] = 0.0
         for i in range(N):
             if valid[t, i]:
@@ -164,14 +171,14 @@ def pulled(
         for i in range(N):
             if not valid[t, i]:
                 continue
-            f[0], f[1], f[2] = x[0], x[1], x[2]
-            f[3] = x[3] + x[1] * pG[i, 2] - x[2] * pG[i, 1]
-            f[4] = x[4] + x[2] * pG[i, 0] - x[0] * pG[i, 2]
-            f[5] = x[5] + x[0] * pG[i, 1] - x[1] * pG[i, 0]
+            _taken(x, pG, i, e)
             for a in range(6):
-                f[a] = W6[i, a] * (e[i, a] - f[a])
+                f[a] = W6[i, a] * e[i, a]
                 out[row, i, a] += f[a]
-                out[row, i, 12] += twist[t, i, a] * f[a]
+            if timed:
+                _into_payload(RG, twist[t], i, 1.0, rate)
+                for a in range(6):
+                    out[row, i, 12] += rate[i, a] * f[a]
             _home_pull(RX[t], pX[t], pG[i], pZ[i], f, out[row, i])
     for row in range(len(out)):
         for i in range(N):
@@ -180,7 +187,7 @@ def pulled(
     return out.reshape(len(out), OWN * N)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _pushed(W: Array, pG: Array, e: Array, i: int, f: Array) -> None:
     """Add what the weighted residual of grasp i pushes the payload (6,)."""
     u, v, w = W[i, 3] * e[i, 3], W[i, 4] * e[i, 4], W[i, 5] * e[i, 5]
@@ -192,7 +199,26 @@ def _pushed(W: Array, pG: Array, e: Array, i: int, f: Array) -> None:
     f[5] += w
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
+def _into_payload(RG: Array, twist: Array, i: int, factor: float, out: Array) -> None:
+    """Write `factor` times a six-vector of grasp i in the payload's axes."""
+    for k in range(0, 6, 3):
+        u, v, w = factor * twist[i, k], factor * twist[i, k + 1], factor * twist[i, k + 2]
+        for a in range(3):
+            out[i, k + a] = RG[i, a, 0] * u + RG[i, a, 1] * v + RG[i, a, 2] * w
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _taken(x: Array, pG: Array, i: int, e: Array) -> None:
+    """Take a small motion x (6,) of the payload off the residual of grasp i."""
+    for a in range(3):
+        e[i, a] -= x[a]
+    e[i, 3] -= x[3] + x[1] * pG[i, 2] - x[2] * pG[i, 1]
+    e[i, 4] -= x[4] + x[2] * pG[i, 0] - x[0] * pG[i, 2]
+    e[i, 5] -= x[5] + x[0] * pG[i, 1] - x[1] * pG[i, 0]
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _times(A: Array, f: Array, x: Array) -> None:
     """Write A f (6,)."""
     for a in range(6):
@@ -201,7 +227,7 @@ def _times(A: Array, f: Array, x: Array) -> None:
             x[a] += A[a, k] * f[k]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _seen(
     R: Array, p: Array, RG: Array, pG: Array, RZ: Array, pZ: Array, t: int, i: int, held: Array, B: Array
 ) -> None:
@@ -218,7 +244,7 @@ def _seen(
         B[i, 9 + a] = place
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _apart(X: Array, place: Array, B: Array, pG: Array, i: int, e: Array) -> None:
     """Write rotation vector and position (6,) of grasp i from X G to B G, in the axes of X."""
     u, v, w = B[i, 9] - place[0], B[i, 10] - place[1], B[i, 11] - place[2]
@@ -239,7 +265,7 @@ def _apart(X: Array, place: Array, B: Array, pG: Array, i: int, e: Array) -> Non
     e[i, 0], e[i, 1], e[i, 2] = share * (E21 - E12), share * (E02 - E20), share * (E10 - E01)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _home_pull(X: Array, place: Array, pG: Array, pZ: Array, f: Array, out: Array) -> None:
     """Take what a push f (6,) in the axes of X at X G pulls on a home off out[6:12], in the reference home's axes."""
     x = X[0, 0] * f[3] + X[0, 1] * f[4] + X[0, 2] * f[5]
@@ -256,7 +282,7 @@ def _home_pull(X: Array, place: Array, pG: Array, pZ: Array, f: Array, out: Arra
     out[11] -= z
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _into_own(R: Array, six: Array) -> None:
     """Turn both parts of a six-vector by R^T in place."""
     for k in range(0, 6, 3):
@@ -265,7 +291,7 @@ def _into_own(R: Array, six: Array) -> None:
             six[k + a] = R[0, a] * u + R[1, a] * v + R[2, a] * w
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def residuals(
     R: Array, p: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array
 ) -> Array:
@@ -281,7 +307,7 @@ def residuals(
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _product(A: Array, B: Array, out: Array) -> None:
     """Write A B (3, 3): at this size plain loops are much quicker than a call of BLAS."""
     for a in range(3):
@@ -289,7 +315,7 @@ def _product(A: Array, B: Array, out: Array) -> None:
             out[a, b] = A[a, 0] * B[0, b] + A[a, 1] * B[1, b] + A[a, 2] * B[2, b]
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _turn(vector: Array, out: Array) -> None:
     """Write the rotation (3, 3) about the first three of `vector` by their length [rad] (Rodrigues)."""
     x, y, z = vector[0], vector[1], vector[2]
@@ -304,11 +330,11 @@ def _turn(vector: Array, out: Array) -> None:
     out[2, 0], out[2, 1], out[2, 2] = b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _log_share(x: float, y: float, z: float, trace: float) -> float:
     """Return what the skew part (x, y, z), twice the sine times the axis, is to be multiplied by for its vector."""
     square = 0.25 * (x * x + y * y + z * z)
     if square < 1e-6 and trace > 1:
         return 0.5 + square / 12 + 3 * square * square / 80
     sine = np.sqrt(square) + 1e-300
-    return 0.5 * np.arctan2(sine, 0.5 * (trace - 1)) / sine
+    return float(0.5 * np.arctan2(sine, 0.5 * (trace - 1)) / sine)

@@ -17,7 +17,7 @@ from steelyard.spatial.screws import log_pose
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
-from steelyard.team.pose_fit import ROUGH, PoseFit, Rows, fit_poses
+from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import Team, TeamMotion
@@ -69,26 +69,27 @@ class PoseTeam:
         raw = stretches(log, {})
         resting = idle(raw)
         if not any(rows.any() for rows in resting):
-            return cls._fitted(log, clocks, _unchanged)._without_slips(log, clocks, _unchanged)
-        first = cls._fitted(log, clocks, lambda parts: _unseen(parts, resting))
+            return cls._fitted(log, clocks, raw, _unchanged)._without_slips(log, clocks, raw, _unchanged)
+        first = cls._fitted(log, clocks, raw, lambda parts: _unseen(parts, resting))
         off = first.off(log)
 
         def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
             return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
 
         found = presence_findings(raw, edit(raw), log.names)
-        team = cls._fitted(log, clocks, edit)._without_slips(log, clocks, edit)
+        team = cls._fitted(log, clocks, raw, edit)._without_slips(log, clocks, raw, edit)
         return replace(team, findings=(*found, *team.findings))
 
     @classmethod
-    def _fitted(cls, log: TeamLog, clocks: bool, edit: Edit) -> PoseTeam:
+    def _fitted(cls, log: TeamLog, clocks: bool, parts: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
+        """Return the fit of recordings as they are (`parts`) after an edit."""
         reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
-        parts = edit(stretches(log, late))
+        parts = edit(parts)
         data = TeamMotion(*all_poses(parts))
         start = first_team(data, reference, log.names)
         few = slice(None, None, max(1, len(data.valid) // FEW_ROWS))
-        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGH)
+        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
         if not clocks:
             return cls(parts, fit_poses(data, _followed(data, fit), reference, fit.noise), late)
         for _ in range(CLOCK_ROUNDS):
@@ -104,7 +105,7 @@ class PoseTeam:
             data = TeamMotion(*all_poses(parts))
         return cls(parts, fit, late)
 
-    def _without_slips(self, log: TeamLog, clocks: bool, edit: Edit) -> PoseTeam:
+    def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
         """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were."""
         team, slips = self, list[SlipAt]()
         for _ in range(MOST_SLIPS):
@@ -112,11 +113,11 @@ class PoseTeam:
             if found is None:
                 break
             # Once more without what follows the slip, which has bent the first fit.
-            team = self._fitted(log, clocks, edited(edit, [*slips, found]))
+            team = self._fitted(log, clocks, raw, edited(edit, [*slips, found]))
             slips.append(team._measured(log, found))
         if not slips:
             return self
-        team = self._fitted(log, clocks, edited(edit, slips))
+        team = self._fitted(log, clocks, raw, edited(edit, slips))
         return replace(team, findings=tuple(slip.finding(log) for slip in slips))
 
     def _slip(self, log: TeamLog) -> SlipAt | None:

@@ -20,7 +20,7 @@ class TeamMotion:
 
     poses  X_HG (T, N); where not `valid` they hold anything finite
     valid  (T, N) whether the robot has a pose at that time
-    twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; None where they are not asked for
+    twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; None where not asked for
     """
 
     poses: Pose
@@ -50,13 +50,6 @@ class TeamMotion:
             return homes[0] @ self.poses[:, 0] @ grasps[0].inverse()
         first = np.argmax(self.valid, axis=1)
         return homes[first] @ self.poses[np.arange(len(first)), first] @ grasps[first].inverse()
-
-    def lateness(self, grasps: Pose) -> Array:
-        """Return the twists (T, N, 6) in the payload's axes, zeros where delays are not asked for."""
-        if self.twist is None:
-            return np.zeros((*self.valid.shape, 6))
-        parts = self.twist.reshape(*self.valid.shape, 2, 3)
-        return np.asarray((parts @ grasps.rotation.matrix.swapaxes(1, 2)).reshape(self.twist.shape))
 
     @cached_property
     def scatter(self) -> list[Array]:

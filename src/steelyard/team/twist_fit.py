@@ -17,7 +17,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.logs.log import Mask
+from steelyard.logs.log import Integers, Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
 from steelyard.team.pose_covariance import Spread
@@ -41,7 +41,7 @@ def _ad() -> Array:
 
 AD = _ad()
 # Where its entries are that are not zero, and what they are.
-ENTRIES = np.argwhere(AD != 0), AD[AD != 0]
+PLACES, SIGNS = np.argwhere(AD != 0).astype(np.int64), AD[AD != 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -175,7 +175,7 @@ class _Split:
         W = (np.repeat(noise**-2.0, 3, axis=1) * spoke[:, None]).ravel()
         J = adjoint_inverse(grasps).reshape(-1, 6) * np.repeat(spoke, 6)[:, None]
         WJ = J * W[:, None]
-        return cls(W, J, WJ, np.linalg.inv(WJ.T @ J))
+        return cls(W, J, WJ, np.asarray(np.linalg.inv(WJ.T @ J), dtype=np.float64))
 
     @property
     def P(self) -> Array:
@@ -199,14 +199,14 @@ def _normal(merged: TwistScatter, grasps: Pose, noise: Array) -> tuple[Array, Ar
         split, y = _Split.of(spoke, grasps, noise), S[:size, :size]
         P, fitted = split.P, split.J @ split.inner
         payload = split.WJ.T @ y @ split.WJ
-        H += contracted(P, fitted @ payload @ fitted.T, *ENTRIES)
-        floor += contracted(P, rows * (fitted @ split.J.T), *ENTRIES)
+        H += contracted(P, fitted @ payload @ fitted.T, PLACES, SIGNS)
+        floor += contracted(P, rows * (fitted @ split.J.T), PLACES, SIGNS)
         g += split.scores(y)
     return H - floor, g, floor
 
 
 @numba.njit(cache=True)
-def contracted(P: Array, S: Array, places: Array, signs: Array) -> Array:
+def contracted(P: Array, S: Array, places: Integers, signs: Array) -> Array:
     """Return sum_t ad(y_i)^T P_ij ad(y_j) for y with scatter S (6 N, 6 N), from the entries of ad that are not zero."""
     count = len(P) // 6
     out = np.zeros_like(P)
