@@ -325,3 +325,42 @@ def test_answers_that_are_no_body_become_the_nearest_one() -> None:
         assert np.linalg.eigvalsh(forms.pseudo_inertia(found))[0] > 0
         inverse = np.linalg.inv(factor @ factor.T)
         assert (found - phi) @ inverse @ (found - phi) <= (body - phi) @ inverse @ (body - phi)
+
+
+def test_two_gimbals_that_cannot_balance_the_payload_are_refused() -> None:
+    whole = trial().log
+    two = replace(
+        whole,
+        robots=whole.robots[:2],
+        recordings=tuple(
+            replace(r, tracks={n: t for n, t in r.tracks.items() if n != "robot2"}) for r in whole.recordings
+        ),
+    )
+    with pytest.raises(CannotAnswer, match=r"'robot0' and 'robot1', cannot hold a payload still .* somebody else"):
+        JointTeam().identify(two)
+    moving = [r for r in two.recordings if r.kind != "still"]
+    assert JointTeam().identify(two.with_recordings(*moving)).mass > 0
+
+
+def test_gravity_that_nobody_knows_is_asked_for() -> None:
+    log = trial().log
+    lost = replace(log, robots=tuple(replace(robot, gravity=None) for robot in log.robots))
+    with pytest.raises(CannotAnswer, match="somebody must know where gravity points"):
+        JointTeam().identify(lost)
+
+
+def test_a_payload_that_bends_is_noticed() -> None:
+    made = trial(robots=4, kinds=("motion",))
+    (last,) = made.log.recordings
+    rng, tracks = np.random.default_rng(1), {}
+    for name, track in last.tracks.items():
+        t = (track.time - track.time[0])[:, None, None]
+        sines = np.sin(2 * np.pi * rng.uniform(0.3, 1.0, (3, 5)) * t + rng.uniform(0, 6.3, (3, 5))).sum(-1)
+        bent = Pose(Rotation(track.channels["rotation"]), track.channels["position"]) @ Pose(
+            Rotation.exp(0.02 * sines), 0.01 * sines[:, ::-1]
+        )
+        channels = {**track.channels, "rotation": bent.rotation.matrix, "position": bent.position}
+        tracks[name] = replace(track, channels=channels)
+    found = JointTeam().identify(made.log.with_recordings(replace(last, tracks=tracks)))
+    assert "payload-not-rigid" in found.codes()
+    assert "payload-jointed" not in found.codes()

@@ -16,6 +16,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
+from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge import rigidity_findings
@@ -61,8 +62,10 @@ class JointTeam:
             found = [*standing.findings, *(rigidity_findings(standing.parts, log.names) if standing.rough else [])]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
+        placed = balance_frame(grasps).inverse() @ grasps
+        require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)
-        D = summing(balance_frame(grasps).inverse() @ grasps)
+        D = summing(placed)
         size = team_size(grasps, spread)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
