@@ -40,6 +40,6 @@ def require_balance(log: TeamLog, recordings: Sequence[BodyRows], X_BG: Pose) ->
                 apart = f"turns {np.rad2deg(turned):.0f} deg apart about the line of their grasps"
                 raise CannotAnswer(
                     f"two robots with passive gimbals, '{carriers[0]}' and '{carriers[1]}', cannot hold a payload "
-                    f"still at {apart}, as in '{first[0]}' and '{name}': somebody else carries it. Add the forces of that "
-                    "robot, or leave the still recordings out."
+                    f"still at {apart}, as in '{first[0]}' and '{name}': somebody else carries it. Add the forces "
+                    "of that robot, or leave the still recordings out."
                 )
