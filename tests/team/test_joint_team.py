@@ -364,3 +364,10 @@ def test_a_payload_that_bends_is_noticed() -> None:
     found = JointTeam().identify(made.log.with_recordings(replace(last, tracks=tracks)))
     assert "payload-not-rigid" in found.codes()
     assert "payload-jointed" not in found.codes()
+
+
+def test_a_mass_that_may_be_a_third_off_is_not_called_identified() -> None:
+    made = trial(freedom=Freedom(Z[:, None], np.zeros((3, 0)), np.array([0.5, 0.3, 0.0])), kinds=("motion",))
+    found = JointTeam().identify(made.log)
+    assert abs(found.mass - 12) > 1
+    assert not found.identified[0]
