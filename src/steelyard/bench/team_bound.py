@@ -24,10 +24,10 @@ from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import balance_frame, summing
 from steelyard.team.joint import JointTeam
-from steelyard.team.pose_fit import linearise, solved
+from steelyard.team.pose_fit import information, shown
 from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_team import PoseTeam
-from steelyard.team.poses import Team, TeamMotion
+from steelyard.team.poses import TeamMotion
 from steelyard.team.stacked import all_poses
 
 FIRST_SEED = 9000
@@ -43,17 +43,14 @@ def bound(noise: TeamNoise, exact: TeamTrial) -> dict[str, Array]:
     team, count = standing.fit.team, len(exact.log.names)
     size = np.tile([noise.pose_rad, noise.pose_m], (count, 1))
     unknown = np.concatenate([OWN * i + np.arange(OWN - 1) for i in range(1, count)])
-    grasps = np.sqrt(np.diag(solved(linearise(data, _truth(team), size), unknown, size, len(data.valid)).inverse))
+    H = information(data, team.grasps, size)[np.ix_(unknown, unknown)]
+    grasps = np.sqrt(np.diag(shown(H, unknown, size, len(data.valid)).inverse))
     each = grasps.reshape(count - 1, OWN - 1)
     std = _payload(noise, exact, standing)
     return {
         "rotation": each[:, :3].ravel(), "position": each[:, 3:6].ravel(), "mass": std[:1], "com": std[1:4],
         "inertia": std[4:],
     }  # fmt: skip
-
-
-def _truth(team: Team) -> Team:
-    return replace(team, delays=np.zeros(len(team.delays)))
 
 
 def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:

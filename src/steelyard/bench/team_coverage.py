@@ -13,6 +13,7 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.bench.team_pool import spread
 from steelyard.check import Array
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
@@ -55,24 +56,28 @@ def errors(made: TeamTrial, found: TeamEstimate) -> dict[str, tuple[Array, Array
     }
 
 
-def trial(noise: str, seed: int) -> dict[str, tuple[Array, Array]]:
-    """Return errors and standard deviations of one trial of the noise called so."""
+def trial(job: tuple[str, int]) -> dict[str, tuple[Array, Array]]:
+    """Return errors and standard deviations of one trial: the noise called so, and the seed."""
+    noise, seed = job
     scene: TeamScene = replace(case("A"), noise=NOISES[noise], motion_samples=MOTION_SAMPLES)
     made = simulate_team(scene, seed)
     return errors(made, JointTeam().identify(made.log))
 
 
 def coverage(
-    trials: int = 200, noises: tuple[str, ...] = tuple(NOISES), progress: Callable[[int], None] | None = None
+    trials: int = 400,
+    noises: tuple[str, ...] = tuple(NOISES),
+    progress: Callable[[int], None] | None = None,
+    workers: int = 1,
 ) -> dict[str, Any]:
     """Return by noise and kind: share of 95 % intervals that hold the truth, mean half-width over the rms error."""
     out: dict[str, Any] = {"trials": trials}
     for noise in noises:
         rows = []
-        for k in range(trials):
-            rows.append(trial(noise, FIRST_SEED + k))
+        for row in spread(trial, [(noise, FIRST_SEED + k) for k in range(trials)], workers):
+            rows.append(row)
             if progress is not None:
-                progress(k + 1)
+                progress(len(rows))
         out[noise] = {kind: pooled([row[kind] for row in rows]) for kind in KINDS}
     return out
 

@@ -17,7 +17,12 @@ _COLUMNS = (
     ("   I3 %", "I3", 2),
     ("s CPU", "time_s", 3),
 )
-_SCALE = (("grasp deg", "rotation_deg", 4), ("grasp mm", "position_mm", 3), ("s CPU", "time_s", 4))
+_SCALE = (
+    ("grasp deg", "rotation_deg", 4),
+    ("grasp mm", "position_mm", 3),
+    ("+-", "position_se", 3),
+    ("s CPU", "time_s", 4),
+)
 
 
 def team_table(result: dict[str, Any]) -> str:
@@ -35,11 +40,38 @@ def team_table(result: dict[str, Any]) -> str:
         kinds = {k: v for k, v in result["bound"].items() if isinstance(v, dict)}
         said = ", ".join(f"{kind} {v['ratio']:.2f}" for kind, v in kinds.items())
         lines += ["", f"joint, rms error over the Cramer-Rao bound with white noise: {said}"]
+    for row in result.get("times", ()):
+        lines += [f"joint, {row['n']} robots, {row['rows']} rows, whole identification: {row['time_s']:.3f} s CPU"]
+    lines += _events(result.get("events", {}))
     for noise, kinds in result.get("coverage", {}).items():
         if isinstance(kinds, dict):
             said = ", ".join(f"{kind} {v['coverage_pct']:.1f} %" for kind, v in kinds.items())
             lines += [f"joint, 95 % intervals hold the truth, {noise} noise: {said}"]
     return "\n".join(lines)
+
+
+def _events(events: dict[str, Any]) -> list[str]:
+    """Return lines on a late clock, slips and a robot that leaves."""
+    if not events:
+        return []
+    late, left = events["late_clock"], events["leaving"]
+    error = late["offset_error_ms"]
+    lines = [
+        f"case {late['case']}, one robot {late['late_ms']:.0f} ms late: offset off by {error['mean']:.3f} ms, at worst "
+        f"{error['worst']:.3f} ms; position error {late['ratio_clocks']:.2f} x that in step, "
+        f"{late['ratio_without']:.1f} x without the estimate of clocks"
+    ]
+    for name, slip in events["slips"].items():
+        lines.append(
+            f"case {name}, slips of 5 mm: {slip['found']} of {slip['trials']} found within 0.3 s, "
+            f"{slip['false']} false alarms in {slip['trials']} logs without"
+        )
+    shares = ", ".join(f"{kind} {left[kind]['ratio']:.2f}" for kind in left if isinstance(left[kind], dict))
+    return [
+        *lines,
+        f"case {left['case']}, one of {left['robots']} leaves at half: named in {left['named']} of {left['trials']}; "
+        f"rms error over that when told: {shares}",
+    ]
 
 
 def _with_moments(values: dict[str, Any]) -> dict[str, Any]:

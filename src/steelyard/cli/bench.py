@@ -151,6 +151,7 @@ def segment(data: Path, as_json: bool, **choices: Any) -> None:
 @click.option("--sizes", type=click.IntRange(min=2), multiple=True, help="Only these numbers of robots in the scaling.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
 @click.option("--coverage", type=click.IntRange(min=0), default=0, show_default=True, help="Trials of the intervals.")
+@click.option("--slips", type=click.IntRange(min=0), default=40, show_default=True, help="Slips, and logs without.")
 @_JSON
 def team(trials: int, as_json: bool, **choices: Any) -> None:
     """One payload, three robots, noise from clean to that of the paper; and cost against the number of robots."""

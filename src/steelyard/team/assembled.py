@@ -60,7 +60,9 @@ def assembled(
 
 
 def _identified(body: InertialParameters, covariance: Array, payload: PayloadFit, open_grasps: bool) -> Mask:
-    """Return which (10,) of mass, centre of mass and inertia about it are known to a good part of what they can be."""
+    """Return which (10,) of mass, centre of mass and inertia about it are known: two standard deviations are below
+    SHOWN of what a body of this mass and size can have.
+    """
     if not payload.lost.shape[1] and not open_grasps:
         return np.ones(10, np.bool_)
     jacobian = np.zeros((10, 10))
@@ -68,7 +70,8 @@ def _identified(body: InertialParameters, covariance: Array, payload: PayloadFit
     jacobian[1:] = com_jacobian(body.vector)
     std = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
     scale = payload.scale / np.concatenate([[1.0], np.full(3, payload.scale[0]), np.ones(6)])
-    known = std < SHOWN * scale
+    scale[0] = min(scale[0], abs(float(body.mass)))
+    known = 2 * std < SHOWN * scale
     # The centre of mass is the first moment over the mass.
     known[1:] &= known[0]
     return np.asarray(known)

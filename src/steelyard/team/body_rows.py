@@ -25,6 +25,10 @@ PATH_FILTER = 2.0
 LEAST_CYCLES, END_CYCLES = 12.0, 1.0
 
 
+# Share of the grasps' own axes in those of the balance frame.
+ALIKE = 1e-3
+
+
 @dataclass(frozen=True, eq=False)
 class Run:
     """Rows of one recording without a gap, all in B's axes.
@@ -50,10 +54,17 @@ class BodyRows:
 
 
 def balance_frame(grasps: Pose) -> Pose:
-    """Return X_RB: at the middle of the grasps (N,), along the axes in which they spread."""
+    """Return X_RB: at the middle of the grasps (N,), along the axes in which they spread.
+
+    Where they spread alike, as two do across their line, the grasps' own axes decide, so that neither their order nor
+    the reference does.
+    """
     centre = grasps.position.mean(0)
     off = grasps.position - centre
-    _, axes = np.linalg.eigh(off.T @ off)
+    spread = off.T @ off
+    turn = grasps.rotation.matrix
+    own = np.einsum("nij,j,nkj->ik", turn, [0.0, 1.0, 2.0], turn)
+    _, axes = np.linalg.eigh(spread + ALIKE * np.trace(spread) / len(turn) * own)
     axes[:, 2] *= np.sign(np.linalg.det(axes))
     return Pose(Rotation(axes), centre)
 

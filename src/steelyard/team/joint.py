@@ -16,6 +16,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
+from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge import rigidity_findings
@@ -57,12 +58,14 @@ class JointTeam:
         else:
             standing = PoseTeam.of(log, self.clocks)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
-            late, order = standing.late, 2
+            late, order = _against(standing.late, log.reference), 2
             found = [*standing.findings, *(rigidity_findings(standing.parts, log.names) if standing.rough else [])]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
+        placed = balance_frame(grasps).inverse() @ grasps
+        require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)
-        D = summing(balance_frame(grasps).inverse() @ grasps)
+        D = summing(placed)
         size = team_size(grasps, spread)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
@@ -87,6 +90,11 @@ def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEsti
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
     return replace(team, parameters=team.parameters - points)
+
+
+def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:
+    """Return how late every clock is against the reference's."""
+    return {name: seconds - late[reference] for name, seconds in late.items()}
 
 
 def needs_twists(log: TeamLog) -> bool:

@@ -15,9 +15,6 @@ from steelyard.spatial import cross_matrix
 from steelyard.team.body_rows import BodyRows
 from steelyard.team.spectra import band_power
 
-# So many robots tell the colour well enough.
-ENOUGH = 6
-
 
 def motion_noise(
     recordings: Sequence[BodyRows], residuals: Sequence[Array], path: Array, edges: Array, highest_hz: float, order: int
@@ -42,7 +39,7 @@ def _shares(recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: A
     """Return the mean square per row (3, K) of noise of unit variance after 0, 1 and 2 differences."""
     total, rows = np.zeros((3, len(edges))), np.zeros(len(edges))
     for recording, residual in zip(recordings, residuals, strict=True):
-        flat = residual[:, :ENOUGH].reshape(len(residual), -1)
+        flat = residual.reshape(len(residual), -1)
         size = np.sqrt((flat**2).mean(0))
         flat = flat[:, size > 0] / size[size > 0]
         if not flat.shape[1]:

@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.spatial import cross_matrix
 from steelyard.team.adjoint import adjoint
 from steelyard.team.pose_fit import PoseFit
 from steelyard.team.pose_rows import OWN
@@ -69,10 +70,13 @@ class Spread:
 def grasp_covariance(fit: PoseFit) -> Spread:
     """Return the covariance of grasps and delays."""
     count = len(fit.team.delays)
-    factor = np.sqrt(_inflation(fit))[KIND[fit.unknown % OWN]]
-    H = fit.linear.information[np.ix_(fit.unknown, fit.unknown)]
-    V = H * np.outer(factor, factor)
-    covariance = fit.solved.inverse @ V @ fit.solved.inverse
+    central = _central(fit)
+    H = central.T @ fit.information @ central
+    factor = np.sqrt(_inflation(fit, np.diag(H), central))[KIND[fit.unknown % OWN]]
+    V = H[np.ix_(fit.unknown, fit.unknown)] * np.outer(factor, factor)
+    back = np.linalg.inv(central[np.ix_(fit.unknown, fit.unknown)])
+    inverse = back @ fit.solved.inverse @ back.T
+    covariance = inverse @ V @ inverse
     full, blind, late = np.zeros((6 * count, 6 * count)), np.zeros((6 * count, fit.solved.lost.shape[1])), None
     grasp = np.flatnonzero(fit.unknown % OWN < 6)
     place = 6 * (fit.unknown[grasp] // OWN) + fit.unknown[grasp] % OWN
@@ -80,35 +84,55 @@ def grasp_covariance(fit: PoseFit) -> Spread:
     blind[place] = fit.solved.lost[grasp]
     delay = np.flatnonzero(fit.unknown % OWN == OWN - 1)
     if len(delay):
-        late = np.zeros(count)
-        late[fit.unknown[delay] // OWN] = np.sqrt(np.maximum(np.diag(covariance)[delay], 0))
+        late = np.sqrt(np.maximum(_against(covariance[np.ix_(delay, delay)], fit.reference), 0))
     turn = adjoint(fit.team.grasps)
     turn[:, 3:, :3] = 0.0
     return Spread(full, blind, late, turn)
 
 
-def _inflation(fit: PoseFit) -> Array:
+def _against(covariance: Array, reference: int) -> Array:
+    """Return the variances (N,) of differences from one of them."""
+    variance = np.diag(covariance)
+    return np.asarray(variance + variance[reference] - 2 * covariance[reference])
+
+
+def _central(fit: PoseFit) -> Array:
+    """Return B (13 N, 13 N): homes that turn about the middle of their grasp's places, by which they do not matter."""
+    count = len(fit.team.delays)
+    out = np.eye(OWN * count)
+    for i in range(count):
+        seen = fit.rows.data.valid[:, i]
+        middle = fit.rows.data.poses.position[seen, i].mean(0) if seen.any() else np.zeros(3)
+        out[OWN * i + 9 : OWN * i + 12, OWN * i + 6 : OWN * i + 9] = cross_matrix(middle)
+    return out
+
+
+def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
-    scores = fit.linear.scores[:, fit.unknown]
-    window = _window(fit.linear.residual, len(scores))
-    sums = np.cumsum(np.concatenate([np.zeros((1, scores.shape[1])), scores - scores.mean(0)]), axis=0)
-    batches = sums[window:] - sums[:-window]
-    rows = len(scores)
+    scores = fit.rows.pull(fit.noise, each=True)
+    # Sums over an eighth of a window, then over windows that move by as much.
+    part = max(1, _window(fit.rows.apart, len(scores)) // 8)
+    sums = np.add.reduceat(scores, np.arange(0, len(scores), part), axis=0)[: len(scores) // part] @ central
+    sums = np.cumsum(np.concatenate([np.zeros((1, sums.shape[1])), sums - sums.mean(0)]), axis=0)
+    width = min(8, max(1, len(sums) // 4))
+    batches, share = sums[width:] - sums[:-width], width / (len(sums) - 1)
     # Batches of a series whose mean was taken away scatter less than the series does.
-    variance = (batches**2).mean(0) * rows / window / (1 - window / rows)
-    ratio = variance / np.maximum(np.diag(fit.linear.information)[fit.unknown], 1e-300)
-    kinds = KIND[fit.unknown % OWN]
-    return np.array([max(float(ratio[kinds == k].mean()), 1.0) if (kinds == k).any() else 1.0 for k in range(5)])
+    variance = (batches**2).mean(0) / share / (1 - share)
+    # Traces, which no turn of anybody's axes changes.
+    seen, white = (
+        np.array([x.reshape(-1, OWN)[:, k == KIND].sum() for k in range(5)]) for x in (variance, information)
+    )
+    return np.asarray(np.maximum(seen / np.maximum(white, 1e-300), 1.0))
 
 
 def _window(residual: Array, rows: int) -> int:
     """Return the number of rows of a window, from how long residuals stay correlated."""
     flat = residual.reshape(rows, -1)
-    flat = flat[:, flat.any(0)]
+    flat = np.ascontiguousarray(flat[:, flat.any(0)])
     power = np.maximum((flat**2).sum(), 1e-300)
     length, lag = 1.0, 1
     while lag < rows // 4:
-        share = float((flat[lag:] * flat[:-lag]).sum() / power)
+        share = float(flat[lag:].ravel() @ flat[:-lag].ravel() / power)
         if share < 0.05:
             break
         length, lag = length + 2 * share, lag + 1

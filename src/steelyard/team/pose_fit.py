@@ -4,176 +4,302 @@ Every robot i reports the pose T_i(t) of its grasp in its own home. With the hom
 of the reference robot and the grasps G_i in the reference grasp,
     T_i(t) = Z_i^-1 X(t) G_i exp(e_i),   e_i ~ N(0, W_i^-1),
 so that every loop closes by construction. A Gauss-Newton step has six unknowns per row of time, which are eliminated
-row by row (Schur complement), and thirteen per robot: grasp, home and how late its clock is.
+row by row (Schur complement), and thirteen per robot: grasp, home and how late its clock is. Residuals live in each
+grasp's own axes and gradients are exact, so that neither the reference nor the homes nor the order of the robots move
+the optimum.
 Source: own; the paper fits twists of pairs (eq. 1-8) and refines them (section III-B2).
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers
+from steelyard.spatial import Pose, Rotation
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse, exp
 from steelyard.team.pose_noise import pose_noise
 from steelyard.team.pose_rows import OWN, SIGN, WHICH
 from steelyard.team.poses import Team, TeamMotion
 
-STEPS = 12
-# A step that lowers chi^2 by less than this is smaller than a hundredth of a standard deviation.
-SETTLED = 1e-4
-# Rows that are enough to come near the optimum; all rows then finish.
-FEW_ROWS = 1500
+STEPS = 25
 # A direction of a grasp is shown where the motion along it is so many times the noise of a single row.
 SHOWN = 5.0
 # Noise to begin with [rad, m].
 GUESS = 1e-3
-# Noise is renewed until it changes by less than this share.
-NOISE_SETTLED = 0.03
+# The information is taken anew where the noise has changed by this share.
+RENEWED = 0.02
+# Steps after which grasps are near enough for noise to be judged, and for the information to stay as it is.
+NEAR = 2
 
 
-@dataclass(frozen=True, eq=False)
-class Linear:
-    """One linearisation of the fit with the motion eliminated: chi^2 = const - 2 pull.d + d.information.d.
+@dataclass(frozen=True)
+class Close:
+    """When a fit is done: a step lowers chi^2 by less than `chi2`, and noise changes by a smaller share than `noise`.
 
-    residual  (T, N, 6) from predicted to measured, in the axes of each grasp
-    free      (T, 6) how the motion moves at d = 0
-    scores    (T, 13 N) what each row adds to `pull`
+    A chi^2 of x is a step of sqrt(x) standard deviations.
     """
 
-    information: Array
-    pull: Array
-    residual: Array
-    free: Array
-    scores: Array
-    J: Array
-    W: Array
-    inverse: Array
+    chi2: float
+    noise: float
 
 
-def linearise(data: TeamMotion, team: Team, noise: Array) -> Linear:
-    """Return the normal equations of one Gauss-Newton step; noise (N, 2) [rad, m]."""
-    W, J = np.repeat(noise**-2.0, 3, axis=1), adjoint_inverse(team.grasps)
-    found, place = data.patterns
-    info = np.einsum("nia,ni,nib->nab", J, W, J)
-    held = np.einsum("cn,nab->cab", found.astype(float), info)
-    # Rows that nobody saw say nothing: any motion will do.
-    held[~found.any(1)] = np.eye(6)
-    inverse = np.linalg.inv(held)
-    G, Z, X = team.grasps, team.homes, team.motion
-    residual = pose_rows.residuals(
-        data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position, Z.rotation.matrix,
-        Z.position, X.rotation.matrix, X.position,
-    )  # fmt: skip
-    if data.twist is not None:
-        residual = residual - data.twist * team.delays[:, None] * data.valid[..., None]
-    free, rest = pose_rows.followed(residual, data.valid, J, W, inverse, place)
-    scores = pose_rows.scores(rest, data.features, WHICH, SIGN)
-    information = sum(
-        (
-            pose_rows.information(S, J, W, seen, WHICH, SIGN)
-            for S, seen in zip(data.scatter, found, strict=True)
-            if seen.any()
-        ),
-        np.zeros((OWN * data.count, OWN * data.count)),
-    )
-    return Linear(information, scores.sum(0), residual, free, scores, J, W, inverse)
+EXACT, ROUGHLY = Close(1e-13, 1e-7), Close(1e-6, 1e-3)
 
 
 @dataclass(frozen=True, eq=False)
-class Solved:
-    """A step in the directions that the motion shows.
+class Rows:
+    """The rows at one set of grasps, homes and delays, with the motion that fits them.
 
-    step     (K,) of the unknown parameters
-    inverse  (K, K) their covariance for white noise
+    still   the team, its motion as it was before
+    turns   (T, 3, 3), places (T, 3) the motion that fits
+    apart   (T, N, 6) residuals from predicted to measured, in the payload's axes
+    """
+
+    data: TeamMotion
+    still: Team
+    turns: Array
+    places: Array
+    apart: Array
+
+    @classmethod
+    def settled(
+        cls, data: TeamMotion, team: Team, noise: Array, sweeps: int = 1, path: tuple[Array, Array] | None = None
+    ) -> Rows:
+        """Return the rows when the motion, or `path`, has followed grasps and homes; noise (N, 2) [rad, m]."""
+        turns, places = path or (team.motion.rotation.matrix, team.motion.position)
+        G, Z = team.grasps, team.homes
+        W, inverse, pattern = _weights(data, team, noise)
+        turns, places, apart = pose_rows.settled(
+            data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position,
+            Z.rotation.matrix, Z.position, turns, places, _twist(data), team.delays, W, inverse, pattern, sweeps,
+        )  # fmt: skip
+        return cls(data, team, turns, places, apart)
+
+    @cached_property
+    def team(self) -> Team:
+        """Where everything is."""
+        return replace(self.still, motion=Pose(Rotation(self.turns), self.places))
+
+    @property
+    def residual(self) -> Array:
+        """Residuals (T, N, 6) in each grasp's own axes."""
+        parts = self.apart.reshape(*self.apart.shape[:2], 2, 3)
+        return np.asarray((parts @ self.still.grasps.rotation.matrix).reshape(self.apart.shape))
+
+    def noise(self, noise: Array) -> Array:
+        """Return the noise (N, 2) that the residuals show, from one to begin with."""
+        along = Pose(Rotation.identity(self.data.count), self.still.grasps.position)
+        return pose_noise(self.apart, self.data.valid, adjoint_inverse(along), noise)
+
+    def pull(self, noise: Array, each: bool = False) -> Array:
+        """Return half the gradient of chi^2 (13 N,), sign turned, or what `each` row (T, 13 N) adds to it."""
+        G, Z = self.still.grasps, self.still.homes
+        W, inverse, pattern = _weights(self.data, self.still, noise)
+        out = pose_rows.pulled(
+            self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position, self.turns,
+            self.places, _twist(self.data), W, inverse, pattern, each,
+        )  # fmt: skip
+        return out if each else out[0]
+
+
+def _twist(data: TeamMotion) -> Array:
+    return np.zeros((0, data.count, 6)) if data.twist is None else data.twist
+
+
+def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
+    """Return weights (N, 2), the inverse information about the motion per pattern (C, 6, 6), and patterns (T,)."""
+    J, W = adjoint_inverse(team.grasps), np.repeat(noise**-2.0, 3, axis=1)
+    found, place = data.patterns
+    held = np.einsum("cn,nab->cab", found.astype(float), np.einsum("nia,ni,nib->nab", J, W, J, optimize=True))
+    # Rows that nobody saw say nothing: any motion will do.
+    held[~found.any(1)] = np.eye(6)
+    return noise**-2.0, np.linalg.inv(held), place
+
+
+def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
+    """Return what all rows say of all parameters (13 N, 13 N), the motion eliminated."""
+    J, W = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
+    out = np.zeros((OWN * data.count, OWN * data.count))
+    for S, seen in zip(data.scatter, data.patterns[0], strict=True):
+        if seen.any():
+            out += pose_rows.information(S, J, W, seen, WHICH, SIGN)
+    return out
+
+
+@dataclass(frozen=True, eq=False)
+class Shown:
+    """What the motion shows of the unknown parameters.
+
+    inverse  (K, K) their covariance for white noise, zero along what is lost
     lost     (K, L) directions of theirs that the motion does not show, unit length in units of the noise
     """
 
-    step: Array
     inverse: Array
     lost: Array
 
 
-def solved(linear: Linear, unknown: Integers, noise: Array, rows: int) -> Solved:
-    """Return the step in the parameters `unknown`; the others, and directions not shown, stay.
+def shown(H: Array, unknown: Integers, noise: Array, rows: int) -> Shown:
+    """Return what information (K, K) about the parameters `unknown` shows of them.
 
     Homes and delays always follow; of what is then left for the grasps, a direction counts as lost where the motion
     along it is less than SHOWN times the noise of a row: from noise alone, poses look as if they moved that much.
     """
-    H, g = linear.information[np.ix_(unknown, unknown)], linear.pull[unknown]
     grasp = unknown % OWN < 6
     homes = np.linalg.pinv(H[np.ix_(~grasp, ~grasp)], hermitian=True)
     carried = H[np.ix_(grasp, ~grasp)] @ homes
     left = H[np.ix_(grasp, grasp)] - carried @ H[np.ix_(~grasp, grasp)]
-    turn, place = noise[unknown[grasp] // OWN].T
-    floor = np.where(unknown[grasp] % OWN < 3, 2.0, (turn / place) ** 2) * rows
-    scale = 1 / np.sqrt(floor)
+    scale = _unit(unknown[grasp], noise, rows)
     values, vectors = np.linalg.eigh(left * np.outer(scale, scale))
-    shown = values > SHOWN**2
-    root = scale[:, None] * vectors[:, shown]
+    seen = values > SHOWN**2
+    root = scale[:, None] * vectors[:, seen]
     inverse = np.zeros_like(H)
-    inner = (root / values[shown]) @ root.T
+    inner = (root / values[seen]) @ root.T
     back = -carried.T @ inner
     inverse[np.ix_(grasp, grasp)] = inner
     inverse[np.ix_(~grasp, grasp)] = back
     inverse[np.ix_(grasp, ~grasp)] = back.T
     inverse[np.ix_(~grasp, ~grasp)] = homes - back @ carried
-    lost = np.zeros((len(unknown), int((~shown).sum())))
-    lost[grasp] = scale[:, None] * vectors[:, ~shown]
-    return Solved(inverse @ g, inverse, lost)
+    lost = np.zeros((len(unknown), int((~seen).sum())))
+    lost[grasp] = scale[:, None] * vectors[:, ~seen]
+    return Shown(inverse, lost)
 
 
-def moved(data: TeamMotion, team: Team, linear: Linear, unknown: Integers, step: Array) -> Team:
-    """Return the team after a step in the unknown parameters, with the motion that follows from it."""
-    full = np.zeros(OWN * data.count)
-    full[unknown] = step
-    own = full.reshape(-1, OWN)
-    follow = linear.free - pose_rows.moved_by(
-        full, data.features, linear.J, linear.W, linear.inverse, data.patterns[1], data.valid, WHICH, SIGN
-    )
-    return Team(
-        team.grasps @ exp(own[:, :6]),
-        team.homes @ exp(own[:, 6:12]),
-        team.motion @ exp(follow),
-        team.delays + own[:, 12],
-    )
+def _gauged(information: Array, common: float, unknown: Integers) -> Array:
+    """Return the information (K, K) about the unknown parameters, and `common` [s^-2] that their delays sum to zero.
+
+    What all clocks have in common moves the motion along itself and shows in nothing: the sum, unlike any one robot's
+    delay, is the same whoever is the reference.
+    """
+    H, timed = information[np.ix_(unknown, unknown)], unknown % OWN == OWN - 1
+    H[np.ix_(timed, timed)] += common
+    return H
+
+
+def _unit(grasp: Integers, noise: Array, rows: int) -> Array:
+    """Return steps of grasps that all rows together tell by their noise alone."""
+    turn, place = noise[grasp // OWN].T
+    return np.asarray(1 / np.sqrt(np.where(grasp % OWN < 3, 2.0, (turn / place) ** 2) * rows))
+
+
+@dataclass(frozen=True, eq=False)
+class Solver:
+    """Steps from pulls: by Cholesky where everything is shown, which is quick, else in the directions that are."""
+
+    order: Integers
+    factor: tuple[Array, bool] | None
+    scale: Array
+    shown: Shown | None
+
+    @classmethod
+    def of(cls, H: Array, unknown: Integers, noise: Array, rows: int) -> Solver:
+        """Return the solver of information H (K, K) about the parameters `unknown`."""
+        grasp = unknown % OWN < 6
+        order = np.concatenate([np.flatnonzero(~grasp), np.flatnonzero(grasp)])
+        scale = 1 / np.sqrt(np.maximum(np.diag(H)[order], 1e-300))
+        try:
+            factor = cho_factor(H[np.ix_(order, order)] * np.outer(scale, scale), lower=True)
+            first = int((~grasp).sum())
+            inner = np.tril(factor[0][first:, first:]) * (_unit(unknown[grasp], noise, rows) / scale[first:])[:, None]
+            np.linalg.cholesky(inner @ inner.T - SHOWN**2 * np.eye(len(inner)))
+        except LinAlgError:
+            return cls(order, None, scale, shown(H, unknown, noise, rows))
+        return cls(order, factor, scale, None)
+
+    def step(self, pull: Array) -> Array:
+        """Return the step (K,) for a pull."""
+        if self.shown is not None:
+            return np.asarray(self.shown.inverse @ pull)
+        out = np.empty_like(pull)
+        out[self.order] = self.scale * cho_solve(self.factor, self.scale * pull[self.order])
+        return out
+
+    def all_shown(self) -> Shown:
+        """Return the covariance for white noise, and what is lost."""
+        if self.shown is not None:
+            return self.shown
+        inverse = np.empty((len(self.order), len(self.order)))
+        inverse[np.ix_(self.order, self.order)] = np.outer(self.scale, self.scale) * cho_solve(
+            self.factor, np.eye(len(self.order))
+        )
+        return Shown(inverse, np.zeros((len(self.order), 0)))
 
 
 @dataclass(frozen=True, eq=False)
 class PoseFit:
-    """The optimum: the team, its last normal equations, noise (N, 2) [rad, m] and which parameters were unknown."""
+    """The optimum: its rows, information (13 N, 13 N), noise (N, 2) [rad, m], which parameters were unknown."""
 
-    team: Team
-    linear: Linear
+    reference: int
+    rows: Rows
+    information: Array
     noise: Array
     unknown: Integers
-    solved: Solved
+    solver: Solver
+
+    @cached_property
+    def solved(self) -> Shown:
+        """Covariance of the unknown parameters for white noise, and what is lost."""
+        return self.solver.all_shown()
+
+    @property
+    def team(self) -> Team:
+        """Where everything is."""
+        return self.rows.team
+
+    @property
+    def J(self) -> Array:
+        """Residuals per motion of the payload (N, 6, 6)."""
+        return adjoint_inverse(self.team.grasps)
+
+    @property
+    def W(self) -> Array:
+        """Weights of residuals (N, 6)."""
+        return np.repeat(self.noise**-2.0, 3, axis=1)
 
 
-def fit_poses(data: TeamMotion, start: Team, reference: int, noise: Array | None = None) -> PoseFit:
+def _informed(data: TeamMotion, grasps: Pose, noise: Array, unknown: Integers) -> tuple[Array, float, Solver]:
+    """Return the information, what holds the sum of delays at zero, and the solver of both."""
+    H = information(data, grasps, noise)
+    common = float(np.diag(H)[OWN - 1 :: OWN].mean())
+    return H, common, Solver.of(_gauged(H, common, unknown), unknown, noise, len(data.valid))
+
+
+def fit_poses(
+    data: TeamMotion, start: Team, reference: int, noise: Array | None = None, close: Close = EXACT
+) -> PoseFit:
     """Return the optimum near `start`; the noise of every robot is estimated along the way.
 
-    Delays are estimated where the data have twists. Evenly spread rows come first, all rows finish.
+    Delays, which sum to zero, are estimated where the data have twists.
     """
-    rows, count = data.valid.shape
+    count = data.count
     own = np.arange(OWN if data.twist is not None else OWN - 1)
-    unknown = np.concatenate([OWN * i + own for i in range(count) if i != reference])
-    team, noise = start, np.full((count, 2), GUESS) if noise is None else noise
-    every = rows // FEW_ROWS
-    if every > 1:
-        thin = slice(None, None, every)
-        few = fit_poses(data.rows(thin), replace(start, motion=start.motion[thin]), reference, noise)
-        noise, team = few.noise, replace(few.team, motion=data.motion_seen(few.team.grasps, few.team.homes))
-    for _ in range(STEPS):
-        linear = linearise(data, team, noise)
-        new = pose_noise(linear.residual, data.valid, linear.J, noise)
-        quiet = np.abs(np.log(new / noise)).max() < NOISE_SETTLED
-        last = solved(linear, unknown, noise, rows)
-        if quiet and float(last.step @ linear.pull[unknown]) < SETTLED:
-            break
-        team = moved(data, team, linear, unknown, last.step)
+    unknown = np.concatenate([OWN * i + (own if i != reference else own[OWN - 1 :]) for i in range(count)])
+    timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
+    team, path = start, None
+    noise = known = np.full((count, 2), GUESS) if noise is None else noise
+    H, common, solver = _informed(data, team.grasps, noise, unknown)
+    for step_number in range(STEPS):
+        here = Rows.settled(data, team, noise, 1, path)
+        # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
+        new = here.noise(noise) if step_number >= near else noise
+        quiet = step_number >= near and bool(np.abs(np.log(new / noise)).max() < close.noise)
         noise = new
-    return PoseFit(team, linear, noise, unknown, last)
+        if 0 < step_number <= near or np.abs(np.log(noise / known)).max() > RENEWED:
+            known, (H, common, solver) = noise, _informed(data, team.grasps, noise, unknown)
+        pull = here.pull(noise)[unknown] - common * timed * team.delays.sum()
+        step = solver.step(pull)
+        if quiet and float(step @ pull) < close.chi2:
+            break
+        full = np.zeros(OWN * count)
+        full[unknown] = step
+        each, path = full.reshape(-1, OWN), (here.turns, here.places)
+        team = replace(
+            team, grasps=team.grasps @ exp(each[:, :6]), homes=team.homes @ exp(each[:, 6:12]),
+            delays=team.delays + each[:, 12],
+        )  # fmt: skip
+    return PoseFit(reference, here, H, noise, unknown, solver)

@@ -10,6 +10,10 @@ from steelyard.logs.log import Mask
 ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
 LEAST = np.array([1e-7, 1e-7])
+# Scoring ends where noise changes by less than this share: the step after would change it by about its square.
+SETTLED = 1e-4
+# That robots of a team err alike counts as much as so many rows.
+ALIKE = 1.0
 
 
 def pose_noise(residual: Array, valid: Mask, J: Array, noise: Array) -> Array:
@@ -19,7 +23,7 @@ def pose_noise(residual: Array, valid: Mask, J: Array, noise: Array) -> Array:
     noise     (N, 2) to begin with
 
     The motion of the payload takes up six combinations of the residuals, so that their scatter S is that of
-    (1 - J A^-1 J^T W) n. Expectation maximisation on S: no pass over the rows. Only rows where all robots speak count.
+    (1 - J A^-1 J^T W) n; no pass over the rows. Only rows where all robots speak count.
     """
     count = valid.shape[1]
     rows = residual[valid.all(1)].reshape(-1, 6 * count)
@@ -29,20 +33,33 @@ def pose_noise(residual: Array, valid: Mask, J: Array, noise: Array) -> Array:
 
 
 def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Array:
-    """Return the same from the scatter (6 N, 6 N) of residuals, or of measured twists, of which J explains six."""
+    """Return the same from the scatter (6 N, 6 N) of residuals, or of measured twists, of which J explains six.
+
+    Restricted maximum likelihood by Fisher scoring, with a faint belief that the robots of a team err alike: two grasps
+    alone tell the sum of their noise, not who makes it.
+    Source: Patterson and Thompson 1971.
+    """
     count = len(noise)
     if not rows:
         return noise
-    S = scatter / rows
     stack = J.reshape(6 * count, 6)
-    variance = noise**2
+    variance = noise.ravel() ** 2
+    likeness = ALIKE * np.kron(np.eye(count) - 1 / count, np.eye(2))
     for _ in range(ROUNDS):
-        W = np.repeat(1 / variance, 3, axis=1).ravel()
-        A = np.linalg.inv((stack * W[:, None]).T @ stack)
-        P = np.eye(6 * count) - stack @ A @ (stack * W[:, None]).T
-        expected = np.diag(P @ S @ P.T) + np.einsum("ka,ab,kb->k", stack, A, stack)
-        new = np.maximum(expected.reshape(count, 2, 3).mean(-1), LEAST**2)
-        if np.abs(np.log(new / variance)).max() < 1e-3:
-            return np.asarray(np.sqrt(new))
+        W = np.repeat(1 / variance, 3)
+        pulled = stack * W[:, None]
+        lever = pulled @ np.linalg.inv(pulled.T @ stack)
+        M = np.diag(W) - lever @ pulled.T
+        MS = W[:, None] * scatter - lever @ (pulled.T @ scatter)
+        seen = np.einsum("ab,ab->a", MS, M).reshape(-1, 3).sum(1)
+        size = np.diag(M).reshape(-1, 3).sum(1)
+        slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
+        squares = (M**2).reshape(2 * count, 3, 2 * count, 3).sum((1, 3))
+        curve = 0.5 * rows * np.outer(variance, variance) * squares + likeness
+        change = np.linalg.solve(curve + 1e-9 * np.trace(curve) / len(curve) * np.eye(len(curve)), slope)
+        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), np.tile(LEAST**2, count))
+        moved = float(np.abs(np.log(new / variance)).max())
         variance = new
-    return np.asarray(np.sqrt(variance))
+        if moved < SETTLED:
+            break
+    return np.asarray(np.sqrt(variance).reshape(count, 2))

@@ -13,13 +13,14 @@ from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
+from steelyard.spatial.screws import log_pose
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
-from steelyard.team.pose_fit import FEW_ROWS, PoseFit, fit_poses
+from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
-from steelyard.team.poses import TeamMotion
+from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
 from steelyard.team.slips import SlipAt, alone, edited, find_slip
 from steelyard.team.stacked import Stretch, all_poses, stretches
@@ -29,9 +30,13 @@ PUNCTUAL = 2e-4
 # A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
 DOUBTED = 4.0
 CLOCK_ROUNDS = 6
+# Rows that are enough to come near the optimum; all rows then finish.
+FEW_ROWS = 1500
+# Sweeps over a row with which the motion follows grasps and homes from wherever it was.
+FOLLOWED = 2
 MOST_SLIPS = 3
 # Noise above this share of the motion asks whether the payload is rigid.
-ROUGH = 0.05
+LOUD = 0.05
 
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
@@ -47,7 +52,7 @@ def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, 
 
 @dataclass(frozen=True, eq=False)
 class PoseTeam:
-    """Recordings with their clocks right, the joint fit of poses, and how late each clock is [s]."""
+    """Recordings with their clocks right, the joint fit of poses, and how late each clock is [s]: zero on average."""
 
     parts: tuple[Stretch, ...]
     fit: PoseFit
@@ -64,47 +69,43 @@ class PoseTeam:
         raw = stretches(log, {})
         resting = idle(raw)
         if not any(rows.any() for rows in resting):
-            return cls._fitted(log, clocks, _unchanged)._without_slips(log, clocks, _unchanged)
-        first = cls._fitted(log, clocks, lambda parts: _unseen(parts, resting))
+            return cls._fitted(log, clocks, raw, _unchanged)._without_slips(log, clocks, raw, _unchanged)
+        first = cls._fitted(log, clocks, raw, lambda parts: _unseen(parts, resting))
         off = first.off(log)
 
         def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
             return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
 
         found = presence_findings(raw, edit(raw), log.names)
-        team = cls._fitted(log, clocks, edit)._without_slips(log, clocks, edit)
+        team = cls._fitted(log, clocks, raw, edit)._without_slips(log, clocks, raw, edit)
         return replace(team, findings=(*found, *team.findings))
 
     @classmethod
-    def _fitted(cls, log: TeamLog, clocks: bool, edit: Edit) -> PoseTeam:
+    def _fitted(cls, log: TeamLog, clocks: bool, parts: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
+        """Return the fit of recordings as they are (`parts`) after an edit."""
         reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
-        parts = edit(stretches(log, late))
+        parts = edit(parts)
         data = TeamMotion(*all_poses(parts))
         start = first_team(data, reference, log.names)
-        few = slice(None, None, max(1, len(data.valid) // FEW_ROWS if clocks else 1))
-        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference)
-        if len(data.valid) > len(fit.team.motion.position):
-            fit = replace(fit, team=replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes)))
+        few = slice(None, None, max(1, len(data.valid) // FEW_ROWS))
+        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
         if not clocks:
-            return cls(parts, fit, late)
+            return cls(parts, fit_poses(data, _followed(data, fit), reference, fit.noise), late)
         for _ in range(CLOCK_ROUNDS):
-            timed = replace(data, twist=_twists(parts, fit))
-            fit = fit_poses(timed, replace(fit.team, delays=np.zeros(len(log.names))), reference, fit.noise)
+            team = _followed(data, fit)
+            timed = replace(data, twist=_twists(parts, team))
+            fit = fit_poses(timed, replace(team, delays=np.zeros(len(log.names))), reference, fit.noise)
             step = fit.team.delays
-            doubt = np.zeros_like(step)
-            timed_ones = fit.unknown % OWN == OWN - 1
-            doubt[fit.unknown[timed_ones] // OWN] = np.sqrt(np.diag(fit.solved.inverse)[timed_ones])
+            doubt = np.sqrt(np.diag(fit.solved.inverse)[fit.unknown % OWN == OWN - 1])
             late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
             if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * doubt)).all():
                 break
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
-            if data.valid.shape[0] != len(fit.team.motion.position):
-                fit = replace(fit, team=replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes)))
         return cls(parts, fit, late)
 
-    def _without_slips(self, log: TeamLog, clocks: bool, edit: Edit) -> PoseTeam:
+    def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
         """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were."""
         team, slips = self, list[SlipAt]()
         for _ in range(MOST_SLIPS):
@@ -112,16 +113,16 @@ class PoseTeam:
             if found is None:
                 break
             # Once more without what follows the slip, which has bent the first fit.
-            team = self._fitted(log, clocks, edited(edit, [*slips, found]))
+            team = self._fitted(log, clocks, raw, edited(edit, [*slips, found]))
             slips.append(team._measured(log, found))
         if not slips:
             return self
-        team = self._fitted(log, clocks, edited(edit, slips))
+        team = self._fitted(log, clocks, raw, edited(edit, slips))
         return replace(team, findings=tuple(slip.finding(log) for slip in slips))
 
     def _slip(self, log: TeamLog) -> SlipAt | None:
         best, start = None, 0
-        apart = alone(self.fit.linear.residual, self.fit.linear.J, self.fit.linear.W)
+        apart = alone(self.fit.rows.residual, self.fit.J, self.fit.W)
         for number, part in enumerate(self.parts):
             rows = slice(start, start + len(part))
             start += len(part)
@@ -144,7 +145,7 @@ class PoseTeam:
         middle = Rotation.nearest(path.rotation.matrix.mean(0))
         turned = float(np.sqrt(((middle.inverse() @ path.rotation).log() ** 2).mean()))
         moved = float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))
-        return bool((self.fit.noise > ROUGH * np.array([turned, moved])).any())
+        return bool((self.fit.noise > LOUD * np.array([turned, moved])).any())
 
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""
@@ -175,32 +176,38 @@ class PoseTeam:
         """
         gravity, fit = self.gravity(log), self.fit
         frame = balance_frame(fit.team.grasps)
-        noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", fit.linear.J, fit.linear.W, fit.linear.J))
+        noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", fit.J, fit.W, fit.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
-        out, start = [], 0
+        out, start, residual = [], 0, fit.rows.residual
         for part in self.parts:
             rows = slice(start, start + len(part))
             start += len(part)
             body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
-            out.append((body, fit.linear.residual[rows]))
+            out.append((body, residual[rows]))
         return out, noise
 
 
-def _twists(parts: tuple[Stretch, ...], fit: PoseFit) -> Array:
-    """Return how each grasp's pose moves (T, N, 6) in its own axes per second that its stamps are late."""
-    J, start, out = adjoint_inverse(fit.team.grasps), 0, []
+def _followed(data: TeamMotion, fit: PoseFit) -> Team:
+    """Return the team of a fit with the motion that its grasps and homes give the rows of `data`."""
+    seen = replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes), delays=0 * fit.team.delays)
+    return Rows.settled(data, seen, fit.noise, FOLLOWED).team
+
+
+def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
+    """Return how each grasp's pose moves (T, N, 6) in its own axes per second that its stamps are late.
+
+    At the ends of recordings, where only one side is known, it stays zero.
+    """
+    J, start, out = adjoint_inverse(team.grasps), 0, []
     for part in parts:
-        motion = fit.team.motion[start : start + len(part)]
+        motion = team.motion[start : start + len(part)]
         start += len(part)
         half = max(1, round(0.05 * part.rate))
         twist = np.zeros((len(part), 6))
         if len(part) > 2 * half:
-            before, after = motion[: -2 * half], motion[2 * half :]
-            R = motion[half:-half].rotation.inverse()
-            span = 2 * half / part.rate
-            twist[half:-half, :3] = (before.rotation.inverse() @ after.rotation).log() / span
-            twist[half:-half, 3:] = R.apply(after.position - before.position) / span
-        out.append(-np.einsum("nij,tj->tni", J, twist))
+            between = motion[: -2 * half].inverse() @ motion[2 * half :]
+            twist[half:-half] = log_pose(between) * (part.rate / (2 * half))
+        out.append(-np.einsum("nij,tj->tni", J, twist, optimize=True))
     return np.concatenate(out)
 
 

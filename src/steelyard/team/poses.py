@@ -20,7 +20,7 @@ class TeamMotion:
 
     poses  X_HG (T, N); where not `valid` they hold anything finite
     valid  (T, N) whether the robot has a pose at that time
-    twist  (T, N, 6) of each grasp in its own axes, for delays; None where they are not asked for
+    twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; None where not asked for
     """
 
     poses: Pose
@@ -52,18 +52,14 @@ class TeamMotion:
         return homes[first] @ self.poses[np.arange(len(first)), first] @ grasps[first].inverse()
 
     @cached_property
-    def features(self) -> Array:
-        """The features (T, N * 25) of every row; see pose_rows."""
-        twist = np.zeros((*self.valid.shape, 6)) if self.twist is None else self.twist
-        return pose_rows.features(self.poses.rotation.matrix, self.poses.position, twist, self.valid)
-
-    @cached_property
     def scatter(self) -> list[Array]:
-        """Scatter (25 N, 25 N) of the features per pattern."""
+        """Scatter (25 N, 25 N) of the features of every row per pattern; see pose_rows."""
+        twist = np.zeros((*self.valid.shape, 6)) if self.twist is None else self.twist
+        rows = pose_rows.features(self.poses.rotation.matrix, self.poses.position, twist, self.valid)
         found, place = self.patterns
         if len(found) == 1:
-            return [self.features.T @ self.features]
-        chosen = [self.features[place == k] for k in range(len(found))]
+            return [rows.T @ rows]
+        chosen = [rows[place == k] for k in range(len(found))]
         return [F.T @ F for F in chosen]
 
 

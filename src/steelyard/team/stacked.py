@@ -55,9 +55,12 @@ class Stretch:
 def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     """Return every recording with its clocks put right by `late` [s], seconds that each robot's stamps are late.
 
-    Raises BadValue where the corrected clocks no longer overlap.
+    Rows are told by the reference's clock as it is, whatever `late` says of it. Raises BadValue where the corrected
+    clocks no longer overlap.
     """
-    return tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+    made = tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+    own = late.get(log.reference, 0.0)
+    return tuple(replace(part, time=part.time + own) for part in made) if own else made
 
 
 def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
@@ -84,7 +87,7 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
         if track.has("rotation", "position"):
             turned, had = rotation_at(track, time)
             turns[i] = turned[:, None]
-            place[:, i], placed = channel_at(track, "position", time)
+            place[:, i], placed = _place_at(track, time)
             seen[:, i] = bridged(had & placed)
         if track.has("force"):
             wrench[:, i, 3:], felt[:, i] = channel_at(track, "force", time)
@@ -103,6 +106,20 @@ def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:
         return track.pose.rotation, good
     vectors, turned = channel_at(track, "rotation", time)
     return mean_rotation(track) @ Rotation.exp(vectors), turned
+
+
+def _place_at(track: Track, time: Array) -> tuple[Array, Mask]:
+    """Return a track's positions at `time` (M,), and where they were measured.
+
+    A curve without overshoot depends on its axes: the grasp's own on average are taken, which no home changes.
+    """
+    good = track.valid["position"]
+    if good.all() and len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6):
+        return track.channels["position"], good
+    turn = mean_rotation(track)
+    own = replace(track, channels={**track.channels, "position": turn.inverse().apply(track.channels["position"])})
+    values, placed = channel_at(own, "position", time)
+    return turn.apply(values), placed
 
 
 def bridged(good: Mask) -> Mask:

@@ -11,15 +11,17 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.logs.log import Mask
+from steelyard.logs.log import Integers, Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
 from steelyard.team.pose_covariance import Spread
-from steelyard.team.pose_fit import NOISE_SETTLED, SETTLED, SHOWN
+from steelyard.team.pose_fit import EXACT, SHOWN
 from steelyard.team.pose_noise import noise_of_scatter
 from steelyard.team.twist_statistic import TwistScatter
 
@@ -38,6 +40,8 @@ def _ad() -> Array:
 
 
 AD = _ad()
+# Where its entries are that are not zero, and what they are.
+PLACES, SIGNS = np.argwhere(AD != 0).astype(np.int64), AD[AD != 0]
 
 
 @dataclass(frozen=True, eq=False)
@@ -58,15 +62,17 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Tw
     unknown = np.concatenate([6 * i + np.arange(6) for i in range(data.count) if i != reference])
     noise = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), np.full((data.count, 2), 1e-2))
     for _ in range(STEPS):
-        H, g, floor = _normal(merged, grasps, noise)
-        step, inverse, lost = _solved(H, g, floor, unknown)
         new = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), noise)
-        quiet = np.abs(np.log(new / noise)).max() < NOISE_SETTLED
-        if quiet and float(step @ g[unknown]) < SETTLED:
+        quiet = np.abs(np.log(new / noise)).max() < EXACT.noise
+        noise = new
+        H, g, floor = _normal(merged, grasps, noise)
+        step = _step(H, g, floor, unknown)
+        if quiet and float(step @ g[unknown]) < EXACT.chi2:
             break
         full = np.zeros(6 * data.count)
         full[unknown] = step
-        grasps, noise = grasps @ exp(full.reshape(-1, 6)), new
+        grasps = grasps @ exp(full.reshape(-1, 6))
+    inverse, lost = _shown(H, floor, unknown)
     factor = np.sqrt(_inflation(data, grasps, noise, H + floor, unknown))
     size = factor[(unknown % 6) // 3]
     covariance = inverse @ ((H + floor)[np.ix_(unknown, unknown)] * np.outer(size, size)) @ inverse
@@ -152,13 +158,37 @@ def _full(merged: TwistScatter) -> tuple[Array, float]:
     return merged.scatter[best][:size, :size], float(merged.rows[best] if merged.spoke[best].all() else 0.0)
 
 
-def _projections(spoke: Array, grasps: Pose, noise: Array) -> tuple[Array, Array, Array]:
-    """Return P and Pi (6 N, 6 N) of one pattern, and J A^-1 J^T: what the fitted twists still hold of the noise."""
-    W = (np.repeat(noise**-2.0, 3, axis=1) * spoke[:, None]).ravel()
-    J = adjoint_inverse(grasps).reshape(-1, 6)
-    J = J * np.repeat(spoke, 6)[:, None]
-    held = J @ np.linalg.inv((J * W[:, None]).T @ J) @ J.T
-    return np.diag(W) - W[:, None] * held * W, held * W, held
+@dataclass(frozen=True, eq=False)
+class _Split:
+    """What of measured twists y (6 N) is the payload's, J c with c = A^-1 (W J)^T y, and what is left, W y - W J c.
+
+    W  (6 N,) weights, zero for robots that did not speak     J, WJ  (6 N, 6)     inner  A^-1 (6, 6)
+    """
+
+    W: Array
+    J: Array
+    WJ: Array
+    inner: Array
+
+    @classmethod
+    def of(cls, spoke: Array, grasps: Pose, noise: Array) -> _Split:
+        W = (np.repeat(noise**-2.0, 3, axis=1) * spoke[:, None]).ravel()
+        J = adjoint_inverse(grasps).reshape(-1, 6) * np.repeat(spoke, 6)[:, None]
+        WJ = J * W[:, None]
+        return cls(W, J, WJ, np.asarray(np.linalg.inv(WJ.T @ J), dtype=np.float64))
+
+    @property
+    def P(self) -> Array:
+        """The weight (6 N, 6 N) of twists with the payload's eliminated."""
+        return np.diag(self.W) - self.WJ @ self.inner @ self.WJ.T
+
+    def scores(self, y: Array) -> Array:
+        """Return sum ad(y_i)^T (P y)_i (6 N,) of twists with scatter y (6 N, 6 N)."""
+        c = self.inner @ (self.WJ.T @ y)
+        left, count = self.W[:, None] * y - self.WJ @ c, len(self.W) // 6
+        # (P y) (J c)^T with c = A^-1 (W J)^T y: only the blocks of a grasp with itself.
+        mixed = (left @ self.WJ @ self.inner).reshape(count, 6, 6) @ self.J.reshape(count, 6, 6).swapaxes(1, 2)
+        return np.asarray(np.einsum("cak,nck->na", AD, mixed).ravel())
 
 
 def _normal(merged: TwistScatter, grasps: Pose, noise: Array) -> tuple[Array, Array, Array]:
@@ -166,46 +196,58 @@ def _normal(merged: TwistScatter, grasps: Pose, noise: Array) -> tuple[Array, Ar
     size = 6 * merged.count
     H, g, floor = np.zeros((size, size)), np.zeros(size), np.zeros((size, size))
     for S, rows, spoke in zip(merged.scatter, merged.rows, merged.spoke, strict=True):
-        P, fitted, held = _projections(spoke, grasps, noise)
-        y = S[:size, :size]
-        H += _contracted(P, fitted @ y @ fitted.T)
-        floor += _contracted(P, rows * held)
-        g += _scores(P @ y @ fitted.T)
+        split, y = _Split.of(spoke, grasps, noise), S[:size, :size]
+        P, fitted = split.P, split.J @ split.inner
+        payload = split.WJ.T @ y @ split.WJ
+        H += contracted(P, fitted @ payload @ fitted.T, PLACES, SIGNS)
+        floor += contracted(P, rows * (fitted @ split.J.T), PLACES, SIGNS)
+        g += split.scores(y)
     return H - floor, g, floor
 
 
-def _scores(mixed: Array) -> Array:
-    """Return sum ad(y_i)^T (P y)_i from sum (P y) (Pi y)^T."""
-    count = len(mixed) // 6
-    blocks = mixed.reshape(count, 6, count, 6)[np.arange(count), :, np.arange(count)]
-    return np.asarray(np.einsum("cak,nck->na", AD, blocks).ravel())
-
-
-def _contracted(P: Array, S: Array) -> Array:
-    """Return sum_t ad(y_i)^T P_ij ad(y_j) for y with scatter S."""
+@numba.njit(cache=True)
+def contracted(P: Array, S: Array, places: Integers, signs: Array) -> Array:
+    """Return sum_t ad(y_i)^T P_ij ad(y_j) for y with scatter S (6 N, 6 N), from the entries of ad that are not zero."""
     count = len(P) // 6
-    p, s = P.reshape(count, 6, count, 6), S.reshape(count, 6, count, 6)
-    out = np.empty((count, 6, count, 6))
+    out = np.zeros_like(P)
     for i in range(count):
-        half = np.einsum("cak,cjd->akjd", AD, p[i], optimize=True)
-        half = np.einsum("akjd,kjl->ajdl", half, s[i], optimize=True)
-        out[i] = np.einsum("ajdl,dbl->ajb", half, AD, optimize=True)
-    return np.asarray(out.reshape(6 * count, 6 * count))
+        for j in range(count):
+            for m in range(len(signs)):
+                c, a, k = places[m]
+                for n in range(len(signs)):
+                    d, b, e = places[n]
+                    entry = P[6 * i + c, 6 * j + d] * S[6 * i + k, 6 * j + e]
+                    out[6 * i + a, 6 * j + b] += signs[m] * signs[n] * entry
+    return out
 
 
-def _solved(H: Array, g: Array, floor: Array, unknown: Array) -> tuple[Array, Array, Array]:
-    """Return the step, the inverse and the lost directions of the unknown steps.
+def _step(H: Array, g: Array, floor: Array, unknown: Array) -> Array:
+    """Return the step in the unknown parameters, in the directions that are shown."""
+    inner = H[np.ix_(unknown, unknown)]
+    try:
+        # All are shown where the information exceeds SHOWN^2 times that of noise along every direction.
+        np.linalg.cholesky(inner - SHOWN**2 * floor[np.ix_(unknown, unknown)])
+        return np.asarray(cho_solve(cho_factor(inner, lower=True), g[unknown]))
+    except LinAlgError:
+        return np.asarray(_shown(H, floor, unknown)[0] @ g[unknown])
+
+
+def _shown(H: Array, floor: Array, unknown: Array) -> tuple[Array, Array]:
+    """Return the inverse and the lost directions of the unknown steps.
 
     A direction is lost where its information is less than SHOWN^2 times what noise alone seems to say of it.
     """
-    H, g, floor = H[np.ix_(unknown, unknown)], g[unknown], floor[np.ix_(unknown, unknown)]
-    root = np.linalg.cholesky(floor + 1e-12 * np.diag(np.diag(floor) + 1e-300))
+    H, floor = H[np.ix_(unknown, unknown)], floor[np.ix_(unknown, unknown)]
+    try:
+        np.linalg.cholesky(H - SHOWN**2 * floor)
+        return np.asarray(np.linalg.inv(H)), np.zeros((len(unknown), 0))
+    except LinAlgError:
+        root = np.linalg.cholesky(floor + 1e-12 * np.diag(np.diag(floor) + 1e-300))
     back = np.linalg.inv(root)
     values, vectors = np.linalg.eigh(back @ H @ back.T)
     basis = back.T @ vectors
     shown = values > SHOWN**2
-    inverse = (basis[:, shown] / values[shown]) @ basis[:, shown].T
-    return inverse @ g, inverse, basis[:, ~shown]
+    return (basis[:, shown] / values[shown]) @ basis[:, shown].T, basis[:, ~shown]
 
 
 def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown: Array) -> Array:
@@ -213,8 +255,7 @@ def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown
     size = 6 * data.count
     windows = np.zeros((int(data.window.max()) + 1, size))
     for S, spoke, window in zip(data.scatter, data.spoke, data.window, strict=True):
-        P, fitted, _ = _projections(spoke, grasps, noise)
-        windows[window] += _scores(P @ S[:size, :size] @ fitted.T)
+        windows[window] += _Split.of(spoke, grasps, noise).scores(S[:size, :size])
     if len(windows) < 4:
         return np.ones(2)
     ratio = (windows**2).sum(0)[unknown] / np.maximum(np.diag(H)[unknown], 1e-300)
@@ -228,11 +269,12 @@ def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) ->
     size = 6 * count
     H, g = np.zeros((count, count)), np.zeros(count)
     for S, spoke in zip(merged.scatter, merged.spoke, strict=True):
-        P, fitted, _ = _projections(spoke, grasps, noise)
-        rate = fitted @ S[size:, size:] @ fitted.T
+        split = _Split.of(spoke, grasps, noise)
+        P, fitted = split.P, split.J @ split.inner
+        rate = fitted @ (split.WJ.T @ S[size:, size:] @ split.WJ) @ fitted.T
         H += (P * rate).reshape(count, 6, count, 6).sum((1, 3))
-        mixed = P @ S[:size, size:] @ fitted.T
-        g -= np.diag(mixed).reshape(count, 6).sum(1)
+        mixed = P @ (S[:size, size:] @ split.WJ)
+        g -= np.einsum("ak,ak->a", mixed, fitted).reshape(count, 6).sum(1)
     others = np.arange(count) != reference
     delays, std = np.zeros(count), np.zeros(count)
     inverse = np.linalg.pinv(H[np.ix_(others, others)], hermitian=True)

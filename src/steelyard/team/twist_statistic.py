@@ -76,12 +76,16 @@ class TwistScatter:
         patterns, which = np.unique(self.spoke, axis=0, return_inverse=True)
         scatter = np.zeros((len(patterns), *self.scatter.shape[1:]))
         rows = np.zeros(len(patterns))
-        np.add.at(scatter, which.ravel(), self.scatter)
-        np.add.at(rows, which.ravel(), self.rows)
+        for k, S, count in zip(which.ravel(), self.scatter, self.rows, strict=True):
+            scatter[k] += S
+            rows[k] += count
         return TwistScatter(scatter, rows, patterns, np.zeros(len(patterns), np.int64))
 
     def pair(self, i: int, j: int) -> Array:
         """Return the scatter (12, 12) of the twists of two robots over rows in which both spoke."""
         both = self.spoke[:, i] & self.spoke[:, j]
         place = np.concatenate([6 * i + np.arange(6), 6 * j + np.arange(6)])
-        return np.asarray(self.scatter[both].sum(0)[np.ix_(place, place)])
+        out = np.zeros((12, 12))
+        for k in np.flatnonzero(both):
+            out += self.scatter[k][np.ix_(place, place)]
+        return out
