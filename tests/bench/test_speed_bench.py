@@ -13,7 +13,7 @@ from steelyard.parts.clustering import cluster
 
 @pytest.fixture(scope="module")
 def result():
-    done = CliRunner().invoke(bench, ["speed", "--tets", "400", "--many", "600", "--repeats", "1", "--json"])
+    done = CliRunner().invoke(bench, "speed --tets 400 --many 600 --repeats 1 --hull-sets 600 --json".split())
     assert done.exit_code == 0, done.output
     return json.loads(done.stdout)
 
@@ -27,6 +27,13 @@ def test_ours_and_its_rival_make_the_same_tree_and_ours_is_faster(result):
     assert ratios["htc_cold, eager"] > 5
     assert ratios["hull of 20 points"] > 2
     assert max(stages[f"hull_{n}_points_error"] for n in speed.POINTS) < 1e-12
+
+
+def test_hulls_of_every_kind_have_the_volume_that_qhull_says(result):
+    found = result["hull_sets"]
+    assert sum(found["count"].values()) == found["sets"] == 600
+    assert len(found["count"]) == 12
+    assert found["largest_error"] == max(found["error"].values()) < 1e-9
 
 
 def test_table_has_every_number(result):

@@ -13,6 +13,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
+from steelyard.bench import hull_sets
 from steelyard.bench.plain_clustering import plain_cluster
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
@@ -40,8 +41,10 @@ TIMING = (
 )
 
 
-def run(tets: int = 5000, many: int = 150_000, repeats: int = REPEATS, progress: Any = None) -> dict[str, Any]:
-    """Return stage times and in-run ratios; `many` = 0 leaves out the large solid."""
+def run(
+    tets: int = 5000, many: int = 150_000, repeats: int = REPEATS, progress: Any = None, *, sets: int = 0
+) -> dict[str, Any]:
+    """Return stage times, in-run ratios, and how `sets` sets of points compare with Qhull; 0 leaves a step out."""
     if tets < 100 or repeats < 1:
         raise BadValue(f"the solid needs at least 100 tets and a time at least one run; got {tets} and {repeats}.")
     steps: list[Callable[[], dict[str, Any]]] = [partial(_clustering, tets, repeats), partial(_hulls, repeats)]
@@ -53,6 +56,8 @@ def run(tets: int = 5000, many: int = 150_000, repeats: int = REPEATS, progress:
             found[name].update(part)
         if progress is not None:
             progress(k + 1, len(steps))
+    if sets:
+        found["hull_sets"] = hull_sets.run(sets, progress)
     return found
 
 
@@ -60,7 +65,18 @@ def speed_table(result: dict[str, Any]) -> str:
     """Return stage times and ratios, a line each."""
     lines = [f"  {name:34s} {value:12.3f}" for name, value in result["stages"].items()]
     ratios = [f"  {name:34s} {value:12.1f} x" for name, value in result["ratios"].items()]
-    return "\n".join([result["timing"], "", "stages", *lines, "", "rival / ours", *ratios])
+    return "\n".join([result["timing"], "", "stages", *lines, "", "rival / ours", *ratios, *_sets_lines(result)])
+
+
+def _sets_lines(result: dict[str, Any]) -> list[str]:
+    """Return the largest error of a hull's volume per kind of set, where sets were compared."""
+    if "hull_sets" not in result:
+        return []
+    found = result["hull_sets"]
+    lines = [
+        f"  {kind:34s} {error:12.1e}   {found['faults'][kind]} given back" for kind, error in found["error"].items()
+    ]
+    return ["", f"volume of {found['sets']} hulls against Qhull, seed {found['seed']}: largest relative error", *lines]
 
 
 def tool_solid(tets: int, seed: int = 0) -> TetMesh:

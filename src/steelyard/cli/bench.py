@@ -166,12 +166,15 @@ def team(trials: int, as_json: bool, **choices: Any) -> None:
 @click.option("--tets", type=click.IntRange(min=100), default=5000, show_default=True, help="Tetrahedra of the solid.")
 @click.option("--many", type=click.IntRange(min=0), default=150_000, show_default=True, help="And of the large one.")
 @click.option("--repeats", type=click.IntRange(min=1), default=20, show_default=True, help="Runs per time.")
+@click.option(
+    "--hull-sets", type=click.IntRange(min=0), default=12_000, show_default=True, help="Sets of points against Qhull."
+)
 @_JSON
-def speed(tets: int, many: int, repeats: int, as_json: bool) -> None:
+def speed(tets: int, many: int, repeats: int, hull_sets: int, as_json: bool) -> None:
     """How fast are clusters and hulls, beside the same algorithm with SciPy's Qhull?"""
     from steelyard.bench import speed as job
 
-    result = job.run(tets, many, repeats, progress_bar("bench speed"))
+    result = job.run(tets, many, repeats, progress_bar("bench speed"), sets=hull_sets)
     print_json(result) if as_json else click.echo(job.speed_table(result))
 
 

@@ -12,11 +12,12 @@ from steelyard.findings import Finding
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.material_choice import Choices
+from steelyard.identify.placement import misplaced
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
 
-# A part is "at zero" below this share of the whole.
-ZERO_SHARE = 1e-3
+# A part with more than this share of the volume is "at zero" below a hundredth of the mean density.
+ZERO_SHARE, ZERO_DENSITY = 1e-3, 1e-2
 # A combination of part masses counts as seen where the data fix it to this share of the whole mass.
 SEEN_SHARE = 0.5
 # Centroids lie in a plane where their spread across it is below this share of the spread along it.
@@ -47,7 +48,7 @@ def part_findings(
         text = (
             f"Homogeneous parts of this shape leave a chi-square of {misfit:.0f} that ten free numbers do not "
             f"(at most {limit:.0f} by chance): a part is not of one density, or the shape is wrong."
-        )
+        ) + misplaced(data, parts)
         out.append(Finding.of("part-not-homogeneous", text))
     return out
 
@@ -59,18 +60,17 @@ def misfit_limit(data: Effective, parts: int, chance: float = MISFIT_CHANCE) -> 
 
 def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:
     """Return the finding on parts with next to no mass."""
-    zero = [p.label for p in estimate.parts if p.mass < ZERO_SHARE * estimate.mass]
-    if not zero:
+    share = parts.volume / parts.volume.sum()
+    mass = np.array([part.mass for part in estimate.parts])
+    zero = (share > ZERO_SHARE) & (mass < ZERO_DENSITY * share * estimate.mass)
+    if not zero.any():
         return []
-    share = float(parts.volume[np.isin(parts.label, zero)].sum() / parts.volume.sum())
-    if share < ZERO_SHARE:
-        return []
-    names = ", ".join(map(str, zero))
-    return [
-        Finding.of(
-            "part-zero-mass", f"Part {names} has less than 0.1 % of the mass but {100 * share:.2g} % of the volume."
-        )
-    ]
+    names = " and ".join(map(str, parts.label[zero]))
+    text = (
+        f"Part {names} weighs {1e3 * mass[zero].sum():.2g} g: less than a hundredth of what "
+        f"{100 * share[zero].sum():.2g} % of the volume would at the mean density."
+    )
+    return [Finding.of("part-zero-mass", text)]
 
 
 def named_materials(count: int, choices: Choices | None, materials: Sequence[Material]) -> list[str | None]:

@@ -34,6 +34,7 @@ from steelyard.identify.part_models import (
     material_masses,
 )
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
+from steelyard.identify.placement import misplaced
 from steelyard.identify.problem import Problem
 from steelyard.identify.shape_error import EXACT, MEASURED, ShapeError
 from steelyard.identify.solution import Solution
@@ -136,7 +137,7 @@ class PartMasses:
             found = uneven(seen, self.parts)
             if found is not None:
                 others = (f for f in findings if f.code != "part-not-homogeneous")
-                said = Finding.of("part-not-homogeneous", found.message)
+                said = Finding.of("part-not-homogeneous", found.message + misplaced(seen, self.parts))
                 return self._with_freed(problem, data, found).with_findings(*others, said)
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)

@@ -100,4 +100,7 @@ def shape_of(
     if refill is not None:
         mesh = refill(solid.mesh)
         solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)))
-    return Shape(solid, segment(solid.cloud, solid, parts=parts), seen if isinstance(seen, Scan) else None)
+    # Normals that were found and not measured blur at edges: they would split one colour by its shading.
+    measured = (seen.cloud if isinstance(seen, Scan) else seen).normals is not None
+    cloud = solid.cloud if measured else replace(solid.cloud, normals=None)
+    return Shape(solid, segment(cloud, solid, parts=parts), seen if isinstance(seen, Scan) else None)

@@ -1,0 +1,65 @@
+"""An object that is not where it is said to be: the log's centre of mass tells, in millimetres."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from steelyard.identify.effective import Effective
+from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.placement import misplaced
+from steelyard.inertia import InertialParameters
+from steelyard.parts.parts import Parts
+from steelyard.simulate.handling import handling_log
+from steelyard.spatial import Pose, Rotation
+
+MASSES = np.array([0.4, 0.1])
+
+
+def block(size: tuple[float, float, float], centre: tuple[float, float, float]) -> np.ndarray:
+    """Ten parameters of a box at 1 kg/m^3."""
+    sides = np.array(size)
+    volume = float(np.prod(sides))
+    inertia = volume / 12 * np.diag((sides**2).sum() - sides**2)
+    return np.asarray(InertialParameters.from_com(volume, np.array(centre), inertia).vector)
+
+
+CLUB = Parts(np.arange(2), np.stack([block((0.03, 0.1, 0.03), (0, 0.2, 0)), block((0.02, 0.2, 0.02), (0, 0.05, 0))]))
+
+
+def seen(parts: Parts, body: InertialParameters, std: float = 1e-4) -> Effective:
+    """What a log says that knows phi to `std`."""
+    information = np.eye(10) / std**2
+    return Effective(information, information @ body.vector, np.zeros(0), np.zeros((0, 10)))
+
+
+def moved(shift: tuple[float, float, float]) -> Parts:
+    return CLUB.in_frame(Pose(Rotation.identity(), np.array(shift)))
+
+
+def test_nothing_is_said_where_some_masses_give_the_centre_of_mass() -> None:
+    for masses in (MASSES, MASSES[::-1], np.array([1.0, 0.0])):
+        assert misplaced(seen(CLUB, CLUB.whole(masses)), CLUB) == ""
+    assert misplaced(seen(CLUB, CLUB.whole(MASSES)), moved((0, 0.01, 0))) == ""
+
+
+@pytest.mark.parametrize("shift", [(0.006, 0, 0), (0, 0, -0.006)])
+def test_a_shift_across_the_parts_is_told_in_millimetres(shift: tuple[float, float, float]) -> None:
+    said = misplaced(seen(CLUB, CLUB.whole(MASSES)), moved(shift))
+    assert "6.0 mm from where any masses of even parts would" in said
+
+
+def test_a_centre_of_mass_outside_the_object_can_only_be_a_wrong_pose() -> None:
+    said = misplaced(seen(CLUB, CLUB.whole(MASSES)), moved((0.055, 0, 0)))
+    assert "40.0 mm outside the object: pose_in_sensor is wrong by at least that much." in said
+
+
+def test_a_gap_within_its_error_is_no_gap() -> None:
+    assert misplaced(seen(CLUB, CLUB.whole(MASSES), std=2e-3), moved((0.006, 0, 0))) == ""
+
+
+@pytest.mark.parametrize(("masses", "named"), [((0.4, 0.0), True), ((0.4, 0.004), False)])
+def test_a_part_without_mass_is_named_and_a_light_one_is_not(masses: tuple[float, float], named: bool) -> None:
+    log = handling_log(CLUB.whole(np.array(masses)), noise="low", seed=0)
+    estimate = PartMasses(CLUB, bias="none", density="free").identify(log)
+    assert ("part-zero-mass" in estimate.codes()) == named
