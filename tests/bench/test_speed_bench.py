@@ -13,7 +13,7 @@ from steelyard.parts.clustering import cluster
 
 @pytest.fixture(scope="module")
 def result():
-    done = CliRunner().invoke(bench, "speed --tets 400 --many 600 --repeats 1 --hull-sets 600 --json".split())
+    done = CliRunner().invoke(bench, "speed --tets 400 --many 600 --repeats 1 --hull-sets 600 --json")
     assert done.exit_code == 0, done.output
     return json.loads(done.stdout)
 
