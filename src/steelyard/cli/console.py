@@ -28,7 +28,7 @@ def say_if_compiling() -> None:
 
     root = Path(steelyard.__file__).parent
     if sys.stderr.isatty() and not any(root.glob("identify/__pycache__/*.nbi")):
-        say("Compiling numerical kernels (first run only, a few minutes) ...")
+        say("Compiling numerical kernels (first run only, about a minute) ...")
 
 
 def progress_bar(label: str) -> Callable[[int, int], None] | None:
