@@ -18,7 +18,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from steelyard.errors import BadFile
-from steelyard.io.tables import Columns, Header
+from steelyard.io.table_header import Columns, Header
 
 _WIDEST = 4096
 _DAMAGED = (ValueError, OSError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile)

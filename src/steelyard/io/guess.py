@@ -19,7 +19,8 @@ from steelyard.io.channels import channel
 from steelyard.io.description import EXAMPLE, Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
-from steelyard.io.tables import Header, Table
+from steelyard.io.table_header import Header
+from steelyard.io.tables import Table
 from steelyard.io.units import TIME, UNITS
 
 Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
-from steelyard.io.ply_files import write_bytes
+from steelyard.io.whole_files import write_bytes
 from steelyard.shape.mesh import Colours
 from steelyard.shape.views import Depths
 

@@ -13,8 +13,9 @@ import numpy as np
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
-from steelyard.io.ply_files import write_bytes, write_mesh
+from steelyard.io.ply_files import write_mesh
 from steelyard.io.recording_files import object_table
+from steelyard.io.whole_files import write_bytes
 from steelyard.parts.known import KnownObject
 
 PARTS_NOTE = (

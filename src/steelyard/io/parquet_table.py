@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
-from steelyard.io.tables import Columns, Header
+from steelyard.io.table_header import Columns, Header
 
 
 def _pyarrow() -> tuple[Any, Any]:

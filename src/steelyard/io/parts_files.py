@@ -20,7 +20,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.array_table import ArrayTable
-from steelyard.io.ply_files import write_bytes
+from steelyard.io.whole_files import write_bytes
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -10,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
+from steelyard.io.whole_files import write_bytes
 from steelyard.shape.mesh import TriangleMesh
 
 Column = np.ndarray[Any, np.dtype[Any]]
@@ -186,15 +186,3 @@ def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> 
     else:
         body = vertex.tobytes() + face.tobytes()
     write_bytes(path, header.encode() + body)
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file by way of a temporary one beside it; raises BadFile where that is not possible."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
-    finally:
-        temporary.unlink(missing_ok=True)

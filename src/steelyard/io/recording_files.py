@@ -8,7 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
-from steelyard.io.result_files import write_text
+from steelyard.io.whole_files import write_text
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Pose, Rotation
 

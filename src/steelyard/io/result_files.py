@@ -2,20 +2,18 @@
 
 from __future__ import annotations
 
-import contextlib
 import json
 import math
-import os
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadFile
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia import forms
 from steelyard.io.team_results import team_entries
+from steelyard.io.whole_files import write_text
 from steelyard.team.estimate import TeamEstimate
 
 
@@ -109,21 +107,3 @@ def _plain(value: Any) -> Any:
 def write_result(estimate: Estimate, path: Path | str) -> None:
     """Write the result as JSON; the file appears complete or not at all. Raises BadFile."""
     write_text(Path(path), json.dumps(result_dict(estimate), indent=1, allow_nan=False) + "\n")
-
-
-def write_text(path: Path, text: str) -> None:
-    """Write a text file, complete or not at all; raises BadFile."""
-    write_bytes(path, text.encode())
-
-
-def write_bytes(path: Path, content: bytes) -> None:
-    """Write a file by way of a temporary one beside it; raises BadFile where that is not possible."""
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_bytes(content)
-        temporary.replace(path)
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)

@@ -4,40 +4,18 @@ from __future__ import annotations
 
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any, Protocol
-
-import numpy as np
+from typing import Protocol
 
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.entries import close_match, listed
+from steelyard.io.table_header import Columns, Header
 
 Column = str | int
-Columns = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
 TEXT = (".csv", ".tsv", ".txt")
 BAGS = (".mcap", ".bag", ".db3")
 KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet"
-
-
-@dataclass(frozen=True)
-class Header:
-    """What a table holds before its rows are read.
-
-    names   one per column; None where a text file has no header
-    count   number of columns
-    groups  arrays with several columns (NPZ): name -> its column numbers
-    """
-
-    names: tuple[str, ...] | None
-    count: int
-    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
-
-    def shown(self) -> list[str]:
-        """Return the names to list in a message: arrays with several columns appear once."""
-        inner = {n for group in self.groups.values() for n in group}
-        return [*self.groups, *(name for n, name in enumerate(self.names or ()) if n not in inner)]
 
 
 class Table(Protocol):

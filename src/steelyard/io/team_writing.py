@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.result_files import write_bytes, write_text
+from steelyard.io.whole_files import write_bytes, write_text
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation

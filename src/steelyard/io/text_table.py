@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.tables import Columns, Header
+from steelyard.io.table_header import Columns, Header
 from steelyard.io.text_blocks import blocks, head_lines
 
 _WORDS = re.compile(r'"[^"]*"|\S+')

@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.images import read_colour, read_depth, write_image
-from steelyard.io.ply_files import write_bytes
+from steelyard.io.whole_files import write_bytes
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
 
