@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -160,6 +161,7 @@ def _timed(cloud: Cloud) -> tuple[Segmentation, dict[str, float]]:
     marks.append(time.thread_time())
     found = parts_of_pieces(pieces)
     marks.append(time.thread_time())
+    found = replace(found, findings=(*solid.findings, *found.findings))
     orient, enclosed, supervoxel, clustering = np.diff(marks).tolist()
     volume = enclosed - orient  # enclose orients, too
     return found, {

@@ -9,6 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
+from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
@@ -61,6 +62,16 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     from steelyard.shape.working_cloud import working_cloud
 
     used, findings = working_cloud(cloud, points)
+    X_CB, order = canonical(used.xyz)
+    made = _enclosed(used.chosen(order).in_frame(X_CB), findings)
+    normals = np.empty_like(used.xyz)
+    normals[order] = X_CB.inverse().rotation.apply(np.asarray(made.cloud.normals))
+    mesh = TetMesh.known(used.xyz, order[made.mesh.tets], made.mesh.volumes, made.mesh.neighbours)
+    return replace(made, mesh=mesh, cloud=replace(used, normals=normals))
+
+
+def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> Solid:
+    """Return the closed volume of points that need no more work, in their canonical frame and order."""
     surface, turned = _oriented(used)
     mesh, centres, votes = complex_of(used.xyz, surface)
     found = _winding_number(surface, centres)
@@ -73,8 +84,7 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     against = _against(surface, solid)
     if used.normals is not None and against > _TURNED:
         text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
-        again = enclose(replace(used, normals=None), points)
-        return replace(again, findings=(*findings, Finding.of("normals-flipped", text), *again.findings))
+        return _enclosed(replace(used, normals=None), (*findings, Finding.of("normals-flipped", text)))
     doubt = _doubt(mesh.volumes, found, votes)
     if doubt > _CLEAR:
         doubt += stacked(surface.xyz, surface.normals, surface.near.index, SLOPE)
