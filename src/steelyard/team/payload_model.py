@@ -79,7 +79,7 @@ def normal(part: Spectra, D: Array, W: Array, motion_noise: Array) -> Normal:
     E = basis()
     S = part.scatter
     H, g = np.zeros((16, 16)), np.zeros(16)
-    WE = np.einsum("kij,pjx->kpix", W, E, optimize=True)
+    WE = W[:, None] @ E
     flat = E.reshape(10, -1)
     H[:10, :10] = (WE @ S[:, None, :12, :12]).sum(0).reshape(10, -1) @ flat.T
     H[:10, 10:] = np.einsum("kpix,kx->pi", WE, S[:, :12, -1])

@@ -116,7 +116,7 @@ def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, 
     """Return weights (N, 2), the inverse information about the motion per pattern (C, 6, 6), and patterns (T,)."""
     J, W = adjoint_inverse(team.grasps), np.repeat(noise**-2.0, 3, axis=1)
     found, place = data.patterns
-    held = np.einsum("cn,nab->cab", found.astype(float), np.einsum("nia,ni,nib->nab", J, W, J, optimize=True))
+    held = np.einsum("cn,nab->cab", found.astype(float), np.swapaxes(J * W[:, :, None], 1, 2) @ J)
     # Rows that nobody saw say nothing: any motion will do.
     held[~found.any(1)] = np.eye(6)
     return noise**-2.0, np.linalg.inv(held), place

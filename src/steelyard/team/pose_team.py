@@ -207,7 +207,7 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
         if len(part) > 2 * half:
             between = motion[: -2 * half].inverse() @ motion[2 * half :]
             twist[half:-half] = log_pose(between) * (part.rate / (2 * half))
-        out.append(-np.einsum("nij,tj->tni", J, twist, optimize=True))
+        out.append(-np.moveaxis(J @ twist.T, 2, 0))
     return np.concatenate(out)
 
 
