@@ -87,7 +87,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
     say(f"The page with the parts in 3D: {output}")
     say(
-        f"Log and cloud are in {keep}; try: steelyard identify {log} --scan {keep / 'hammer.ply'}"
+        f"Log, cloud and parts are in {keep}; try: steelyard identify {log} --parts {keep / 'parts.npz'}"
         if keep
         else "Keep log, cloud and parts with --keep DIR."
     )

@@ -67,7 +67,10 @@ def _message(parts: Parts, search: Search, models: list[Freed], weight: Array) -
     named = [k for k in np.argsort(-chance, kind="stable") if chance[k] > NAMED] or [int(chance.argmax())]
     if chance[named[0]] > SURE:
         named = [k for k in named if chance[k] > SURE]
-        who = "Part " + " and ".join(str(parts.label[k]) for k in named) + " is not of one density"
+        labels = " and ".join(str(parts.label[k]) for k in named)
+        who = (
+            f"Parts {labels} are not of one density each" if len(named) > 1 else f"Part {labels} is not of one density"
+        )
     else:
         who = "Part " + " or ".join(f"{parts.label[k]} ({100 * chance[k]:.0f} %)" for k in named)
         who += " is not of one density"

@@ -13,16 +13,20 @@ from steelyard.parts.parts import Parts
 
 # A gap counts where it is so many standard deviations wide, and wider than meshes are exact [m].
 CLEAR, LEAST = 4.0, 1e-4
+# A scan puts the centroids of its parts off by so much, one standard deviation; three count as a gap [m].
+DRAWN = 1e-3
+SCANNED = 3 * DRAWN
 # Half the length of a rod over its radius of gyration: no convex part reaches much farther from its centroid.
 REACH = float(np.sqrt(3.0))
 # Weight of "the shares add up to one" beside distances over the size of the object.
 _WHOLE = 1e3
 
 
-def misplaced(data: Effective, parts: Parts) -> str:
+def misplaced(data: Effective, parts: Parts, least: float = LEAST) -> str:
     """Return a sentence where the centre of mass that the log shows lies off the parts, "" where it lies among them.
 
-    data  what the log says, blurred by the errors of shape and grasp
+    data   what the log says, blurred by the errors of shape and grasp
+    least  a gap that is no more than this is none [m]
     """
     mass = float(data.best[0])
     if mass <= 0:
@@ -34,17 +38,17 @@ def misplaced(data: Effective, parts: Parts) -> str:
     ahead = gap / max(distance, 1e-12)
     slope = np.einsum("i,ij->j", ahead, forms.com_jacobian(data.best)[:3])
     std = float(np.sqrt(max(slope @ inverse_scaled(data.information) @ slope, 0.0)))
-    if distance < max(CLEAR * std, LEAST):
+    if distance < max(CLEAR * std, least):
         return ""
     outside = float(ahead @ com) - float((parts.centroid @ ahead + REACH * _gyration(parts, ahead)).max())
     if outside > CLEAR * std:
         return (
-            f" The log puts the centre of mass {1e3 * outside:.1f} mm outside the object: pose_in_sensor is wrong by "
-            "at least that much."
+            f"The log puts the centre of mass {1e3 * outside:.1f} mm outside the object: pose_in_sensor is wrong by at "
+            "least that much. "
         )
     return (
-        f" The log puts the centre of mass {1e3 * distance:.1f} mm from where any masses of even parts would: if none "
-        "is uneven, pose_in_sensor is wrong by at least that much."
+        f"The log puts the centre of mass {1e3 * distance:.1f} mm from where any masses of even parts would: unless "
+        "one is uneven, pose_in_sensor is wrong by at least that much. "
     )
 
 

@@ -108,6 +108,8 @@ def identify(
         aligned = replace(aligned, notes=())
     if parts is not None and not isinstance(parts, Parts):
         before = (*before, *parts.findings)
+    if parts is not None and not any(recording.object_pose_std or ()):
+        notes = (*notes, "pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     return _in_recording_sign(
         replace(
             _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late),
