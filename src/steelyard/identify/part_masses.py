@@ -139,8 +139,9 @@ class PartMasses:
                 others = (f for f in findings if f.code != "part-not-homogeneous")
                 said = Finding.of("part-not-homogeneous", misplaced(seen, self.parts) + found.message)
                 return self._with_freed(problem, data, found).with_findings(*others, said)
-        if self._doubtful and (said_of_place := misplaced(seen, self.parts, SCANNED)):
-            findings.append(Finding.of("part-not-homogeneous", said_of_place.strip()))
+        if self._doubtful and self._off(data, self.parts.whole(masses.mean)):
+            words = misplaced(seen, self.parts, SCANNED)
+            findings += [Finding.of("part-not-homogeneous", words.strip())] if words else []
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
         return self._loosened(problem, data).with_findings(*findings)
@@ -217,6 +218,12 @@ class PartMasses:
         if self._doubtful:
             masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
         return self._built(problem, data, masses, body, covariance)
+
+    def _off(self, data: Effective, body: InertialParameters) -> bool:
+        """Whether the log contradicts the shape by more than a scan is wrong."""
+        error = replace(self.shape_error, com_m=max(self.shape_error.com_m, DRAWN))
+        seen = data.blurred(error.with_grasp(body))
+        return seen.misfit(body.vector) > misfit_limit(seen, len(self.parts))
 
     def _misdrawn(self, data: Effective, masses: Masses) -> Array:
         """Return the covariance (P, P) of part masses that come of borders drawn a little off by a scan.
