@@ -1,4 +1,4 @@
-"""Draw the README's figure from a bench result: steelyard bench identify --json > bench.json, then this file bench.json.
+"""Draw the README's figure from a bench result: steelyard bench identify --json > bench.json, then this file on it.
 
 Needs matplotlib: pip install 'steelyard[plot]'.
 """

@@ -51,7 +51,7 @@ def test_a_shift_across_the_parts_is_told_in_millimetres(shift: tuple[float, flo
 
 def test_a_centre_of_mass_outside_the_object_can_only_be_a_wrong_pose() -> None:
     said = misplaced(seen(CLUB, CLUB.whole(MASSES)), moved((0.055, 0, 0)))
-    assert "40.0 mm outside the object: pose_in_sensor is wrong by at least that much. " in said
+    assert "40.0 mm outside the object: pose_in_sensor is wrong by at least that much." in said
 
 
 def test_a_gap_within_its_error_is_no_gap() -> None:

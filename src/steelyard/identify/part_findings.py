@@ -45,11 +45,11 @@ def part_findings(
     if choices is not None:
         out += _material_findings(estimate, data, choices, materials)
     elif (misfit := data.misfit(estimate.parameters.vector)) > (limit := misfit_limit(data, len(parts))):
-        text = misplaced(data, parts) + (
+        text = (
             f"Homogeneous parts of this shape leave a chi-square of {misfit:.0f} that ten free numbers do not "
             f"(at most {limit:.0f} by chance): a part is not of one density, or the shape is wrong."
         )
-        out.append(Finding.of("part-not-homogeneous", text))
+        out.append(Finding.of("part-not-homogeneous", " ".join(filter(None, (misplaced(data, parts), text)))))
     return out
 
 

@@ -34,9 +34,9 @@ from steelyard.identify.part_models import (
     material_masses,
 )
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
-from steelyard.identify.placement import DRAWN, SCANNED, misplaced
+from steelyard.identify.placement import misplaced
 from steelyard.identify.problem import Problem
-from steelyard.identify.shape_error import EXACT, MEASURED, ShapeError
+from steelyard.identify.shape_error import DRAWN, EXACT, MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
@@ -137,11 +137,13 @@ class PartMasses:
             found = uneven(seen, self.parts)
             if found is not None:
                 others = (f for f in findings if f.code != "part-not-homogeneous")
-                said = Finding.of("part-not-homogeneous", misplaced(seen, self.parts) + found.message)
+                said = Finding.of(
+                    "part-not-homogeneous", " ".join(filter(None, (misplaced(seen, self.parts), found.message)))
+                )
                 return self._with_freed(problem, data, found).with_findings(*others, said)
         if self._doubtful and self._off(data, self.parts.whole(masses.mean)):
-            words = misplaced(seen, self.parts, SCANNED)
-            findings += [Finding.of("part-not-homogeneous", words.strip())] if words else []
+            words = misplaced(seen, self.parts, 3 * DRAWN)
+            findings += [Finding.of("part-not-homogeneous", words)] if words else []
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
         return self._loosened(problem, data).with_findings(*findings)

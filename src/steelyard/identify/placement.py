@@ -13,9 +13,6 @@ from steelyard.parts.parts import Parts
 
 # A gap counts where it is so many standard deviations wide, and wider than meshes are exact [m].
 CLEAR, LEAST = 4.0, 1e-4
-# A scan puts the centroids of its parts off by so much, one standard deviation; three count as a gap [m].
-DRAWN = 1e-3
-SCANNED = 3 * DRAWN
 # Half the length of a rod over its radius of gyration: no convex part reaches much farther from its centroid.
 REACH = float(np.sqrt(3.0))
 # Weight of "the shares add up to one" beside distances over the size of the object.
@@ -44,11 +41,11 @@ def misplaced(data: Effective, parts: Parts, least: float = LEAST) -> str:
     if outside > CLEAR * std:
         return (
             f"The log puts the centre of mass {1e3 * outside:.1f} mm outside the object: pose_in_sensor is wrong by at "
-            "least that much. "
+            "least that much."
         )
     return (
         f"The log puts the centre of mass {1e3 * distance:.1f} mm from where any masses of even parts would: unless "
-        "one is uneven, pose_in_sensor is wrong by at least that much. "
+        "one is uneven, pose_in_sensor is wrong by at least that much."
     )
 
 

@@ -63,3 +63,5 @@ class ShapeError:
 EXACT = ShapeError()
 # What a mesh of a real tool is wrong by even when it is right.
 MEASURED = ShapeError(com_m=1e-4, inertia_share=3e-3)
+# A scan puts the centroids of its parts off by so much, one standard deviation per axis [m].
+DRAWN = 1e-3

@@ -15,6 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.identify.dense import solved
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
@@ -81,17 +82,8 @@ def solve(H: Array, g: Array) -> Array:
             for k in range(j):
                 total -= low[i, k] * low[j, k]
             low[i, j] = np.sqrt(max(total + UNSEEN, UNSEEN)) if i == j else total / low[j, j]
-    for i in range(n):
-        total = g[i] * scale[i]
-        for k in range(i):
-            total -= low[i, k] * x[k]
-        x[i] = total / low[i, i]
-    for i in range(n - 1, -1, -1):
-        total = x[i]
-        for k in range(i + 1, n):
-            total -= low[k, i] * x[k]
-        x[i] = total / low[i, i]
-    return x * scale
+        x[i] = g[i] * scale[i]
+    return solved(low, x) * scale
 
 
 @numba.njit(cache=True)
