@@ -67,6 +67,23 @@ def test_a_lamp_is_found_and_taken_out(sigma):
     assert np.bincount(modes.label).max() > 0.97 * len(cloud)
 
 
+def test_what_nobody_saw_tells_nothing_of_the_lamp_and_is_lent_its_colour():
+    """An underside has the colour of the lit points beside it: it must not be darkened once more."""
+    cloud = body([BAR], [(200, 204, 208)])
+    skin = skin_of(solid(cloud, [BAR]))
+    face = np.zeros_like(cloud.xyz)
+    for axis, (low, high) in enumerate(zip(*BAR, strict=True)):
+        face[np.isclose(cloud.xyz[:, axis], low), axis] = -1
+        face[np.isclose(cloud.xyz[:, axis], high), axis] = 1
+    face /= np.linalg.norm(face, axis=1, keepdims=True)
+    seen = ~np.isclose(cloud.xyz[:, 2], BAR[0][2])
+    lit = cloud.rgb * (1 + face @ LAMP)[:, None]
+    lit[~seen] = lit[seen][np.linalg.norm(cloud.xyz[~seen][:, None] - cloud.xyz[seen], axis=2).argmin(1)]
+    modes = colour_modes(np.clip(lit, 0, 255).astype(np.uint8), skin, face, seen)
+    assert modes.lamp.any()
+    assert len(modes.rgb) == 1
+
+
 def test_no_lamp_is_seen_where_colours_differ_by_part():
     cloud, skin = two_halves((220, 220, 220), (70, 70, 70))
     assert not colour_modes(noisy(cloud.rgb, 5), skin).lamp.any()

@@ -76,6 +76,19 @@ def test_the_cloud_lies_on_the_box_and_its_normals_leave_it(box: Scanned) -> Non
     assert (scan.findings, scan.moved_m) == ((), None)
 
 
+def test_no_point_has_the_colour_of_the_table(box: Scanned) -> None:
+    """Pixels beside the foot show the table, and the underside is lent the colour of what is nearest to it."""
+    cloud = fuse(box.views).cloud
+    assert cloud.seen is not None
+    assert cloud.rgb is not None
+    below = cloud.normals[:, 2] < -0.9  # type: ignore[index]
+    assert below.sum() > 100
+    assert not cloud.seen[below].any()
+    assert cloud.seen[~below].mean() > 0.8
+    red = cloud.rgb[:, 0].astype(float) - cloud.rgb[:, 1]
+    assert (red > 60).mean() > 0.995  # the box is red, the table is not
+
+
 def test_the_same_views_give_the_same_cloud(box: Scanned) -> None:
     a, b = fuse(box.views), fuse(box.views)
     assert np.array_equal(a.cloud.xyz, b.cloud.xyz)

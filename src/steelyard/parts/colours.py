@@ -28,6 +28,8 @@ _TURNED = 0.15  # between the normals of a pair, for it to tell of the lamp
 _LAMP_SEEN = 0.1  # weaker shading is below the difference of two colours
 _LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
 _SHADE = 0.08  # of the brightness: what is left of the light once the lamp is taken out
+_PLACES, _APART = 600, (16, 80)  # places whose pairs tell of the lamp, and how many flat places lie between the two
+_EVEN = 0.05  # cost of a pair below which nothing is lit
 _ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
 
 
@@ -47,20 +49,23 @@ class ColourModes:
     noise: float
 
 
-def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None) -> ColourModes:
+def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: Any = None) -> ColourModes:
     """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255.
 
     normals  (V, 3) outward at the vertices, where they are known better than the triangles tell
+    seen     (V,) whose colour was measured; the rest take the colour that the nearest of those has without the lamp
     """
+    seen = np.ones(len(rgb), dtype=bool) if seen is None else seen
     colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near
     facing, flatness = skin.normals, skin.flatness
     if normals is not None:
         facing, flatness = normals, np.einsum("id,ikd->ik", normals, normals[near[:, :NEIGHBOURS]]).mean(1)
-    lamp = _lamp(colour, facing, flatness, near)
-    sure = np.ones(len(colour), dtype=bool)
+    lamp = _lamp(colour, facing, np.where(seen, flatness, 0.0), skin.vertices)
+    sure = seen.copy()
     if lamp.any():
         colour = colour / (1 + _harmonics(facing) @ lamp)[:, None]
-        sure = flatness > min(0.95, float(np.median(flatness)))
+        sure &= flatness > min(0.95, float(np.median(flatness[seen])))
+    colour = _lent(colour, skin.vertices, seen)
     raw, near = colour, near[:, :NEIGHBOURS]
     noise = _step(colour, near, sure)
     if noise > FINEST / _STEPS:
@@ -73,40 +78,57 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None) -> Colo
     return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise)
 
 
+def _lent(colour: Array, xyz: Array, seen: Any) -> Array:
+    """Return colours (V, 3) where points that nobody saw have that of the nearest that was seen."""
+    if seen.all():
+        return colour
+    from scipy.spatial import cKDTree
+
+    lent = colour.copy()
+    lent[~seen] = colour[seen][cKDTree(xyz[seen]).query(xyz[~seen])[1]]
+    return lent
+
+
 def _harmonics(normals: Array) -> Array:
     """Return the harmonics (..., 8) of first and second order of unit vectors (..., 3), which are the first three."""
     x, y, z = np.moveaxis(normals, -1, 0)
     return np.stack([x, y, z, x * y, x * z, y * z, (x * x - y * y) / 2, (3 * z * z - 1) / 2], axis=-1)
 
 
-def _lamp(colour: Array, normals: Array, flatness: Array, near: Integers) -> Array:
+def _lamp(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Array:
     """Return the weights (8,) of the harmonics; 0 where the brightness does not follow the normals.
 
-    The fit is over pairs of neighbours whose normals differ. It must take away a quarter of the usual difference to be
-    believed. Where there is a lamp by the first order, the second need only be better: no lamp lights both sides.
+    The fit is over pairs of flat places a few spacings apart whose normals differ: next neighbours share their errors,
+    and at an edge a colour is a mixture. It must take away a quarter of the pairs' robust cost to be believed.
     """
-    flat = flatness > np.clip(np.median(flatness), 0.9, 0.98)
-    apart = near[:, 3::4]  # some rings away: next neighbours share their triangles, and so their errors
-    i, j = np.repeat(np.arange(len(near)), apart.shape[1]), apart.ravel()
-    used = flat[i] & flat[j] & (((normals[i] - normals[j]) ** 2).sum(1) > _TURNED**2)
+    from scipy.spatial import cKDTree
+
+    flat = np.flatnonzero(flatness > np.clip(np.median(flatness), 0.9, 0.98))
+    if len(flat) < 2:
+        return np.zeros(8)
+    tree, some = cKDTree(xyz[flat]), flat[:: 1 + len(flat) // _PLACES]
+    apart = flat[tree.query(xyz[some], min(_APART[-1] + 1, len(flat)))[1].reshape(len(some), -1)[:, _APART[0] :: 4]]
+    i, j = np.repeat(some, apart.shape[1]), apart.ravel()
+    used = ((normals[i] - normals[j]) ** 2).sum(1) > _TURNED**2
     i, j = i[used], j[used]
     light = np.log(np.maximum(colour.mean(1), 4 / 255))
     side = light[i] - light[j]
-    before = float(np.median(np.abs(side))) if len(side) else 0.0
-    if before < _ROUGH / 4:
+    before = _cost(side)
+    if before < _EVEN:
         return np.zeros(8)
     wave = _harmonics(normals)
-    one_side, left = _fitted(wave[i, :3], wave[j, :3], side)
-    seen = bool(np.linalg.norm(one_side) >= _LAMP_SEEN and left <= 0.75 * before)
-    if not seen:
-        one_side, left = np.zeros(3), before
-    both_sides, rest = _fitted(wave[i], wave[j], side)
-    better = rest < (1.0 if seen else 0.75) * left and left > _ROUGH / 4 and np.linalg.norm(both_sides) > _LAMP_SEEN
-    return both_sides if better else np.concatenate([one_side, np.zeros(5)])
+    lamp, off = _fitted(wave[i], wave[j], side)
+    seen = _cost(off) < 0.75 * before and np.linalg.norm(lamp) >= _LAMP_SEEN
+    return lamp if seen else np.zeros(8)
 
 
-def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, float]:
-    """Return the weights (K,) that explain differences of log brightness, and the median of what they leave.
+def _cost(off: Array) -> float:
+    """Return the mean robust cost (Cauchy's) of differences of log brightness; 0 where there are none."""
+    return float(np.log1p((off / _ROUGH) ** 2).mean()) if len(off) else 0.0
+
+
+def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, Array]:
+    """Return the weights (K,) that explain differences of log brightness, and what they leave of each.
 
     Robust Gauss-Newton steps: pairs of two albedos are outliers, with Cauchy's weights.
 
@@ -122,7 +144,7 @@ def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, float]:
         lamp = lamp + np.linalg.solve(weighted.T @ rows + ridge, weighted.T @ off - ridge @ lamp)
         dip = -min(float((one @ lamp).min()), float((two @ lamp).min()))
         lamp *= min(1.0, _LAMP_MOST / max(dip, 1e-12))
-    return lamp, float(np.median(np.abs(off)))
+    return lamp, off
 
 
 def _step(colour: Array, near: Integers, sure: Any) -> float:

@@ -154,7 +154,9 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     skin = skin_of(mesh)
     colour = np.zeros(len(mesh.vertices), dtype=np.int64)
     if cloud.rgb is not None:
-        colours = colour_modes(_vertex_colours(cloud, mesh), skin, _vertex_normals(cloud, mesh))
+        same = _same(cloud, mesh)
+        told = (cloud.normals, cloud.seen) if same else (None, None)  # what is known of points is known of vertices
+        colours = colour_modes(_vertex_colours(cloud, mesh), skin, *told)
         colour = without_prints(colours.label, skin)
     pairs, corners = inner_faces(mesh)
     a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
@@ -222,11 +224,6 @@ def by_volume(labels: Any, mesh: TetMesh) -> Integers:
     rank = np.empty(len(first), dtype=np.int64)
     rank[np.lexsort((first, -np.bincount(inverse, mesh.volumes)))] = np.arange(len(first))
     return np.asarray(rank[inverse])
-
-
-def _vertex_normals(cloud: Cloud, mesh: TetMesh) -> Array | None:
-    """Return the normals (V, 3) of the cloud where its points are the vertices."""
-    return cloud.normals if _same(cloud, mesh) else None
 
 
 def _same(cloud: Cloud, mesh: TetMesh) -> bool:

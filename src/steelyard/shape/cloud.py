@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
@@ -15,6 +15,8 @@ from steelyard.shape.mesh import Colours, Integers
 from steelyard.shape.spacing import Neighbours
 from steelyard.spatial import Pose
 
+Flags = np.ndarray[Any, np.dtype[np.bool_]]
+
 
 @dataclass(frozen=True, eq=False)
 class Cloud:
@@ -24,12 +26,15 @@ class Cloud:
     rgb      (N, 3) uint8, None where colours are not known
     label    (N,) label of the true part that each point lies on, None where it is not known
     normals  (N, 3) unit vectors that leave the solid, None where they are not known
+    seen     (N,) whether a camera saw the colour of each point; the rest have that of the nearest that one saw.
+             None where all were seen
     """
 
     xyz: Array
     rgb: Colours | None = None
     label: Integers | None = None
     normals: Array | None = None
+    seen: Flags | None = None
 
     def __post_init__(self) -> None:
         xyz = check.vectors("points", self.xyz)
@@ -42,6 +47,8 @@ class Cloud:
             object.__setattr__(self, "label", _column("labels", self.label, xyz.shape[:1], np.int64))
         if self.normals is not None:
             object.__setattr__(self, "normals", _column("normals", self.normals, xyz.shape, np.float64))
+        if self.seen is not None:
+            object.__setattr__(self, "seen", _column("marks of what was seen", self.seen, xyz.shape[:1], np.bool_))
 
     def __len__(self) -> int:
         return len(self.xyz)
@@ -65,12 +72,13 @@ class Cloud:
 
     def chosen(self, rows: Any) -> Cloud:
         """Return the points of `rows`, numbers or a mask."""
-        return Cloud(self.xyz[rows], *(None if c is None else c[rows] for c in (self.rgb, self.label, self.normals)))
+        columns = (self.rgb, self.label, self.normals, self.seen)
+        return Cloud(self.xyz[rows], *(None if column is None else column[rows] for column in columns))
 
     def in_frame(self, X_AB: Pose) -> Cloud:
         """Return the same points, given in B, seen from frame A."""
         normals = None if self.normals is None else X_AB.rotation.apply(self.normals)
-        return Cloud(X_AB.apply(self.xyz), self.rgb, self.label, normals)
+        return replace(self, xyz=X_AB.apply(self.xyz), normals=normals)
 
 
 def _column(name: str, values: Any, shape: tuple[int, ...], dtype: type) -> Any:

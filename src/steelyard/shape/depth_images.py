@@ -11,6 +11,7 @@ import numba
 import numpy as np
 
 FACING = 0.3  # cosine of incidence below which a view's word about a surface is not asked
+UPWARD = 0.7  # least upward component of the normal of a surface that faces up
 _STEEP = 3.0  # slope between neighbouring pixels that still counts as one surface (72 degrees)
 MOST_VIEWS = 1024  # views that can speak of one point
 
@@ -258,24 +259,36 @@ def settled(
 
 @numba.njit(cache=True, nogil=True)
 def colours(
-    rgb: Any, depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float
-) -> Any:
-    """Return the median colour (N, 3) of the views that see each point."""
+    rgb: Any, depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float,
+    clear: float, enough: int,
+) -> Any:  # fmt: skip
+    """Return the median colour (N, 3) of the views that see each point, and which points `enough` of them saw (N,).
+
+    clear  height over the table [m] below which a pixel may show the table; it counts only for a surface that faces up,
+           which nothing but the table's own noise comes as near to
+    """
     rows = np.empty((MOST_VIEWS, 6))
     values = np.empty((3, MOST_VIEWS))
-    out = np.zeros((len(xyz), 3), np.uint8)
+    out, seen = np.zeros((len(xyz), 3), np.uint8), np.zeros(len(xyz), np.bool_)
     for i in range(len(xyz)):
         found = looked(depth, unit, camera, R, p, xyz[i], normal[i], window, noise, rows)
         on = 0
         for r in range(found):
-            if rows[r, 5] == 0:
-                for c in range(3):
-                    values[c, on] = rgb[int(rows[r, 0]), int(rows[r, 1]), int(rows[r, 2]), c]
-                on += 1
+            if rows[r, 5] != 0:
+                continue
+            k, v, u = int(rows[r, 0]), int(rows[r, 1]), int(rows[r, 2])
+            z = depth[k, v, u] * unit
+            height = R[k, 2, 0] * (u - camera[2]) / camera[0] + R[k, 2, 1] * (v - camera[3]) / camera[1] + R[k, 2, 2]
+            if height * z + p[k, 2] < clear and normal[i, 2] < UPWARD:
+                continue
+            for c in range(3):
+                values[c, on] = rgb[k, v, u, c]
+            on += 1
+        seen[i] = on >= enough
         for c in range(3):
             if on:
                 out[i, c] = int(np.median(values[c, :on]) + 0.5)
-    return out
+    return out, seen
 
 
 @numba.njit(cache=True, nogil=True)

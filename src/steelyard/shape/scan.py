@@ -22,6 +22,9 @@ from steelyard.shape.views import TablePlane, Views
 
 POINTS = 3000  # of the cloud, about
 _CELLS = 8000  # of the grid under the object, about
+_CLEAR = 3.0  # times the depth noise: what is measured higher than this above the table is not the table
+_TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
+_ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
 
 
@@ -73,9 +76,9 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock.lap("surface")
     xyz, normal, seen, spacing, bottom = _closed(scene, xyz, normal, points)
     clock.lap("underside")
-    rgb = _colours(scene, xyz, normal, seen)
+    rgb, coloured = _colours(scene, xyz, normal, seen)
     clock.lap("colour")
-    cloud = Cloud(xyz, rgb, None, normal).in_frame(scene.X_WT)
+    cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
     findings = _findings(scene, others, disagree)
     return Scan(
         cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
@@ -105,12 +108,39 @@ def _closed(scene: Scene, xyz: Array, normal: Array, points: int) -> tuple[Array
     return xyz[rows], normal[rows], int((rows < seen).sum()), radius, bottom
 
 
-def _colours(scene: Scene, xyz: Array, normal: Array, seen: int) -> Any:
-    """Return colours (N, 3): of the first `seen` points from the views, of the rest from the nearest seen point."""
-    if scene.views.rgb is None:
-        return None
-    rgb = images.colours(scene.views.rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise)
-    return np.concatenate([rgb, rgb[cKDTree(xyz[:seen]).query(xyz[seen:])[1]]]) if seen < len(xyz) else rgb
+def _colours(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any, Any]:
+    """Return colours (N, 3), and which of them (N,) the views show: of the first `seen` points, those that do not mix
+    with the table. The rest have the colour of the nearest of those.
+    """
+    if (images_rgb := scene.views.rgb) is None:
+        return None, None
+    shown, rgb = np.zeros(len(xyz), bool), np.zeros((len(xyz), 3), np.uint8)
+    clear, enough = _CLEAR * scene.sigma, min(LEAST_VIEWS, len(scene.R))
+    rgb[:seen], shown[:seen] = images.colours(
+        images_rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise, clear, enough
+    )
+    # What lies as low as the table and looks like it may be its fringe.
+    shown &= (xyz[:, 2] > 2 * clear) | ~_like_table(scene, images_rgb, clear, rgb)
+    if not shown.any():
+        return rgb, None
+    if not shown.all():
+        rgb[~shown] = rgb[shown][cKDTree(xyz[shown]).query(xyz[~shown])[1]]
+    return rgb, shown
+
+
+def _like_table(scene: Scene, images_rgb: Any, clear: float, rgb: Any) -> Any:
+    """Return which colours (N, 3) are as near to the table's median as nearly all of the table is."""
+    depth = scene.views.depth
+    stride = max(1, int(np.sqrt(depth.size / _TABLE_SAMPLES)))
+    shown = images.sampled(depth, *scene.images()[1:], stride)
+    every = (slice(None), slice(stride // 2, None, stride), slice(stride // 2, None, stride))
+    pixels = images_rgb[every][depth[every] > 0].astype(float)
+    table = pixels[np.abs(shown[:, 2]) < clear]
+    if not len(table):
+        return np.zeros(len(rgb), bool)
+    middle = np.median(table, axis=0)
+    reach = float(np.percentile(np.linalg.norm(table - middle, axis=1), _NEARLY_ALL))
+    return np.linalg.norm(rgb - middle, axis=1) < max(2 * reach, _ALIKE)
 
 
 def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:

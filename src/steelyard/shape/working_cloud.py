@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from steelyard.check import Array
@@ -42,7 +44,7 @@ def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     if cloud.diagonal <= _TOO_LONG_M:
         return cloud, []
     text = f"The points span {cloud.diagonal:.4g} m, more than an arm can hold; they were read as millimetres."
-    return Cloud(cloud.xyz * 1e-3, cloud.rgb, cloud.label, cloud.normals), [Finding.of("cloud-in-mm", text)]
+    return replace(cloud, xyz=cloud.xyz * 1e-3), [Finding.of("cloud-in-mm", text)]
 
 
 def _without_repeats(cloud: Cloud) -> Cloud:
