@@ -54,6 +54,7 @@ MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io"
 MAY_IMPORT["bench"] = MAY_IMPORT["api"] | {"api"}
 MAY_IMPORT["cli"] = MAY_IMPORT["bench"] | {"bench", ""}
 MAY_IMPORT[""] = MAY_IMPORT["cli"] | {"cli"}  # the package itself: `import steelyard as sy`
+MAY_IMPORT["__main__"] = {"cli"}
 
 FILES_ALLOWED = {"io", "report", "cli", "bench"}
 FILE_CALLS = {

@@ -114,6 +114,15 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
     return shape_of(_seen(Path(scan)) if isinstance(scan, str | Path) else scan, parts, refill)
 
 
+def save_parts(shape: Shape, path: str | Path) -> None:
+    """Write a shape in parts to `path` (parts.npz), with how wrong it may be; raises BadFile."""
+    from steelyard.io.parts_files import SavedParts, write_parts
+
+    made, error = shape.segmentation, shape.error
+    saved = SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, error.com_m, error.inertia_share)
+    write_parts(saved, path)
+
+
 def _seen(path: Path) -> Cloud | Views:
     """Return the views of a folder, or the cloud of a file."""
     if path.is_dir():

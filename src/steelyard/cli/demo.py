@@ -56,7 +56,6 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     from steelyard.cli.versus import summary, versus_table
     from steelyard.io import read_recording, result_dict, write_result
     from steelyard.io.cloud_files import write_cloud
-    from steelyard.io.parts_files import SavedParts, write_parts
     from steelyard.io.recording_files import write_recording
     from steelyard.logs.alignment import align
     from steelyard.report import write_report
@@ -68,8 +67,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         folder = keep or Path(scratch)
         log = write_recording(seen.recording, folder)
         write_cloud(shape.solid.cloud, folder / "hammer.ply")
-        made = shape.segmentation
-        write_parts(SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names), folder / "parts.npz")
+        api.save_parts(shape, folder / "parts.npz")
         recording = read_recording(log)
         rows = align(recording).log
         answers = _answers(log, shape, rows, seen.X_SW)

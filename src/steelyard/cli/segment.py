@@ -32,22 +32,15 @@ def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_j
     if output is not None and output.resolve() == scan.resolve():
         raise BadValue(f"{output} is the scan itself; give the parts another name, such as parts.npz.")
     say_if_compiling()
-    from steelyard.api import shape_of
+    from steelyard.api import save_parts, shape_of
 
     shape = shape_of(scan, parts, cells)
     if output is not None:
-        _write(shape, output)
+        save_parts(shape, output)
     if as_json:
         print_json(_plain(shape, output))
     else:
         click.echo(_table(shape, scan, output))
-
-
-def _write(shape: Shape, output: Path) -> None:
-    from steelyard.io.parts_files import SavedParts, write_parts
-
-    made = shape.segmentation
-    write_parts(SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names), output)
 
 
 def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:

@@ -99,8 +99,12 @@ def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> l
             name, mass = truth[part.label]
             known = f"truth {1e3 * mass:.{decimals(1e3 * part.std)}f}"
         mass_cell = plus_minus(1e3 * part.mass, 1e3 * part.std, "g")
-        row = (f"part {part.label} {name}".rstrip(), mass_cell, known, f"{part.density:.0f} kg/m³", part.material or "")
-        rows.append(tuple(cell for cell, shown in zip(row, (1, 1, truth, 1, 1), strict=True) if shown))
+        place = ", ".join(f"{1e3 * value:.0f}" for value in part.centroid)
+        row = (
+            f"part {part.label} {name}".rstrip(), mass_cell, known, f"{part.density:.0f} kg/m³", f"at ({place}) mm",
+            part.material or "",
+        )  # fmt: skip
+        rows.append(tuple(cell for cell, shown in zip(row, (1, 1, truth, 1, 1, 1), strict=True) if shown))
     return ["", columns(rows)]
 
 

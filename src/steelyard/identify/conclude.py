@@ -51,13 +51,14 @@ def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
 
 
 def conclude(
-    problem: Problem, solution: Solution, method: str, score: Array | None = None, require: bool = True
+    problem: Problem, solution: Solution, method: str, score: Array | None = None, response: Array | None = None
 ) -> Estimate:
     """Return the Estimate of a solution.
 
     `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
-    Raises CannotAnswer where mass or centre of mass are not fixed, and names the inertia that is not, unless `require`
-    is false: a shape may fix them.
+    Where a shape makes the answer together with the log, `response` (p, p) is how it follows the score: then the
+    covariance, still that of the log alone, and its widening are left to the caller, and nothing must be fixed by the
+    log alone. Else raises CannotAnswer where mass or centre of mass are not fixed, and names the inertia that is not.
     """
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
@@ -80,7 +81,7 @@ def conclude(
     seen = meat if solution.weights is None else problem.plus_bias_prior(white)
     F, G, _, _ = without_bias(problem.plus_bias_prior(H), seen)
     sight = Sight(*_sight(F, G, solution.linear[:10]))
-    if require:
+    if response is None:
         _require_answer(sight, problem)
     estimate = Estimate(
         body,
@@ -95,13 +96,13 @@ def conclude(
         covariance[10:16, 10:16] if problem.with_bias else np.zeros((6, 6)),
         covariance[:10, 10:16] if problem.with_bias else np.zeros((10, 6)),
     )  # fmt: skip
-    left_out = leave_one_out(problem, solution, bread)
+    left_out = leave_one_out(problem, solution, bread, response)
     if left_out:
         estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
-    return _widened(estimate.with_findings(*_findings(estimate)) if require else estimate)
+    return widened(estimate.with_findings(*_findings(estimate))) if response is None else estimate
 
 
-def _widened(estimate: Estimate) -> Estimate:
+def widened(estimate: Estimate) -> Estimate:
     """Return the estimate with error bars at least as wide as leaving blocks out shows, where there are enough blocks.
 
     What the model leaves out (a soft wrist, cross-talk) is no noise, and only differs from one stretch to the next.
@@ -120,6 +121,8 @@ def _widened(estimate: Estimate) -> Estimate:
         covariance=factor**2 * estimate.covariance,
         bias_covariance=factor**2 * estimate.bias_covariance,
         cross_covariance=factor**2 * estimate.cross_covariance,
+        part_covariance=None if estimate.part_covariance is None else factor**2 * estimate.part_covariance,
+        parts=tuple(replace(part, std=factor * part.std) for part in estimate.parts),
         notes=(*estimate.notes, note),
     )
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,12 +18,18 @@ SHOWN = 1e-9
 
 @dataclass(frozen=True, eq=False)
 class Effective:
-    """Information F (10, 10) and F phi_hat (10,), and how the bias (0 or more) follows phi."""
+    """Information F (10, 10) and F phi_hat (10,), and how the bias (b numbers, 0 or more) follows phi.
+
+    score_weight  (10, 10) H V^-1: what a step of the score is worth in F phi_hat; the identity where it is not needed
+    bias_own      (b, b) covariance of the bias at a given phi
+    """
 
     information: Array
     pull: Array
     bias_at: Array
     bias_slope: Array
+    score_weight: Array = field(default_factory=lambda: np.eye(10))
+    bias_own: Array = field(default_factory=lambda: np.zeros((0, 0)))
 
     @classmethod
     def of(cls, problem: Problem, linear: Array, score: Array | None) -> Effective:
@@ -42,7 +48,7 @@ class Effective:
         half = F @ inverse_scaled(G)
         information = half @ F
         pull = half @ (g[:10] - g[10:] @ follow)
-        return cls(0.5 * (information + information.T), pull, own @ g[10:], follow)
+        return cls(0.5 * (information + information.T), pull, own @ g[10:], follow, half, own)
 
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
@@ -50,7 +56,12 @@ class Effective:
         shrink.flat[::11] += 1.0
         found = np.asarray(np.linalg.solve(shrink, np.column_stack([self.information, self.pull])), np.float64)
         information = 0.5 * (found[:, :10] + found[:, :10].T)
-        return Effective(information, found[:, 10].copy(), self.bias_at, self.bias_slope)
+        return replace(self, information=information, pull=found[:, 10].copy())
+
+    def response(self, follows: Array) -> Array:
+        """Return how [phi, bias] (p,) follows the score (p,), where phi follows F phi_hat by `follows` (10, 10)."""
+        body, slope = follows @ self.score_weight, self.bias_slope
+        return np.block([[body, -body @ slope.T], [-slope @ body, self.bias_own + slope @ body @ slope.T]])
 
     def linear_at(self, phi: Array) -> Array:
         """Return [phi, bias] (p,) with the bias that fits best beside phi (10,)."""

@@ -6,6 +6,7 @@ hundreds of blocks cost no more than hundreds of small solves. Source: Efron and
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -20,8 +21,13 @@ from steelyard.inertia import forms
 FEWEST_BLOCKS = 4
 
 
-def leave_one_out(problem: Problem, solution: Solution, H: Array) -> dict[str, Any]:
-    """Return the hold-out errors and jackknife deviations of `Evidence` by name, or nothing where blocks are few."""
+def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Array | None = None) -> dict[str, Any]:
+    """Return the hold-out errors and jackknife deviations of `Evidence` by name, or nothing where blocks are few.
+
+    H         (p, p) information of the whole log
+    response  (p, p) how the answer follows the score, where more than the log and a Gaussian prior make it: each block
+              then counts as a small change (the infinitesimal jackknife, chapter 21 of the same)
+    """
     if len(problem.block_number) < FEWEST_BLOCKS:
         return {}
     numbers = np.unique(problem.block_number[problem.block_number >= 0])
@@ -31,10 +37,14 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array) -> dict[str, A
     J[:10, :10] = solution.jacobian
     full = J.T @ H @ J
     full[:10, :10] += solution.prior
+
+    def left(plain: Array) -> Array:
+        return response if response is not None else J @ inverse_scaled(full - J.T @ plain @ J) @ J.T
+
     refits, misses, rows = [], [], 0.0
     for number in numbers:
         chosen = problem.block_number == number
-        moved, miss = _without(problem, chosen, solution, full, J)
+        moved, miss = _without(problem, chosen, solution, left)
         refits.append(moved)
         misses.append(miss)
         rows += float(problem.blocks[chosen, 18, 18].sum())
@@ -50,9 +60,15 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array) -> dict[str, A
 
 
 def _without(
-    problem: Problem, chosen: np.ndarray[Any, np.dtype[np.bool_]], solution: Solution, full: Array, J: Array
+    problem: Problem,
+    chosen: np.ndarray[Any, np.dtype[np.bool_]],
+    solution: Solution,
+    left: Callable[[Array], Array],
 ) -> tuple[Array, Array]:
-    """Return the refit without the chosen groups, and the squared residual (6,) it leaves in them."""
+    """Return the refit without the chosen groups, and the squared residual (6,) it leaves in them.
+
+    left  what remains of the covariance (p, p) without this information (p, p)
+    """
     classes = problem.block_class[chosen]
     scatter = problem.blocks[chosen]
     if solution.weights is None:
@@ -63,8 +79,7 @@ def _without(
     else:
         plain, g = normal_equations(problem.T, scatter, solution.weights[classes])
         gradient = 2 * (plain @ solution.linear - g)
-    rest = full - J.T @ plain @ J
-    moved = solution.linear + J @ (inverse_scaled(rest) @ (J.T @ gradient / 2))
+    moved = solution.linear + left(plain) @ gradient / 2
     K = problem.residual_map(moved)
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)
 

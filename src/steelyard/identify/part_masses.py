@@ -17,7 +17,7 @@ from scipy.linalg import eigh
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
-from steelyard.identify.conclude import conclude
+from steelyard.identify.conclude import conclude, widened
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
@@ -152,7 +152,7 @@ class PartMasses:
         """Return the Estimate with densities freed within parts."""
         body = InertialParameters(found.vector)
         covariance = found.covariance + self.shape_error.with_grasp(body)
-        return self._built(problem, data, found.masses, body, covariance)
+        return self._built(problem, data, found.masses, body, covariance, found.covariance)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
@@ -214,12 +214,13 @@ class PartMasses:
         body = self.parts.whole(masses.mean)
         moved = self._moved(data, body)
         error = self.shape_error.covariance(body)
+        spread = follows = B @ masses.covariance @ B.T
         if self._doubtful:
-            body, error = self._recentred(data, body, error)
-        covariance = B @ masses.covariance @ B.T + error + moved.T @ moved
+            body, error, follows = self._recentred(data, body, error, spread)
+        covariance = spread + error + moved.T @ moved
         if self._doubtful:
             masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
-        return self._built(problem, data, masses, body, covariance)
+        return self._built(problem, data, masses, body, covariance, follows)
 
     def _off(self, data: Effective, body: InertialParameters) -> bool:
         """Whether the log contradicts the shape by more than a scan is wrong."""
@@ -239,8 +240,12 @@ class PartMasses:
         steps = [gain @ ((moved - self.parts.per_mass) * masses.mean) for moved in shifted]
         return np.asarray(sum(step @ step.T for step in steps))
 
-    def _recentred(self, data: Effective, body: InertialParameters, error: Array) -> tuple[InertialParameters, Array]:
+    def _recentred(
+        self, data: Effective, body: InertialParameters, error: Array, spread: Array
+    ) -> tuple[InertialParameters, Array, Array]:
         """Return the body with its centre of mass where shape and log together see it, and what is left of the error.
+
+        Then how the whole follows F phi_hat, where masses by the log alone leave it `spread` (10, 10).
 
         Inertia about the centre of mass stays that of the shape. The mean of e given the rest r = phi_hat - B m is
         G_c (F^-1 + G)^-1 r, G_c the part of G that moves the centre.
@@ -250,14 +255,22 @@ class PartMasses:
         step = centre @ (seen.pull - seen.information @ body.vector)
         com = body.com + step[1:4] / float(body.mass)
         found = InertialParameters.from_com(float(body.mass), com, body.inertia_com)
-        return found, error - centre @ seen.information @ centre
+        blur = np.linalg.inv(np.eye(10) + data.information @ error)  # (F^-1 + G)^-1 F^-1
+        masses = spread @ blur
+        follows = masses + centre @ (blur - seen.information @ masses)
+        return found, error - centre @ seen.information @ centre, follows
 
     def _built(
-        self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array
-    ) -> Estimate:
-        """Return the Estimate of a body that is known up to `covariance` (10, 10), with the masses of its parts."""
-        estimate = conclude(problem, Solution.unconstrained(data.linear_at(body.vector)), "part-masses", require=False)
-        return replace(
+        self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
+        follows: Array,
+    ) -> Estimate:  # fmt: skip
+        """Return the Estimate of a body that is known up to `covariance` (10, 10), with the masses of its parts.
+
+        follows  (10, 10) how it follows the log: without a block it would lie elsewhere by this times the block's score
+        """
+        solution = Solution.unconstrained(data.linear_at(body.vector))
+        estimate = conclude(problem, solution, "part-masses", response=data.response(follows))
+        found = replace(
             estimate,
             parameters=body,
             covariance=0.5 * (covariance + covariance.T),
@@ -265,6 +278,7 @@ class PartMasses:
             parts=self._found(masses),
             identified=np.ones(10, np.bool_),
         )
+        return widened(found)
 
     def _found(self, masses: Masses) -> tuple[PartMass, ...]:
         """Return the parts with their masses and materials."""

@@ -32,6 +32,10 @@ class ShapeError:
         if not all(np.isfinite(v) and v >= 0 for v in values):
             raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
 
+    def at_least(self, com_m: float, inertia_share: float) -> ShapeError:
+        """Return the error with its shape part no less than this."""
+        return replace(self, com_m=max(self.com_m, com_m), inertia_share=max(self.inertia_share, inertia_share))
+
     def scaled(self, factor: float) -> ShapeError:
         """Return the error with its shape part `factor` times as large, not below that of a measured shape."""
         com = factor * max(self.com_m, MEASURED.com_m)

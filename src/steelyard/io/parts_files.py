@@ -9,7 +9,7 @@ from __future__ import annotations
 import io
 import zipfile
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any
@@ -45,6 +45,7 @@ class SavedParts:
     rgb     (P, 3) mean colours 0..255, None where they are not known
     tree    the tree that the parts were cut from, None where there is none
     names   (P,) what each part is called, empty where nothing says
+    com_std, inertia_share   how wrong the shape may be, as in `Parts`; 0 where nothing says
     """
 
     solid: TetMesh
@@ -52,6 +53,8 @@ class SavedParts:
     rgb: Array | None = None
     tree: Hierarchy | None = None
     names: tuple[str, ...] = ()
+    com_std: float = 0.0
+    inertia_share: float = 0.0
 
     def __post_init__(self) -> None:
         labels = np.array(self.labels, np.int64)
@@ -79,7 +82,8 @@ class SavedParts:
     @cached_property
     def parts(self) -> Parts:
         """The parts with their exact moments; raises BadValue where one has no volume."""
-        return Parts(np.arange(self.count), self.solid.moments(self.labels, self.count), self.rgb)
+        moments = self.solid.moments(self.labels, self.count)
+        return Parts(np.arange(self.count), moments, self.rgb, com_std=self.com_std, inertia_share=self.inertia_share)
 
     def recut(self, volumes: Sequence[float]) -> SavedParts:
         """Return the solid in the parts of these volumes (K,) [m^3]: part k is the node of the tree with volume k.
@@ -107,7 +111,8 @@ class SavedParts:
         largest_first = np.argsort(-np.bincount(labels, self.solid.volumes))
         number = np.empty(len(volumes), np.int64)
         number[largest_first] = np.argsort(-np.asarray(volumes), kind="stable")
-        return SavedParts(self.solid, number[labels], self._mean_colours(number[labels], len(volumes)), self.tree)
+        rgb = self._mean_colours(number[labels], len(volumes))
+        return replace(self, labels=number[labels], rgb=rgb, names=())
 
     def _mean_colours(self, labels: Integers, count: int) -> Array | None:
         """Return the mean colours (K, 3) of other parts of the same solid."""
@@ -135,6 +140,8 @@ def write_parts(saved: SavedParts, path: Path | str) -> None:
         "labels": saved.labels.astype(np.int32),
         "volume_m3": parts.volume,
         "centroid_m": parts.centroid,
+        "com_std_m": np.float64(saved.com_std),
+        "inertia_share": np.float64(saved.inertia_share),
     }
     if saved.rgb is not None:
         arrays["rgb"] = saved.rgb
@@ -171,7 +178,8 @@ def read_parts(path: Path | str) -> SavedParts:
         if all(name in arrays for name in _TREE):
             tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
         names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"]) if "names" in arrays else ()
-        saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names)
+        unsure = (_number(path, arrays, name) for name in ("com_std_m", "inertia_share"))
+        saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
@@ -204,6 +212,14 @@ def _arrays(path: Path) -> dict[str, Array]:
         if array.dtype.kind not in kinds:
             raise BadFile(f'{path}: array "{name}" must hold {wanted}; it holds {array.dtype}.')
     return found
+
+
+def _number(path: Path, arrays: dict[str, Array], name: str) -> float:
+    """Return an array of one number; 0 where it is missing."""
+    array = arrays.get(name, np.zeros(()))
+    if array.size != 1:
+        raise BadFile(f'{path}: array "{name}" must hold one number; it has the shape {array.shape}.')
+    return float(array.ravel()[0])
 
 
 def _whole(path: Path, arrays: dict[str, Array], name: str) -> Integers:

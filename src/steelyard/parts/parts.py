@@ -8,7 +8,7 @@ Source: "The Sum of Its Parts", eq. 1-5.
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -31,12 +31,16 @@ class Parts:
     moments  (P, 10) the ten parameters of each part at a density of 1 kg/m^3: volume [m^3], first and second moments
     rgb      (P, 3) mean colour 0..255, None where it is not known
     interior where their volume is, None where only the moments are known
+    com_std, inertia_share   standard deviations of what the shape gives, where it says so itself (a scan): of the
+             centre of mass per axis [m], and of the inertia as a share of half its trace
     """
 
     label: Labels
     moments: Array
     rgb: Array | None = None
     interior: Interior | None = None
+    com_std: float = 0.0
+    inertia_share: float = 0.0
 
     def __post_init__(self) -> None:
         moments = check.vectors("part moments", self.moments, 10)
@@ -59,6 +63,10 @@ class Parts:
         object.__setattr__(self, "moments", moments)
         if self.rgb is not None:
             object.__setattr__(self, "rgb", check.vectors("part colours", self.rgb))
+        if not (0 <= self.com_std < np.inf and 0 <= self.inertia_share < np.inf):
+            raise BadValue(
+                f"standard deviations of a shape must not be negative; got {self.com_std}, {self.inertia_share}."
+            )
 
     def __len__(self) -> int:
         return len(self.label)
@@ -85,7 +93,7 @@ class Parts:
     def in_frame(self, X_AB: Pose) -> Parts:
         """Return the same parts, given in B, seen from frame A."""
         interior = None if self.interior is None else self.interior.in_frame(X_AB)
-        return Parts(self.label, InertialParameters(self.moments).in_frame(X_AB).vector, self.rgb, interior)
+        return replace(self, moments=InertialParameters(self.moments).in_frame(X_AB).vector, interior=interior)
 
     def merged(self, groups: Sequence[Sequence[int]]) -> Parts:
         """Return parts joined: each group is a list of indices; it takes the label of its first part."""
@@ -97,4 +105,4 @@ class Parts:
         if self.rgb is not None:
             rgb = np.stack([np.average(self.rgb[g], axis=0, weights=self.volume[g]) for g in rows])
         interior = None if self.interior is None else self.interior.merged(rows)
-        return Parts(self.label[[g[0] for g in rows]], moments, rgb, interior)
+        return replace(self, label=self.label[[g[0] for g in rows]], moments=moments, rgb=rgb, interior=interior)

@@ -180,7 +180,8 @@ def _shape(parts: Parts | Shape, recording: Recording) -> Placed:
     grasp = {"grasp_m": grasp_m, "grasp_rad": grasp_rad}
     if isinstance(parts, Parts):
         _require_metres(parts)
-        return (parts.in_frame(recording.object_pose),), None, replace(MEASURED, **grasp)
+        error = MEASURED.at_least(parts.com_std, parts.inertia_share)
+        return (parts.in_frame(recording.object_pose),), None, replace(error, **grasp)
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts.parts)
     return placed, cuts.prior, replace(parts.error, **grasp)

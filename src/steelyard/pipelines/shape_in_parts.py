@@ -55,10 +55,7 @@ class Shape:
     @property
     def error(self) -> ShapeError:
         """How wrong the shape may be: no less than a measured mesh, more as far as the solid is unsure of itself."""
-        return ShapeError(
-            com_m=max(MEASURED.com_m, self.solid.surface_m),
-            inertia_share=max(MEASURED.inertia_share, self.solid.volume_std),
-        )
+        return MEASURED.at_least(self.solid.surface_m, self.solid.volume_std)
 
     def cuts(self) -> Cuts:
         """Return the cuts that a log may choose from: about the number shape and colour chose, and half of it.
