@@ -16,20 +16,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import pose_rows
+from steelyard.team import pose_rows, pose_statistic
 from steelyard.team.adjoint import adjoint_inverse, exp
 from steelyard.team.pose_noise import pose_noise
-from steelyard.team.pose_rows import OWN, SIGN, WHICH
+from steelyard.team.pose_solver import Shown, Solver
+from steelyard.team.pose_statistic import ENTRIES, OWN
 from steelyard.team.poses import Team, TeamMotion
 
 STEPS = 25
-# A direction of a grasp is shown where the motion along it is so many times the noise of a single row.
-SHOWN = 5.0
 # Noise to begin with [rad, m].
 GUESS = 1e-3
 # The information is taken anew where the noise has changed by this share.
@@ -77,8 +75,10 @@ class Rows:
         W, inverse, pattern = _weights(data, team, noise)
         turns, places, apart = pose_rows.settled(
             data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position,
-            Z.rotation.matrix, Z.position, turns, places, _twist(data), team.delays, W, inverse, pattern, sweeps,
+            Z.rotation.matrix, Z.position, turns, places, data.twists, team.delays, W, inverse, pattern, sweeps,
         )  # fmt: skip
+        for made in (turns, places, apart):
+            made.flags.writeable = False
         return cls(data, team, turns, places, apart)
 
     @cached_property
@@ -103,13 +103,9 @@ class Rows:
         W, inverse, pattern = _weights(self.data, self.still, noise)
         out = pose_rows.pulled(
             self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position, self.turns,
-            self.places, _twist(self.data), W, inverse, pattern, each,
+            self.places, self.data.twists, W, inverse, pattern, each,
         )  # fmt: skip
         return out if each else out[0]
-
-
-def _twist(data: TeamMotion) -> Array:
-    return np.zeros((0, data.count, 6)) if data.twist is None else data.twist
 
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
@@ -124,50 +120,17 @@ def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, 
 
 def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
     """Return what all rows say of all parameters (13 N, 13 N), the motion eliminated."""
-    J, W = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
+    J, weight = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
     out = np.zeros((OWN * data.count, OWN * data.count))
     for S, seen in zip(data.scatter, data.patterns[0], strict=True):
-        if seen.any():
-            out += pose_rows.information(S, J, W, seen, WHICH, SIGN)
+        if not seen.any():
+            continue
+        W = (weight * seen[:, None]).ravel()
+        pushed = J.reshape(-1, 6) * W[:, None]
+        P = -pushed @ np.linalg.inv(pushed.T @ J.reshape(-1, 6)) @ pushed.T
+        P[np.diag_indices_from(P)] += W
+        out += pose_statistic.information(S, P, ENTRIES)
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """What the motion shows of the unknown parameters.
-
-    inverse  (K, K) their covariance for white noise, zero along what is lost
-    lost     (K, L) directions of theirs that the motion does not show, unit length in units of the noise
-    """
-
-    inverse: Array
-    lost: Array
-
-
-def shown(H: Array, unknown: Integers, noise: Array, rows: int) -> Shown:
-    """Return what information (K, K) about the parameters `unknown` shows of them.
-
-    Homes and delays always follow; of what is then left for the grasps, a direction counts as lost where the motion
-    along it is less than SHOWN times the noise of a row: from noise alone, poses look as if they moved that much.
-    """
-    grasp = unknown % OWN < 6
-    homes = np.linalg.pinv(H[np.ix_(~grasp, ~grasp)], hermitian=True)
-    carried = H[np.ix_(grasp, ~grasp)] @ homes
-    left = H[np.ix_(grasp, grasp)] - carried @ H[np.ix_(~grasp, grasp)]
-    scale = _unit(unknown[grasp], noise, rows)
-    values, vectors = np.linalg.eigh(left * np.outer(scale, scale))
-    seen = values > SHOWN**2
-    root = scale[:, None] * vectors[:, seen]
-    inverse = np.zeros_like(H)
-    inner = (root / values[seen]) @ root.T
-    back = -carried.T @ inner
-    inverse[np.ix_(grasp, grasp)] = inner
-    inverse[np.ix_(~grasp, grasp)] = back
-    inverse[np.ix_(grasp, ~grasp)] = back.T
-    inverse[np.ix_(~grasp, ~grasp)] = homes - back @ carried
-    lost = np.zeros((len(unknown), int((~seen).sum())))
-    lost[grasp] = scale[:, None] * vectors[:, ~seen]
-    return Shown(inverse, lost)
 
 
 def _gauged(information: Array, common: float, unknown: Integers) -> Array:
@@ -179,55 +142,6 @@ def _gauged(information: Array, common: float, unknown: Integers) -> Array:
     H, timed = information[np.ix_(unknown, unknown)], unknown % OWN == OWN - 1
     H[np.ix_(timed, timed)] += common
     return H
-
-
-def _unit(grasp: Integers, noise: Array, rows: int) -> Array:
-    """Return steps of grasps that all rows together tell by their noise alone."""
-    turn, place = noise[grasp // OWN].T
-    return np.asarray(1 / np.sqrt(np.where(grasp % OWN < 3, 2.0, (turn / place) ** 2) * rows))
-
-
-@dataclass(frozen=True, eq=False)
-class Solver:
-    """Steps from pulls: by Cholesky where everything is shown, which is quick, else in the directions that are."""
-
-    order: Integers
-    factor: tuple[Array, bool] | None
-    scale: Array
-    shown: Shown | None
-
-    @classmethod
-    def of(cls, H: Array, unknown: Integers, noise: Array, rows: int) -> Solver:
-        """Return the solver of information H (K, K) about the parameters `unknown`."""
-        grasp = unknown % OWN < 6
-        order = np.concatenate([np.flatnonzero(~grasp), np.flatnonzero(grasp)])
-        scale = 1 / np.sqrt(np.maximum(np.diag(H)[order], 1e-300))
-        try:
-            factor = cho_factor(H[np.ix_(order, order)] * np.outer(scale, scale), lower=True)
-            first = int((~grasp).sum())
-            inner = np.tril(factor[0][first:, first:]) * (_unit(unknown[grasp], noise, rows) / scale[first:])[:, None]
-            np.linalg.cholesky(inner @ inner.T - SHOWN**2 * np.eye(len(inner)))
-        except LinAlgError:
-            return cls(order, None, scale, shown(H, unknown, noise, rows))
-        return cls(order, factor, scale, None)
-
-    def step(self, pull: Array) -> Array:
-        """Return the step (K,) for a pull."""
-        if self.shown is not None:
-            return np.asarray(self.shown.inverse @ pull)
-        out = np.empty_like(pull)
-        out[self.order] = self.scale * cho_solve(self.factor, self.scale * pull[self.order])
-        return out
-
-    def all_shown(self) -> Shown:
-        """Return the covariance for white noise, and what is lost."""
-        if self.shown is not None:
-            return self.shown
-        inverse = np.empty((len(self.order), len(self.order)))
-        inverse[np.ix_(self.order, self.order)] = np.outer(self.scale, self.scale) * cho_solve(
-            self.factor, np.eye(len(self.order))
-        )
-        return Shown(inverse, np.zeros((len(self.order), 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,6 +159,11 @@ class PoseFit:
     def solved(self) -> Shown:
         """Covariance of the unknown parameters for white noise, and what is lost."""
         return self.solver.all_shown()
+
+    @property
+    def doubt(self) -> Array:
+        """Standard deviations (N,) of the delays for white noise [s]; empty where they were not estimated."""
+        return np.sqrt(self.solver.variance(self.unknown % OWN == OWN - 1))
 
     @property
     def team(self) -> Team:

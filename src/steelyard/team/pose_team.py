@@ -18,7 +18,6 @@ from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
-from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
@@ -97,9 +96,8 @@ class PoseTeam:
             timed = replace(data, twist=_twists(parts, team))
             fit = fit_poses(timed, replace(team, delays=np.zeros(len(log.names))), reference, fit.noise)
             step = fit.team.delays
-            doubt = np.sqrt(np.diag(fit.solved.inverse)[fit.unknown % OWN == OWN - 1])
             late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
-            if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * doubt)).all():
+            if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
                 break
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
