@@ -24,7 +24,7 @@ from steelyard.team import pose_rows, pose_statistic
 from steelyard.team.adjoint import adjoint_inverse, exp
 from steelyard.team.pose_noise import pose_noise
 from steelyard.team.pose_solver import Shown, Solver
-from steelyard.team.pose_statistic import ENTRIES, OWN
+from steelyard.team.pose_statistic import OWN
 from steelyard.team.poses import Team, TeamMotion
 
 STEPS = 25
@@ -123,13 +123,8 @@ def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
     J, weight = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
     out = np.zeros((OWN * data.count, OWN * data.count))
     for S, seen in zip(data.scatter, data.patterns[0], strict=True):
-        if not seen.any():
-            continue
-        W = (weight * seen[:, None]).ravel()
-        pushed = J.reshape(-1, 6) * W[:, None]
-        P = -pushed @ np.linalg.inv(pushed.T @ J.reshape(-1, 6)) @ pushed.T
-        P[np.diag_indices_from(P)] += W
-        out += pose_statistic.information(S, P, ENTRIES)
+        if seen.any():
+            out += pose_statistic.information(S, J, weight * seen[:, None])
     return out
 
 

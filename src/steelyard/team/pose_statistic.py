@@ -20,28 +20,29 @@ AT_ONCE = 4096
 
 @numba.njit(cache=True, error_model="numpy")
 def features(R: Array, p: Array, twist: Array, valid: Mask) -> Array:
-    """Return the features (T, N * 25) of measured poses R (T, N, 3, 3), p (T, N, 3); zeros where not valid.
+    """Return the features (T, 25 N) of measured poses R (T, N, 3, 3), p (T, N, 3); zeros where not valid.
 
-    With twist (0, N, 6) the first 19 of them (T, N * 19).
+    One feature of all robots after the other; with twist (0, N, 6) the first 19 (T, 19 N).
     """
     T, N = p.shape[:2]
-    width = FEATURES if len(twist) else POSED
-    out = np.zeros((T, N * width))
+    timed = len(twist) > 0
+    out = np.zeros((T, FEATURES if timed else POSED, N))
     for t in range(T):
         for i in range(N):
             if not valid[t, i]:
                 continue
-            row = out[t, width * i : width * (i + 1)]
-            row[0] = 1.0
-            x, y, z = p[t, i]
+            out[t, 0, i] = 1.0
+            x, y, z = p[t, i, 0], p[t, i, 1], p[t, i, 2]
             for a in range(3):
                 u, v, w = R[t, i, 0, a], R[t, i, 1, a], R[t, i, 2, a]
-                row[1 + 3 * a], row[2 + 3 * a], row[3 + 3 * a] = u, v, w
+                out[t, 1 + 3 * a, i], out[t, 2 + 3 * a, i], out[t, 3 + 3 * a, i] = u, v, w
                 # Row a of R^T [p]x.
-                row[10 + 3 * a], row[11 + 3 * a], row[12 + 3 * a] = v * z - w * y, w * x - u * z, u * y - v * x
-            for a in range(width - POSED):
-                row[POSED + a] = twist[t, i, a]
-    return out
+                out[t, 10 + 3 * a, i], out[t, 11 + 3 * a, i] = v * z - w * y, w * x - u * z
+                out[t, 12 + 3 * a, i] = u * y - v * x
+            if timed:
+                for a in range(6):
+                    out[t, POSED + a, i] = twist[t, i, a]
+    return out.reshape(T, -1)
 
 
 def _entries() -> Integers:
@@ -65,47 +66,44 @@ ENTRIES = _entries()
 
 def scatter(R: Array, p: Array, twist: Array, valid: Mask) -> Array:
     """Return the scatter (25 N, 25 N) of the features of all these rows; arguments as in `features`."""
-    count = p.shape[1]
-    width = FEATURES if len(twist) else POSED
-    total = np.zeros((width * count, width * count))
+    size = FEATURES * p.shape[1]
+    seen = size if len(twist) else POSED * p.shape[1]
+    out = np.zeros((size, size))
     for start in range(0, len(p), AT_ONCE):
         rows = slice(start, start + AT_ONCE)
         F = features(R[rows], p[rows], twist[rows], valid[rows])
-        total += F.T @ F
-    if width == FEATURES:
-        return total
-    out = np.zeros((count, FEATURES, count, FEATURES))
-    out[:, :POSED, :, :POSED] = total.reshape(count, POSED, count, POSED)
-    return out.reshape(count * FEATURES, -1)
+        out[:seen, :seen] += F.T @ F
+    return out
+
+
+def information(scatter: Array, J: Array, W: Array) -> Array:
+    """Return what the rows of one pattern of robots say of all parameters (13 N, 13 N), the motion eliminated.
+
+    scatter (25 N, 25 N) of the features    J (N, 6, 6) residuals per motion of the payload    W (N, 6) weights, zero
+    for robots that are not in the pattern
+    """
+    count = len(W)
+    stack, weight = J.swapaxes(0, 1).reshape(-1, 6), W.T.ravel()
+    pushed = stack * weight[:, None]
+    # Weights of residuals less what any motion takes up.
+    P = -pushed @ np.linalg.inv(pushed.T @ stack) @ pushed.T
+    P[np.diag_indices_from(P)] += weight
+    out = _contracted(scatter.reshape(FEATURES, count, -1), P.reshape(6, count, -1), ENTRIES)
+    return out.reshape(OWN, count, OWN, count).transpose(1, 0, 3, 2).reshape(OWN * count, -1)
 
 
 @numba.njit(cache=True, error_model="numpy")
-def information(scatter: Array, P: Array, entries: Integers) -> Array:
-    """Return what the rows of one pattern of robots say of all parameters (13 N, 13 N), the motion eliminated.
-
-    scatter (25 N, 25 N) of the features    P (6 N, 6 N) weights of residuals less what any motion takes up, zero for
-    robots that are not in the pattern    entries (E, 4) of K
-    """
-    N, E = len(P) // 6, len(entries)
-    out, half, block = np.zeros((OWN * N, OWN * N)), np.empty((6, OWN, FEATURES)), np.empty((FEATURES, FEATURES))
+def _contracted(scatter: Array, P: Array, entries: Integers) -> Array:
+    """Return sum_ab K_am P_ab K_bn (13, N, 13 N) from the scatter (25, N, 25 N) of what is in K; P (6, N, 6 N)."""
+    N = P.shape[1]
+    out = np.zeros((OWN, N, OWN * N))
     for i in range(N):
-        for j in range(i + 1):
-            for g in range(FEATURES):
-                for f in range(FEATURES):
-                    block[g, f] = scatter[FEATURES * j + g, FEATURES * i + f]
-            half[:] = 0.0
-            for q in range(E):
-                b, n, line = entries[q, 0], entries[q, 1], block[entries[q, 2]]
-                for a in range(6):
-                    share = P[6 * i + a, 6 * j + b] * entries[q, 3]
-                    for f in range(FEATURES):
-                        half[a, n, f] += share * line[f]
-            for r in range(E):
-                a, m, f = entries[r, 0], OWN * i + entries[r, 1], entries[r, 2]
-                for n in range(OWN):
-                    out[m, OWN * j + n] += entries[r, 3] * half[a, n, f]
-            if i != j:
-                for m in range(OWN):
-                    for n in range(OWN):
-                        out[OWN * j + n, OWN * i + m] = out[OWN * i + m, OWN * j + n]
+        for r in range(len(entries)):
+            for q in range(len(entries)):
+                sign = float(entries[r, 3] * entries[q, 3])
+                total = out[entries[r, 1], i, entries[q, 1] * N : entries[q, 1] * N + N]
+                share = P[entries[r, 0], i, entries[q, 0] * N : entries[q, 0] * N + N]
+                line = scatter[entries[r, 2], i, entries[q, 2] * N : entries[q, 2] * N + N]
+                for j in range(N):
+                    total[j] += sign * share[j] * line[j]
     return out
