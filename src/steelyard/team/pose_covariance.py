@@ -117,11 +117,10 @@ def _turned(rows: Array, central: Array) -> Array:
 
 def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
-    scores = fit.rows.pull(fit.noise, each=True)
+    rows = len(fit.rows.apart)
     # Sums over an eighth of a window, then over windows that move by as much.
-    part = max(1, _window(fit.rows.apart, len(scores)) // 8)
-    sums = np.add.reduceat(scores, np.arange(0, len(scores), part), axis=0)[: len(scores) // part]
-    sums = _turned(sums, central)
+    part = max(1, _window(fit.rows.apart, rows) // 8)
+    sums = _turned(fit.rows.pulls(fit.noise, part)[: rows // part], central)
     sums = np.cumsum(np.concatenate([np.zeros((1, sums.shape[1])), sums - sums.mean(0)]), axis=0)
     width = min(8, max(1, len(sums) // 4))
     batches, share = sums[width:] - sums[:-width], width / (len(sums) - 1)
@@ -137,11 +136,11 @@ def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
 def _window(residual: Array, rows: int) -> int:
     """Return the number of rows of a window, from how long residuals stay correlated."""
     flat = residual.reshape(rows, -1)
-    flat = np.ascontiguousarray(flat[:, flat.any(0)])
-    power = np.maximum((flat**2).sum(), 1e-300)
+    flat = flat.ravel() if len(flat) and flat[0].all() else np.ascontiguousarray(flat[:, flat.any(0)]).ravel()
+    power, width = max(float(flat @ flat), 1e-300), len(flat) // rows
     length, lag = 1.0, 1
     while lag < rows // 4:
-        share = float(flat[lag:].ravel() @ flat[:-lag].ravel() / power)
+        share = float(flat[lag * width :] @ flat[: -lag * width]) / power
         if share < 0.05:
             break
         length, lag = length + 2 * share, lag + 1

@@ -86,26 +86,28 @@ class Rows:
         """Where everything is."""
         return replace(self.still, motion=Pose(Rotation(self.turns), self.places))
 
-    @property
+    @cached_property
     def residual(self) -> Array:
         """Residuals (T, N, 6) in each grasp's own axes."""
-        parts = self.apart.reshape(*self.apart.shape[:2], 2, 3)
-        return np.asarray((parts @ self.still.grasps.rotation.matrix).reshape(self.apart.shape))
+        return pose_rows.in_own(self.apart, self.still.grasps.rotation.matrix)
 
     def noise(self, noise: Array) -> Array:
         """Return the noise (N, 2) that the residuals show, from one to begin with."""
         along = Pose(Rotation.identity(self.data.count), self.still.grasps.position)
-        return pose_noise(self.apart, self.data.valid, adjoint_inverse(along), noise)
+        return pose_noise(self.apart, self.data.complete, adjoint_inverse(along), noise)
 
-    def pull(self, noise: Array, each: bool = False) -> Array:
-        """Return half the gradient of chi^2 (13 N,), sign turned, or what `each` row (T, 13 N) adds to it."""
+    def pull(self, noise: Array) -> Array:
+        """Return half the gradient of chi^2 (13 N,), sign turned."""
+        return np.asarray(self.pulls(noise, len(self.data.valid))[0])
+
+    def pulls(self, noise: Array, rows: int) -> Array:
+        """Return what every so many rows add to half the gradient of chi^2 (T / rows, 13 N), sign turned."""
         G, Z = self.still.grasps, self.still.homes
         W, inverse, pattern = _weights(self.data, self.still, noise)
-        out = pose_rows.pulled(
+        return pose_rows.pulled(
             self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position, self.turns,
-            self.places, self.data.twists, W, inverse, pattern, each,
+            self.places, self.data.twists, W, inverse, pattern, rows,
         )  # fmt: skip
-        return out if each else out[0]
 
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:

@@ -17,18 +17,16 @@ SETTLED = 1e-4
 ALIKE = 1.0
 
 
-def pose_noise(residual: Array, valid: Mask, J: Array, noise: Array) -> Array:
+def pose_noise(residual: Array, complete: Mask, J: Array, noise: Array) -> Array:
     """Return the standard deviations (N, 2) of rotation [rad] and position [m].
 
-    residual  (T, N, 6) of the joint fit     valid (T, N)     J (N, 6, 6) residuals per motion of the payload
-    noise     (N, 2) to begin with
+    residual  (T, N, 6) of the joint fit     complete  (T,) rows in which all robots speak; only they count
+    J         (N, 6, 6) residuals per motion of the payload     noise  (N, 2) to begin with
 
     The motion of the payload takes up six combinations of the residuals, so that their scatter S is that of
-    (1 - J A^-1 J^T W) n; no pass over the rows. Only rows where all robots speak count.
+    (1 - J A^-1 J^T W) n; no pass over the rows.
     """
-    count = valid.shape[1]
-    spoken = valid.all(1)
-    rows = (residual if spoken.all() else residual[spoken]).reshape(-1, 6 * count)
+    rows = (residual if complete.all() else residual[complete]).reshape(-1, 6 * residual.shape[1])
     if not len(rows):
         return noise
     return noise_of_scatter(rows.T @ rows, float(len(rows)), J, noise)

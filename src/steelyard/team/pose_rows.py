@@ -57,19 +57,19 @@ def settled(
 @numba.njit(cache=True, error_model="numpy")
 def pulled(
     residual: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array, twist: Array,
-    W: Array, inverse: Array, pattern: Integers, each: bool,
+    W: Array, inverse: Array, pattern: Integers, rows: int,
 ) -> Array:  # fmt: skip
-    """Return the gradient of half chi^2 by grasps, homes and delays, sign turned: what rows add (T, 13 N), or the sum.
+    """Return the gradient of half chi^2 by grasps, homes and delays, sign turned: what every so many `rows` add to it.
 
-    Arguments as in `settled`, residuals from there; with `each` false the sum (1, 13 N). What any motion takes up of a
+    Arguments as in `settled`, residuals from there; the last of the sums (T / rows, 13 N) may be of fewer rows. What any motion takes up of a
     row is left out. With weights alike along the axes, W e is the exact gradient in each grasp's own axes, so that the
     optimum is that of the likelihood, whatever the reference and the homes.
     """
     T, N = valid.shape
-    out = np.zeros((T if each else 1, N, OWN))
+    out = np.zeros((-(-T // rows), N, OWN))
     timed = len(twist) > 0
     for t in range(T):
-        row, f = t if each else 0, _NOTHING
+        row, f = t // rows, _NOTHING
         for i in range(N):
             if valid[t, i]:
                 f = _pushed(f, W[i, 0], W[i, 1], _three(pG, i), _six(residual, t, i))
@@ -111,6 +111,17 @@ def residuals(
                 _write(out, t, i, _apart(X, place, R, p, RG, pG, RZ, pZ, t, i))
                 _into_own(RG, out, t, i, 0)
                 _into_own(RG, out, t, i, 3)
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def in_own(residual: Array, RG: Array) -> Array:
+    """Return residuals (T, N, 6) in the payload's axes in those of each grasp."""
+    out = residual.copy()
+    for t in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            _into_own(RG, out, t, i, 0)
+            _into_own(RG, out, t, i, 3)
     return out
 
 

@@ -48,6 +48,11 @@ class TeamMotion:
         return int(self.valid.shape[1])
 
     @cached_property
+    def complete(self) -> Mask:
+        """Rows (T,) in which all robots have poses."""
+        return np.asarray(self.valid.all(1))
+
+    @cached_property
     def patterns(self) -> tuple[Mask, Integers]:
         """Return the different sets of robots that have poses (C, N), and which of them each row (T,) has."""
         if self.valid.all():
