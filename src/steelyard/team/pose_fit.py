@@ -112,12 +112,8 @@ class Rows:
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
     """Return weights (N, 2), the inverse information about the motion per pattern (C, 6, 6), and patterns (T,)."""
-    J, W = adjoint_inverse(team.grasps), np.repeat(noise**-2.0, 3, axis=1)
-    found, place = data.patterns
-    held = np.einsum("cn,nab->cab", found.astype(float), np.swapaxes(J * W[:, :, None], 1, 2) @ J)
-    # Rows that nobody saw say nothing: any motion will do.
-    held[~found.any(1)] = np.eye(6)
-    return noise**-2.0, np.linalg.inv(held), place
+    W, (found, place) = noise**-2.0, data.patterns
+    return W, np.linalg.inv(pose_rows.held(team.grasps.position, W, found)), place
 
 
 def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
@@ -214,8 +210,6 @@ def fit_poses(
         full = np.zeros(OWN * count)
         full[unknown] = step
         each, path = full.reshape(-1, OWN), (here.turns, here.places)
-        team = replace(
-            team, grasps=team.grasps @ exp(each[:, :6]), homes=team.homes @ exp(each[:, 6:12]),
-            delays=team.delays + each[:, 12],
-        )  # fmt: skip
+        moved = exp(each[:, :12].reshape(-1, 2, 6))
+        team = Team(team.grasps @ moved[:, 0], team.homes @ moved[:, 1], team.motion, team.delays + each[:, 12])
     return PoseFit(reference, here, H, noise, unknown, solver)

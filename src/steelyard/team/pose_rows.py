@@ -115,6 +115,39 @@ def residuals(
 
 
 @numba.njit(cache=True, error_model="numpy")
+def held(pG: Array, W: Array, found: Mask) -> Array:
+    """Return what a row says of the payload's motion (C, 6, 6), in its axes, for every set of robots found (C, N).
+
+    With weights W (N, 2) alike along the axes, only the places pG (N, 3) of the grasps count. Rows that nobody saw say
+    nothing: any motion will do.
+    """
+    out = np.zeros((len(found), 6, 6))
+    for c in range(len(found)):
+        A = out[c]
+        if not found[c].any():
+            for a in range(6):
+                A[a, a] = 1.0
+        for i in range(len(pG)):
+            if not found[c, i]:
+                continue
+            x, y, z, turn, w = pG[i, 0], pG[i, 1], pG[i, 2], W[i, 0], W[i, 1]
+            square = x * x + y * y + z * z
+            for a in range(3):
+                A[a, a] += turn + w * square
+                A[3 + a, 3 + a] += w
+                for b in range(3):
+                    A[a, b] -= w * pG[i, a] * pG[i, b]
+            A[0, 4] -= w * z
+            A[0, 5] += w * y
+            A[1, 3] += w * z
+            A[1, 5] -= w * x
+            A[2, 3] -= w * y
+            A[2, 4] += w * x
+        A[3:, :3] = A[:3, 3:].T
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
 def in_own(residual: Array, RG: Array) -> Array:
     """Return residuals (T, N, 6) in the payload's axes in those of each grasp."""
     out = residual.copy()

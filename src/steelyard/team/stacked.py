@@ -14,6 +14,7 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.turns import turns_between
 
 # Rows that a gap may last and still be filled: far below what the payload can do in that time.
 BRIDGED = 3
@@ -116,7 +117,7 @@ def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
     It is that of `rotation_at`, `_place_at` and `channel_at` for each.
     """
     turn, pose = mean_rotation(track), track.pose
-    own = (turn.inverse() @ pose.rotation).log(), turn.inverse().apply(pose.position)
+    own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
     curve = between(track.time, np.concatenate([*own, track.wrench()], axis=1), time)
     near = near_samples(track.time, time, float(np.median(np.diff(track.time))))
     return turn @ Rotation.exp(curve[:, None, :3]), turn.apply(curve[:, 3:6]), curve[:, 6:], near
