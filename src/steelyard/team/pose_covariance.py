@@ -135,8 +135,8 @@ def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
 
 def _window(residual: Array, rows: int) -> int:
     """Return the number of rows of a window, from how long residuals stay correlated."""
-    flat = residual.reshape(rows, -1)
-    flat = flat.ravel() if len(flat) and flat[0].all() else np.ascontiguousarray(flat[:, flat.any(0)]).ravel()
+    every = residual.reshape(rows, -1)
+    flat: Array = (every if every[0].all() else every[:, every.any(0)]).ravel()
     power, width = max(float(flat @ flat), 1e-300), len(flat) // rows
     length, lag = 1.0, 1
     while lag < rows // 4:

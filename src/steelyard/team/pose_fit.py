@@ -112,8 +112,8 @@ class Rows:
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
     """Return weights (N, 2), the inverse information about the motion per pattern (C, 6, 6), and patterns (T,)."""
-    W, (found, place) = noise**-2.0, data.patterns
-    return W, np.linalg.inv(pose_rows.held(team.grasps.position, W, found)), place
+    W, (found, place) = np.asarray(noise**-2.0), data.patterns
+    return W, np.asarray(np.linalg.inv(pose_rows.held(team.grasps.position, W, found))), place
 
 
 def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:

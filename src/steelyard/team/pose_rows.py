@@ -59,9 +59,10 @@ def pulled(
     residual: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array, twist: Array,
     W: Array, inverse: Array, pattern: Integers, rows: int,
 ) -> Array:  # fmt: skip
-    """Return the gradient of half chi^2 by grasps, homes and delays, sign turned: what every so many `rows` add to it.
+    """Return the gradient of half chi^2 by grasps, homes and delays, sign turned, in sums over so many `rows`.
 
-    Arguments as in `settled`, residuals from there; the last of the sums (T / rows, 13 N) may be of fewer rows. What any motion takes up of a
+    Arguments as in `settled`, residuals from there; the last of the sums (T / rows, 13 N) may be of fewer rows.
+    What any motion takes up of a
     row is left out. With weights alike along the axes, W e is the exact gradient in each grasp's own axes, so that the
     optimum is that of the likelihood, whatever the reference and the homes.
     """
@@ -226,16 +227,16 @@ def _in_payload(RG: Array, twist: Array, t: int, i: int, factor: float) -> Six:
 
 
 @numba.njit(cache=True, error_model="numpy")
+def _row(A: Array, k: int, a: int, f: Six) -> float:
+    """Return A[k, a] f for A (C, 6, 6)."""
+    front = A[k, a, 0] * f[0] + A[k, a, 1] * f[1] + A[k, a, 2] * f[2]
+    return float(front + A[k, a, 3] * f[3] + A[k, a, 4] * f[4] + A[k, a, 5] * f[5])
+
+
+@numba.njit(cache=True, error_model="numpy")
 def _times(A: Array, k: int, f: Six) -> Six:
     """Return A[k] f for A (C, 6, 6)."""
-    return (
-        A[k, 0, 0] * f[0] + A[k, 0, 1] * f[1] + A[k, 0, 2] * f[2] + A[k, 0, 3] * f[3] + A[k, 0, 4] * f[4] + A[k, 0, 5] * f[5],
-        A[k, 1, 0] * f[0] + A[k, 1, 1] * f[1] + A[k, 1, 2] * f[2] + A[k, 1, 3] * f[3] + A[k, 1, 4] * f[4] + A[k, 1, 5] * f[5],
-        A[k, 2, 0] * f[0] + A[k, 2, 1] * f[1] + A[k, 2, 2] * f[2] + A[k, 2, 3] * f[3] + A[k, 2, 4] * f[4] + A[k, 2, 5] * f[5],
-        A[k, 3, 0] * f[0] + A[k, 3, 1] * f[1] + A[k, 3, 2] * f[2] + A[k, 3, 3] * f[3] + A[k, 3, 4] * f[4] + A[k, 3, 5] * f[5],
-        A[k, 4, 0] * f[0] + A[k, 4, 1] * f[1] + A[k, 4, 2] * f[2] + A[k, 4, 3] * f[3] + A[k, 4, 4] * f[4] + A[k, 4, 5] * f[5],
-        A[k, 5, 0] * f[0] + A[k, 5, 1] * f[1] + A[k, 5, 2] * f[2] + A[k, 5, 3] * f[3] + A[k, 5, 4] * f[4] + A[k, 5, 5] * f[5],
-    )  # fmt: skip
+    return _row(A, k, 0, f), _row(A, k, 1, f), _row(A, k, 2, f), _row(A, k, 3, f), _row(A, k, 4, f), _row(A, k, 5, f)
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -294,8 +295,10 @@ def _home_pull(X: Nine, place: Three, g: Three, home: Three, f: Six) -> Six:
     v = place[1] - home[1] + X[3] * g[0] + X[4] * g[1] + X[5] * g[2]
     w = place[2] - home[2] + X[6] * g[0] + X[7] * g[1] + X[8] * g[2]
     return (
-        X[0] * f[0] + X[1] * f[1] + X[2] * f[2] + v * z - w * y, X[3] * f[0] + X[4] * f[1] + X[5] * f[2] + w * x - u * z,
-        X[6] * f[0] + X[7] * f[1] + X[8] * f[2] + u * y - v * x, x, y, z,
+        X[0] * f[0] + X[1] * f[1] + X[2] * f[2] + v * z - w * y,
+        X[3] * f[0] + X[4] * f[1] + X[5] * f[2] + w * x - u * z,
+        X[6] * f[0] + X[7] * f[1] + X[8] * f[2] + u * y - v * x,
+        x, y, z,
     )  # fmt: skip
 
 
@@ -329,8 +332,7 @@ def _log_share(x: float, y: float, z: float, trace: float) -> float:
     s = 0.25 * (x * x + y * y + z * z)
     if s < 1e-2 and trace > 1:
         # asin(sine) / sine: what is left out is below 1e-17 of it.
-        return 0.5 * (
-            1 + s * (1 / 6 + s * (3 / 40 + s * (5 / 112 + s * (35 / 1152 + s * (63 / 2816 + s * (231 / 13312 + s * 143 / 10240))))))
-        )
+        high = 63 / 2816 + s * (231 / 13312 + s * 143 / 10240)
+        return 0.5 + 0.5 * s * (1 / 6 + s * (3 / 40 + s * (5 / 112 + s * (35 / 1152 + s * high))))
     sine = np.sqrt(s) + 1e-300
     return float(0.5 * np.arctan2(sine, 0.5 * (trace - 1)) / sine)

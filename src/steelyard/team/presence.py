@@ -44,7 +44,7 @@ def _smoothed(part: Stretch) -> Array:
     """Return the size (T, N) [N] of the force averaged over MEAN_S."""
     width = max(1, round(MEAN_S * part.rate))
     mean = uniform_filter1d(part.wrench[..., 3:], width, axis=0, mode="nearest")
-    return np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2)
+    return np.asarray(np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2))
 
 
 def _long(rows: Mask, least: float) -> Mask:
