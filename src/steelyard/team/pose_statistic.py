@@ -68,6 +68,9 @@ def scatter(R: Array, p: Array, twist: Array, valid: Mask) -> Array:
     """Return the scatter (25 N, 25 N) of the features of all these rows; arguments as in `features`."""
     size = FEATURES * p.shape[1]
     seen = size if len(twist) else POSED * p.shape[1]
+    if seen == size and len(p) <= AT_ONCE:
+        F = features(R, p, twist, valid)
+        return np.asarray(F.T @ F)
     out = np.zeros((size, size))
     for start in range(0, len(p), AT_ONCE):
         rows = slice(start, start + AT_ONCE)
