@@ -24,8 +24,9 @@ from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import balance_frame, summing
 from steelyard.team.joint import JointTeam
-from steelyard.team.pose_fit import information, shown
-from steelyard.team.pose_rows import OWN
+from steelyard.team.pose_fit import information
+from steelyard.team.pose_solver import Solver
+from steelyard.team.pose_statistic import OWN
 from steelyard.team.pose_team import PoseTeam
 from steelyard.team.poses import TeamMotion
 from steelyard.team.stacked import all_poses
@@ -44,7 +45,7 @@ def bound(noise: TeamNoise, exact: TeamTrial) -> dict[str, Array]:
     size = np.tile([noise.pose_rad, noise.pose_m], (count, 1))
     unknown = np.concatenate([OWN * i + np.arange(OWN - 1) for i in range(1, count)])
     H = information(data, team.grasps, size)[np.ix_(unknown, unknown)]
-    grasps = np.sqrt(np.diag(shown(H, unknown, size, len(data.valid)).inverse))
+    grasps = np.sqrt(np.diag(Solver.of(H, unknown, size, len(data.valid)).all_shown().inverse))
     each = grasps.reshape(count - 1, OWN - 1)
     std = _payload(noise, exact, standing)
     return {

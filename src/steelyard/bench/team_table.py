@@ -20,7 +20,7 @@ _COLUMNS = (
 _SCALE = (
     ("grasp deg", "rotation_deg", 4),
     ("grasp mm", "position_mm", 3),
-    ("+-", "position_se", 3),
+    ("   +-", "position_se", 3),
     ("s CPU", "time_s", 4),
 )
 

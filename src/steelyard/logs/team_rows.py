@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, frozen
 from steelyard.errors import BadValue
+from steelyard.logs.cubic import cubic
 from steelyard.logs.team_log import TeamRecording
 from steelyard.logs.team_track import Mask, Track
 from steelyard.spatial import Rotation
@@ -114,12 +115,12 @@ def _vectors(track: Track, name: str) -> Array:
 
 def between(known: Array, values: Array, time: Array) -> Array:
     """Return values at `time`: cubic where samples are near, monotone where they are not; ends held."""
-    from scipy.interpolate import CubicSpline, PchipInterpolator
+    from scipy.interpolate import PchipInterpolator
 
     inside = np.clip(time, known[0], known[-1])
     steps = np.diff(known)
     if len(known) > 3 and steps.max() <= _BRIDGED * np.median(steps):
-        return np.asarray(CubicSpline(known, values)(inside))
+        return np.asarray(cubic(known, np.ascontiguousarray(values, dtype=np.float64), inside))
     return np.asarray(PchipInterpolator(known, values)(inside))
 
 

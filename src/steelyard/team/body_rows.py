@@ -18,6 +18,7 @@ from steelyard.logs.conditioning import lowpass
 from steelyard.logs.log import Mask
 from steelyard.spatial import Pose, Rotation, cross, cross_matrix
 from steelyard.team.stacked import Stretch
+from steelyard.team.turns import turns_between
 
 # The path is smoothed at so many times the highest frequency that is used, which leaves that band as it is.
 PATH_FILTER = 2.0
@@ -132,13 +133,12 @@ def _inside(rows: slice, rate: float, highest_hz: float) -> slice:
 def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz: float) -> Array:
     """Return the motion (T, 12) of a path that is smoothed, then differentiated."""
     middle = Rotation.nearest(turn.matrix.mean(0))
-    path = np.concatenate([(middle.inverse() @ turn).log(), place], axis=1)
+    path = np.concatenate([turns_between(middle, turn), place], axis=1)
     if cutoff_hz < 0.45 * rate:
         path = lowpass(path, cutoff_hz, rate)
     turn, place = middle @ Rotation.exp(path[:, :3]), path[:, 3:]
     omega = np.zeros((len(place), 3))
-    near = (turn[1:-3].inverse() @ turn[3:-1]).log()
-    far = (turn[:-4].inverse() @ turn[4:]).log()
+    near, far = turns_between(turn[1:-3], turn[3:-1]), turns_between(turn[:-4], turn[4:])
     omega[2:-2] = (8 * near - far) * (rate / 12)
     second = np.zeros_like(place)
     inner = 16 * (place[1:-3] + place[3:-1]) - 30 * place[2:-2] - place[:-4] - place[4:]

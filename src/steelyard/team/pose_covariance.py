@@ -17,7 +17,7 @@ from steelyard.check import Array
 from steelyard.spatial import cross_matrix
 from steelyard.team.adjoint import adjoint
 from steelyard.team.pose_fit import PoseFit
-from steelyard.team.pose_rows import OWN
+from steelyard.team.pose_statistic import OWN
 
 # Which of rotation and position of grasp and home, and delay, each parameter of a robot is.
 KIND = np.repeat(np.arange(5), [3, 3, 3, 3, 1])
@@ -69,20 +69,24 @@ class Spread:
 
 def grasp_covariance(fit: PoseFit) -> Spread:
     """Return the covariance of grasps and delays."""
-    count = len(fit.team.delays)
+    count, unknown = len(fit.team.delays), fit.unknown
     central = _central(fit)
-    H = central.T @ fit.information @ central
-    factor = np.sqrt(_inflation(fit, np.diag(H), central))[KIND[fit.unknown % OWN]]
-    V = H[np.ix_(fit.unknown, fit.unknown)] * np.outer(factor, factor)
-    back = np.linalg.inv(central[np.ix_(fit.unknown, fit.unknown)])
-    inverse = back @ fit.solved.inverse @ back.T
-    covariance = inverse @ V @ inverse
+    H = _turned(_turned(fit.information, central).T, central)
+    factor = np.sqrt(_inflation(fit, np.diag(H), central))[KIND[unknown % OWN]]
+    V = H[np.ix_(unknown, unknown)] * np.outer(factor, factor)
+    # Grasps and delays are the same whatever homes turn about.
+    asked = np.flatnonzero((unknown % OWN < 6) | (unknown % OWN == OWN - 1))
+    inverse = np.zeros((len(asked), OWN * count))
+    inverse[:, unknown] = fit.solved.inverse[asked]
+    for i in range(count):
+        inverse[:, OWN * i + 9 : OWN * i + 12] -= inverse[:, OWN * i + 6 : OWN * i + 9] @ central[i].T
+    inverse = inverse[:, unknown]
+    covariance = inverse @ V @ inverse.T
     full, blind, late = np.zeros((6 * count, 6 * count)), np.zeros((6 * count, fit.solved.lost.shape[1])), None
-    grasp = np.flatnonzero(fit.unknown % OWN < 6)
-    place = 6 * (fit.unknown[grasp] // OWN) + fit.unknown[grasp] % OWN
+    grasp, delay = (np.flatnonzero(which) for which in (unknown[asked] % OWN < 6, unknown[asked] % OWN == OWN - 1))
+    place = 6 * (unknown[asked[grasp]] // OWN) + unknown[asked[grasp]] % OWN
     full[np.ix_(place, place)] = covariance[np.ix_(grasp, grasp)]
-    blind[place] = fit.solved.lost[grasp]
-    delay = np.flatnonzero(fit.unknown % OWN == OWN - 1)
+    blind[place] = fit.solved.lost[asked[grasp]]
     if len(delay):
         late = np.sqrt(np.maximum(_against(covariance[np.ix_(delay, delay)], fit.reference), 0))
     turn = adjoint(fit.team.grasps)
@@ -97,22 +101,26 @@ def _against(covariance: Array, reference: int) -> Array:
 
 
 def _central(fit: PoseFit) -> Array:
-    """Return B (13 N, 13 N): homes that turn about the middle of their grasp's places, by which they do not matter."""
-    count = len(fit.team.delays)
-    out = np.eye(OWN * count)
-    for i in range(count):
-        seen = fit.rows.data.valid[:, i]
-        middle = fit.rows.data.poses.position[seen, i].mean(0) if seen.any() else np.zeros(3)
-        out[OWN * i + 9 : OWN * i + 12, OWN * i + 6 : OWN * i + 9] = cross_matrix(middle)
+    """Return [c]x (N, 3, 3) of the middle of each grasp's places: homes that turn about it do not move grasps much."""
+    seen = fit.rows.data.valid
+    total = np.einsum("tn,tna->na", seen.astype(float), fit.rows.data.poses.position)
+    return cross_matrix(total / np.maximum(seen.sum(0), 1)[:, None])
+
+
+def _turned(rows: Array, central: Array) -> Array:
+    """Return rows (..., 13 N) by parameters as rows by those with homes that turn about their grasp's middle."""
+    out = rows.copy()
+    for i, cross in enumerate(central):
+        out[..., OWN * i + 6 : OWN * i + 9] += rows[..., OWN * i + 9 : OWN * i + 12] @ cross
     return out
 
 
 def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
-    scores = fit.rows.pull(fit.noise, each=True)
+    rows = len(fit.rows.apart)
     # Sums over an eighth of a window, then over windows that move by as much.
-    part = max(1, _window(fit.rows.apart, len(scores)) // 8)
-    sums = np.add.reduceat(scores, np.arange(0, len(scores), part), axis=0)[: len(scores) // part] @ central
+    part = max(1, _window(fit.rows.apart, rows) // 8)
+    sums = _turned(fit.rows.pulls(fit.noise, part)[: rows // part], central)
     sums = np.cumsum(np.concatenate([np.zeros((1, sums.shape[1])), sums - sums.mean(0)]), axis=0)
     width = min(8, max(1, len(sums) // 4))
     batches, share = sums[width:] - sums[:-width], width / (len(sums) - 1)
@@ -127,12 +135,12 @@ def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
 
 def _window(residual: Array, rows: int) -> int:
     """Return the number of rows of a window, from how long residuals stay correlated."""
-    flat = residual.reshape(rows, -1)
-    flat = np.ascontiguousarray(flat[:, flat.any(0)])
-    power = np.maximum((flat**2).sum(), 1e-300)
+    every = residual.reshape(rows, -1)
+    flat: Array = (every if every[0].all() else every[:, every.any(0)]).ravel()
+    power, width = max(float(flat @ flat), 1e-300), len(flat) // rows
     length, lag = 1.0, 1
     while lag < rows // 4:
-        share = float(flat[lag:].ravel() @ flat[:-lag].ravel() / power)
+        share = float(flat[lag * width :] @ flat[: -lag * width]) / power
         if share < 0.05:
             break
         length, lag = length + 2 * share, lag + 1

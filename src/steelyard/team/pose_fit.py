@@ -16,20 +16,18 @@ from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
-from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import pose_rows
+from steelyard.team import pose_rows, pose_statistic
 from steelyard.team.adjoint import adjoint_inverse, exp
 from steelyard.team.pose_noise import pose_noise
-from steelyard.team.pose_rows import OWN, SIGN, WHICH
+from steelyard.team.pose_solver import Shown, Solver
+from steelyard.team.pose_statistic import OWN
 from steelyard.team.poses import Team, TeamMotion
 
 STEPS = 25
-# A direction of a grasp is shown where the motion along it is so many times the noise of a single row.
-SHOWN = 5.0
 # Noise to begin with [rad, m].
 GUESS = 1e-3
 # The information is taken anew where the noise has changed by this share.
@@ -77,8 +75,10 @@ class Rows:
         W, inverse, pattern = _weights(data, team, noise)
         turns, places, apart = pose_rows.settled(
             data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position,
-            Z.rotation.matrix, Z.position, turns, places, _twist(data), team.delays, W, inverse, pattern, sweeps,
+            Z.rotation.matrix, Z.position, turns, places, data.twists, team.delays, W, inverse, pattern, sweeps,
         )  # fmt: skip
+        for made in (turns, places, apart):
+            made.flags.writeable = False
         return cls(data, team, turns, places, apart)
 
     @cached_property
@@ -86,88 +86,44 @@ class Rows:
         """Where everything is."""
         return replace(self.still, motion=Pose(Rotation(self.turns), self.places))
 
-    @property
+    @cached_property
     def residual(self) -> Array:
         """Residuals (T, N, 6) in each grasp's own axes."""
-        parts = self.apart.reshape(*self.apart.shape[:2], 2, 3)
-        return np.asarray((parts @ self.still.grasps.rotation.matrix).reshape(self.apart.shape))
+        return pose_rows.in_own(self.apart, self.still.grasps.rotation.matrix)
 
     def noise(self, noise: Array) -> Array:
         """Return the noise (N, 2) that the residuals show, from one to begin with."""
         along = Pose(Rotation.identity(self.data.count), self.still.grasps.position)
-        return pose_noise(self.apart, self.data.valid, adjoint_inverse(along), noise)
+        return pose_noise(self.apart, self.data.complete, adjoint_inverse(along), noise)
 
-    def pull(self, noise: Array, each: bool = False) -> Array:
-        """Return half the gradient of chi^2 (13 N,), sign turned, or what `each` row (T, 13 N) adds to it."""
+    def pull(self, noise: Array) -> Array:
+        """Return half the gradient of chi^2 (13 N,), sign turned."""
+        return np.asarray(self.pulls(noise, len(self.data.valid))[0])
+
+    def pulls(self, noise: Array, rows: int) -> Array:
+        """Return what every so many rows add to half the gradient of chi^2 (T / rows, 13 N), sign turned."""
         G, Z = self.still.grasps, self.still.homes
         W, inverse, pattern = _weights(self.data, self.still, noise)
-        out = pose_rows.pulled(
+        return pose_rows.pulled(
             self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position, self.turns,
-            self.places, _twist(self.data), W, inverse, pattern, each,
+            self.places, self.data.twists, W, inverse, pattern, rows,
         )  # fmt: skip
-        return out if each else out[0]
-
-
-def _twist(data: TeamMotion) -> Array:
-    return np.zeros((0, data.count, 6)) if data.twist is None else data.twist
 
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
     """Return weights (N, 2), the inverse information about the motion per pattern (C, 6, 6), and patterns (T,)."""
-    J, W = adjoint_inverse(team.grasps), np.repeat(noise**-2.0, 3, axis=1)
-    found, place = data.patterns
-    held = np.einsum("cn,nab->cab", found.astype(float), np.swapaxes(J * W[:, :, None], 1, 2) @ J)
-    # Rows that nobody saw say nothing: any motion will do.
-    held[~found.any(1)] = np.eye(6)
-    return noise**-2.0, np.linalg.inv(held), place
+    W, (found, place) = np.asarray(noise**-2.0), data.patterns
+    return W, np.asarray(np.linalg.inv(pose_rows.held(team.grasps.position, W, found))), place
 
 
 def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
     """Return what all rows say of all parameters (13 N, 13 N), the motion eliminated."""
-    J, W = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
+    J, weight = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
     out = np.zeros((OWN * data.count, OWN * data.count))
     for S, seen in zip(data.scatter, data.patterns[0], strict=True):
         if seen.any():
-            out += pose_rows.information(S, J, W, seen, WHICH, SIGN)
+            out += pose_statistic.information(S, J, weight * seen[:, None])
     return out
-
-
-@dataclass(frozen=True, eq=False)
-class Shown:
-    """What the motion shows of the unknown parameters.
-
-    inverse  (K, K) their covariance for white noise, zero along what is lost
-    lost     (K, L) directions of theirs that the motion does not show, unit length in units of the noise
-    """
-
-    inverse: Array
-    lost: Array
-
-
-def shown(H: Array, unknown: Integers, noise: Array, rows: int) -> Shown:
-    """Return what information (K, K) about the parameters `unknown` shows of them.
-
-    Homes and delays always follow; of what is then left for the grasps, a direction counts as lost where the motion
-    along it is less than SHOWN times the noise of a row: from noise alone, poses look as if they moved that much.
-    """
-    grasp = unknown % OWN < 6
-    homes = np.linalg.pinv(H[np.ix_(~grasp, ~grasp)], hermitian=True)
-    carried = H[np.ix_(grasp, ~grasp)] @ homes
-    left = H[np.ix_(grasp, grasp)] - carried @ H[np.ix_(~grasp, grasp)]
-    scale = _unit(unknown[grasp], noise, rows)
-    values, vectors = np.linalg.eigh(left * np.outer(scale, scale))
-    seen = values > SHOWN**2
-    root = scale[:, None] * vectors[:, seen]
-    inverse = np.zeros_like(H)
-    inner = (root / values[seen]) @ root.T
-    back = -carried.T @ inner
-    inverse[np.ix_(grasp, grasp)] = inner
-    inverse[np.ix_(~grasp, grasp)] = back
-    inverse[np.ix_(grasp, ~grasp)] = back.T
-    inverse[np.ix_(~grasp, ~grasp)] = homes - back @ carried
-    lost = np.zeros((len(unknown), int((~seen).sum())))
-    lost[grasp] = scale[:, None] * vectors[:, ~seen]
-    return Shown(inverse, lost)
 
 
 def _gauged(information: Array, common: float, unknown: Integers) -> Array:
@@ -179,55 +135,6 @@ def _gauged(information: Array, common: float, unknown: Integers) -> Array:
     H, timed = information[np.ix_(unknown, unknown)], unknown % OWN == OWN - 1
     H[np.ix_(timed, timed)] += common
     return H
-
-
-def _unit(grasp: Integers, noise: Array, rows: int) -> Array:
-    """Return steps of grasps that all rows together tell by their noise alone."""
-    turn, place = noise[grasp // OWN].T
-    return np.asarray(1 / np.sqrt(np.where(grasp % OWN < 3, 2.0, (turn / place) ** 2) * rows))
-
-
-@dataclass(frozen=True, eq=False)
-class Solver:
-    """Steps from pulls: by Cholesky where everything is shown, which is quick, else in the directions that are."""
-
-    order: Integers
-    factor: tuple[Array, bool] | None
-    scale: Array
-    shown: Shown | None
-
-    @classmethod
-    def of(cls, H: Array, unknown: Integers, noise: Array, rows: int) -> Solver:
-        """Return the solver of information H (K, K) about the parameters `unknown`."""
-        grasp = unknown % OWN < 6
-        order = np.concatenate([np.flatnonzero(~grasp), np.flatnonzero(grasp)])
-        scale = 1 / np.sqrt(np.maximum(np.diag(H)[order], 1e-300))
-        try:
-            factor = cho_factor(H[np.ix_(order, order)] * np.outer(scale, scale), lower=True)
-            first = int((~grasp).sum())
-            inner = np.tril(factor[0][first:, first:]) * (_unit(unknown[grasp], noise, rows) / scale[first:])[:, None]
-            np.linalg.cholesky(inner @ inner.T - SHOWN**2 * np.eye(len(inner)))
-        except LinAlgError:
-            return cls(order, None, scale, shown(H, unknown, noise, rows))
-        return cls(order, factor, scale, None)
-
-    def step(self, pull: Array) -> Array:
-        """Return the step (K,) for a pull."""
-        if self.shown is not None:
-            return np.asarray(self.shown.inverse @ pull)
-        out = np.empty_like(pull)
-        out[self.order] = self.scale * cho_solve(self.factor, self.scale * pull[self.order])
-        return out
-
-    def all_shown(self) -> Shown:
-        """Return the covariance for white noise, and what is lost."""
-        if self.shown is not None:
-            return self.shown
-        inverse = np.empty((len(self.order), len(self.order)))
-        inverse[np.ix_(self.order, self.order)] = np.outer(self.scale, self.scale) * cho_solve(
-            self.factor, np.eye(len(self.order))
-        )
-        return Shown(inverse, np.zeros((len(self.order), 0)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -245,6 +152,11 @@ class PoseFit:
     def solved(self) -> Shown:
         """Covariance of the unknown parameters for white noise, and what is lost."""
         return self.solver.all_shown()
+
+    @property
+    def doubt(self) -> Array:
+        """Standard deviations (N,) of the delays for white noise [s]; empty where they were not estimated."""
+        return np.sqrt(self.solver.variance(self.unknown % OWN == OWN - 1))
 
     @property
     def team(self) -> Team:
@@ -298,8 +210,6 @@ def fit_poses(
         full = np.zeros(OWN * count)
         full[unknown] = step
         each, path = full.reshape(-1, OWN), (here.turns, here.places)
-        team = replace(
-            team, grasps=team.grasps @ exp(each[:, :6]), homes=team.homes @ exp(each[:, 6:12]),
-            delays=team.delays + each[:, 12],
-        )  # fmt: skip
+        moved = exp(each[:, :12].reshape(-1, 2, 6))
+        team = Team(team.grasps @ moved[:, 0], team.homes @ moved[:, 1], team.motion, team.delays + each[:, 12])
     return PoseFit(reference, here, H, noise, unknown, solver)

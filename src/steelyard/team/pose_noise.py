@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numba
 import numpy as np
 
 from steelyard.check import Array
@@ -16,17 +17,16 @@ SETTLED = 1e-4
 ALIKE = 1.0
 
 
-def pose_noise(residual: Array, valid: Mask, J: Array, noise: Array) -> Array:
+def pose_noise(residual: Array, complete: Mask, J: Array, noise: Array) -> Array:
     """Return the standard deviations (N, 2) of rotation [rad] and position [m].
 
-    residual  (T, N, 6) of the joint fit     valid (T, N)     J (N, 6, 6) residuals per motion of the payload
-    noise     (N, 2) to begin with
+    residual  (T, N, 6) of the joint fit     complete  (T,) rows in which all robots speak; only they count
+    J         (N, 6, 6) residuals per motion of the payload     noise  (N, 2) to begin with
 
     The motion of the payload takes up six combinations of the residuals, so that their scatter S is that of
-    (1 - J A^-1 J^T W) n; no pass over the rows. Only rows where all robots speak count.
+    (1 - J A^-1 J^T W) n; no pass over the rows.
     """
-    count = valid.shape[1]
-    rows = residual[valid.all(1)].reshape(-1, 6 * count)
+    rows = (residual if complete.all() else residual[complete]).reshape(-1, 6 * residual.shape[1])
     if not len(rows):
         return noise
     return noise_of_scatter(rows.T @ rows, float(len(rows)), J, noise)
@@ -43,23 +43,61 @@ def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Arr
     if not rows:
         return noise
     stack = J.reshape(6 * count, 6)
-    variance = noise.ravel() ** 2
+    variance, least = noise.ravel() ** 2, np.tile(LEAST**2, count)
     likeness = ALIKE * np.kron(np.eye(count) - 1 / count, np.eye(2))
+    seen, size, squares = np.empty(2 * count), np.empty(2 * count), np.empty((2 * count, 2 * count))
     for _ in range(ROUNDS):
-        W = np.repeat(1 / variance, 3)
-        pulled = stack * W[:, None]
-        lever = pulled @ np.linalg.inv(pulled.T @ stack)
-        M = np.diag(W) - lever @ pulled.T
-        MS = W[:, None] * scatter - lever @ (pulled.T @ scatter)
-        seen = np.einsum("ab,ab->a", MS, M).reshape(-1, 3).sum(1)
-        size = np.diag(M).reshape(-1, 3).sum(1)
+        pulled = stack * np.repeat(1 / variance, 3)[:, None]
+        _scores(scatter, variance, pulled, pulled @ np.linalg.inv(pulled.T @ stack), seen, size, squares)
         slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
-        squares = (M**2).reshape(2 * count, 3, 2 * count, 3).sum((1, 3))
-        curve = 0.5 * rows * np.outer(variance, variance) * squares + likeness
-        change = np.linalg.solve(curve + 1e-9 * np.trace(curve) / len(curve) * np.eye(len(curve)), slope)
-        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), np.tile(LEAST**2, count))
+        curve = (0.5 * rows * variance[:, None]) * variance * squares + likeness
+        curve.ravel()[:: 2 * count + 1] += 1e-9 * np.trace(curve) / len(curve)
+        change = np.linalg.solve(curve, slope)
+        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), least)
         moved = float(np.abs(np.log(new / variance)).max())
         variance = new
         if moved < SETTLED:
             break
     return np.asarray(np.sqrt(variance).reshape(count, 2))
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _scores(
+    scatter: Array, variance: Array, pulled: Array, lever: Array, seen: Array, size: Array, squares: Array
+) -> None:
+    """Write, for every part of three rows, the traces of M S M (2 N,) and of M (2 N,), and the squares (2 N, 2 N) of M.
+
+    M = W - lever pulled^T (6 N, 6 N), with W = 1 / variance on its diagonal, S the scatter. M is never made: all that
+    is asked follows from six columns.
+    """
+    rows, parts = len(pulled), len(variance)
+    shared, inner = np.zeros((6, rows)), np.zeros((6, 6))
+    left, right = np.zeros((parts, 36)), np.zeros((36, parts))
+    for a in range(rows):
+        for k in range(6):
+            share = pulled[a, k]
+            for b in range(rows):
+                shared[k, b] += share * scatter[a, b]
+    for k in range(6):
+        for b in range(rows):
+            for m in range(6):
+                inner[k, m] += shared[k, b] * pulled[b, m]
+    seen[:], size[:], squares[:] = 0.0, 0.0, 0.0
+    for a in range(rows):
+        part, w = a // 3, 1 / variance[a // 3]
+        along, back, twice = 0.0, 0.0, 0.0
+        for k in range(6):
+            along += lever[a, k] * pulled[a, k]
+            back += lever[a, k] * shared[k, a]
+            for m in range(6):
+                twice += lever[a, k] * inner[k, m] * lever[a, m]
+                left[part, 6 * k + m] += lever[a, k] * lever[a, m]
+                right[6 * k + m, part] += pulled[a, k] * pulled[a, m]
+        seen[part] += w * (w * scatter[a, a] - 2 * back) + twice
+        size[part] += w - along
+        squares[part, part] += w * (w - 2 * along)
+    for i in range(parts):
+        for k in range(36):
+            share = left[i, k]
+            for j in range(parts):
+                squares[i, j] += share * right[k, j]

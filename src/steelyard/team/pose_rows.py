@@ -1,9 +1,4 @@
-"""One compiled pass over the rows of a joint fit, and the statistic from which its information comes.
-
-Every entry of K_i(t) = [1, -Ad(T_i^-1), V_i], how residual i moves with grasp, home and delay of its robot, is one of
-25 features of the measured row (a constant, the entries of R^T and of -R^T [p]x, the twist). Their scatter is gathered
-once; the information at any grasps and weights follows from it without the rows.
-"""
+"""Compiled passes over the rows of a joint fit: the motion that fits, the residuals, the gradient."""
 
 from __future__ import annotations
 
@@ -12,87 +7,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers, Mask
-
-OWN, FEATURES = 13, 25
-
-
-@numba.njit(cache=True, error_model="numpy")
-def features(R: Array, p: Array, twist: Array, valid: Mask) -> Array:
-    """Return the features (T, N * 25) of measured poses R (T, N, 3, 3), p (T, N, 3); zeros where not valid."""
-    T, N = p.shape[:2]
-    out = np.zeros((T, N * FEATURES))
-    for t in range(T):
-        for i in range(N):
-            if not valid[t, i]:
-                continue
-            row = out[t, FEATURES * i : FEATURES * (i + 1)]
-            row[0] = 1.0
-            x, y, z = p[t, i]
-            for a in range(3):
-                u, v, w = R[t, i, 0, a], R[t, i, 1, a], R[t, i, 2, a]
-                row[1 + 3 * a], row[2 + 3 * a], row[3 + 3 * a] = u, v, w
-                # Row a of R^T [p]x.
-                row[10 + 3 * a], row[11 + 3 * a], row[12 + 3 * a] = v * z - w * y, w * x - u * z, u * y - v * x
-            row[19:25] = twist[t, i]
-    return out
-
-
-def _places() -> tuple[Integers, Array]:
-    """Return which feature each entry of K (6, 13) is, and its sign (0 = the entry is zero)."""
-    which, sign = np.zeros((6, OWN), np.int64), np.zeros((6, OWN))
-    for a in range(6):
-        sign[a, a] = 1.0
-        which[a, 12], sign[a, 12] = 19 + a, 1.0
-        for m in range(3):
-            if a < 3:
-                which[a, 6 + m], sign[a, 6 + m] = 1 + 3 * a + m, -1.0
-            else:
-                which[a, 6 + m], sign[a, 6 + m] = 10 + 3 * (a - 3) + m, 1.0
-                which[a, 9 + m], sign[a, 9 + m] = 1 + 3 * (a - 3) + m, -1.0
-    return which, sign
-
-
-WHICH, SIGN = _places()
-
-
-@numba.njit(cache=True, error_model="numpy")
-def information(scatter: Array, J: Array, W: Array, valid: Mask, which: Integers, sign: Array) -> Array:
-    """Return what the rows of one pattern of robots say of all parameters (13 N, 13 N), the motion eliminated.
-
-    scatter (25 N, 25 N) of the features    J (N, 6, 6) residuals per motion of the payload    W (N, 6)    valid (N,)
-    """
-    N = len(W)
-    A = np.zeros((6, 6))
-    for i in range(N):
-        if valid[i]:
-            A += J[i].T @ (W[i].reshape(6, 1) * J[i])
-    inverse = np.linalg.inv(A)
-    out = np.zeros((OWN * N, OWN * N))
-    for i in range(N):
-        for j in range(i + 1):
-            if not (valid[i] and valid[j]):
-                continue
-            P = -(W[i].reshape(6, 1) * (J[i] @ inverse @ J[j].T)) * W[j].reshape(1, 6)
-            if i == j:
-                for a in range(6):
-                    P[a, a] += W[i, a]
-            block = scatter[FEATURES * i : FEATURES * (i + 1), FEATURES * j : FEATURES * (j + 1)]
-            for a in range(6):
-                for m in range(OWN):
-                    if sign[a, m] == 0.0:
-                        continue
-                    line = block[which[a, m]]
-                    for n in range(OWN):
-                        total = 0.0
-                        for b in range(6):
-                            if sign[b, n] != 0.0:
-                                total += P[a, b] * sign[b, n] * line[which[b, n]]
-                        out[OWN * i + m, OWN * j + n] += sign[a, m] * total
-            if i != j:
-                for m in range(OWN):
-                    for n in range(OWN):
-                        out[OWN * j + n, OWN * i + m] = out[OWN * i + m, OWN * j + n]
-    return out
+from steelyard.team.pose_statistic import OWN
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -110,185 +25,77 @@ def settled(
     """
     T, N = p.shape[:2]
     turns, places, residual = np.empty((T, 3, 3)), np.empty((T, 3)), np.zeros((T, N, 6))
-    B, x, f, W6 = np.empty((N, 12)), np.empty(6), np.empty(6), np.repeat(W, 3).reshape(N, 6)
-    shift, timed = np.zeros((N, 6)), len(twist) > 0
-    X, place, step, held = np.empty((3, 3)), np.empty(3), np.empty((3, 3)), np.empty((3, 3))
+    timed = len(twist) > 0
     for t in range(T):
-        X[:] = RX[t]
-        place[:] = pX[t]
-        e = residual[t]
-        for i in range(N):
-            if valid[t, i]:
-                _seen(R, p, RG, pG, RZ, pZ, t, i, held, B)
-                if timed:
-                    _into_payload(RG, twist[t], i, late[i], shift)
+        X, place, x = _matrix(RX, t), _three(pX, t), _NOTHING
         for _ in range(sweeps):
-            f[:] = 0.0
+            f = _NOTHING
             for i in range(N):
                 if not valid[t, i]:
                     continue
-                _apart(X, place, B, pG, i, e)
+                e = _apart(X, place, R, p, RG, pG, RZ, pZ, t, i)
                 if timed:
-                    for a in range(6):
-                        e[i, a] -= shift[i, a]
-                _pushed(W6, pG, e, i, f)
-            _times(inverse[pattern[t]], f, x)
-            for a in range(3):
-                place[a] += X[a, 0] * x[3] + X[a, 1] * x[4] + X[a, 2] * x[5]
-            _turn(x, step)
-            _product(X, step, held)
-            X[:] = held
+                    e = _less(e, _in_payload(RG, twist, t, i, late[i]))
+                _write(residual, t, i, e)
+                f = _pushed(f, W[i, 0], W[i, 1], _three(pG, i), e)
+            x = _times(inverse, pattern[t], f)
+            place = (
+                place[0] + X[0] * x[3] + X[1] * x[4] + X[2] * x[5],
+                place[1] + X[3] * x[3] + X[4] * x[4] + X[5] * x[5],
+                place[2] + X[6] * x[3] + X[7] * x[4] + X[8] * x[5],
+            )
+            X = _product(X, _turn(x[0], x[1], x[2]))
         for i in range(N):
             if valid[t, i]:
-                _taken(x, pG, i, e)
-        turns[t] = X
-        places[t] = place
+                _write(residual, t, i, _less(_six(residual, t, i), _moved(x, _three(pG, i))))
+        for a in range(3):
+            turns[t, a, 0], turns[t, a, 1], turns[t, a, 2] = X[3 * a], X[3 * a + 1], X[3 * a + 2]
+            places[t, a] = place[a]
     return turns, places, residual
 
 
 @numba.njit(cache=True, error_model="numpy")
 def pulled(
     residual: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array, twist: Array,
-    W: Array, inverse: Array, pattern: Integers, each: bool,
+    W: Array, inverse: Array, pattern: Integers, rows: int,
 ) -> Array:  # fmt: skip
-    """Return the gradient of half chi^2 by grasps, homes and delays, sign turned: what rows add (T, 13 N), or the sum.
+    """Return the gradient of half chi^2 by grasps, homes and delays, sign turned, in sums over so many `rows`.
 
-    Arguments as in `settled`, residuals from there; with `each` false the sum (1, 13 N). What any motion takes up of a
+    Arguments as in `settled`, residuals from there; the last of the sums (T / rows, 13 N) may be of fewer rows.
+    What any motion takes up of a
     row is left out. With weights alike along the axes, W e is the exact gradient in each grasp's own axes, so that the
     optimum is that of the likelihood, whatever the reference and the homes.
     """
     T, N = valid.shape
-    out = np.zeros((T if each else 1, N, OWN))
-    x, f, W6 = np.empty(6), np.empty(6), np.repeat(W, 3).reshape(N, 6)
-    rate, e, timed = np.zeros((N, 6)), np.empty((N, 6)), len(twist) > 0
+    out = np.zeros((-(-T // rows), N, OWN))
+    timed = len(twist) > 0
     for t in range(T):
-        e[:], row = residual[t], t if each else 0
-        f[:] = 0.0
+        row, f = t // rows, _NOTHING
         for i in range(N):
             if valid[t, i]:
-                _pushed(W6, pG, e, i, f)
-        _times(inverse[pattern[t]], f, x)
+                f = _pushed(f, W[i, 0], W[i, 1], _three(pG, i), _six(residual, t, i))
+        x, X, place = _times(inverse, pattern[t], f), _matrix(RX, t), _three(pX, t)
         for i in range(N):
             if not valid[t, i]:
                 continue
-            _taken(x, pG, i, e)
+            u, v = W[i, 0], W[i, 1]
+            e = _less(_six(residual, t, i), _moved(x, _three(pG, i)))
+            push = (u * e[0], u * e[1], u * e[2], v * e[3], v * e[4], v * e[5])
+            pull = _home_pull(X, place, _three(pG, i), _three(pZ, i), push)
             for a in range(6):
-                f[a] = W6[i, a] * e[i, a]
-                out[row, i, a] += f[a]
+                out[row, i, a] += push[a]
+                out[row, i, 6 + a] -= pull[a]
             if timed:
-                _into_payload(RG, twist[t], i, 1.0, rate)
-                for a in range(6):
-                    out[row, i, 12] += rate[i, a] * f[a]
-            _home_pull(RX[t], pX[t], pG[i], pZ[i], f, out[row, i])
+                rate = _in_payload(RG, twist, t, i, 1.0)
+                out[row, i, 12] += (
+                    rate[0] * push[0] + rate[1] * push[1] + rate[2] * push[2]
+                    + rate[3] * push[3] + rate[4] * push[4] + rate[5] * push[5]
+                )  # fmt: skip
     for row in range(len(out)):
         for i in range(N):
-            _into_own(RG[i], out[row, i, :6])
-            _into_own(RZ[i], out[row, i, 6:12])
+            for first in range(0, 12, 3):
+                _into_own(RG if first < 6 else RZ, out, row, i, first)
     return out.reshape(len(out), OWN * N)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _pushed(W: Array, pG: Array, e: Array, i: int, f: Array) -> None:
-    """Add what the weighted residual of grasp i pushes the payload (6,)."""
-    u, v, w = W[i, 3] * e[i, 3], W[i, 4] * e[i, 4], W[i, 5] * e[i, 5]
-    f[0] += W[i, 0] * e[i, 0] + pG[i, 1] * w - pG[i, 2] * v
-    f[1] += W[i, 1] * e[i, 1] + pG[i, 2] * u - pG[i, 0] * w
-    f[2] += W[i, 2] * e[i, 2] + pG[i, 0] * v - pG[i, 1] * u
-    f[3] += u
-    f[4] += v
-    f[5] += w
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _into_payload(RG: Array, twist: Array, i: int, factor: float, out: Array) -> None:
-    """Write `factor` times a six-vector of grasp i in the payload's axes."""
-    for k in range(0, 6, 3):
-        u, v, w = factor * twist[i, k], factor * twist[i, k + 1], factor * twist[i, k + 2]
-        for a in range(3):
-            out[i, k + a] = RG[i, a, 0] * u + RG[i, a, 1] * v + RG[i, a, 2] * w
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _taken(x: Array, pG: Array, i: int, e: Array) -> None:
-    """Take a small motion x (6,) of the payload off the residual of grasp i."""
-    for a in range(3):
-        e[i, a] -= x[a]
-    e[i, 3] -= x[3] + x[1] * pG[i, 2] - x[2] * pG[i, 1]
-    e[i, 4] -= x[4] + x[2] * pG[i, 0] - x[0] * pG[i, 2]
-    e[i, 5] -= x[5] + x[0] * pG[i, 1] - x[1] * pG[i, 0]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _times(A: Array, f: Array, x: Array) -> None:
-    """Write A f (6,)."""
-    for a in range(6):
-        x[a] = 0.0
-        for k in range(6):
-            x[a] += A[a, k] * f[k]
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _seen(
-    R: Array, p: Array, RG: Array, pG: Array, RZ: Array, pZ: Array, t: int, i: int, held: Array, B: Array
-) -> None:
-    """Write Z T G^-1: rotation (9) and position (3) of the payload as robot i sees it at row t."""
-    for a in range(3):
-        for b in range(3):
-            held[a, b] = RZ[i, a, 0] * R[t, i, 0, b] + RZ[i, a, 1] * R[t, i, 1, b] + RZ[i, a, 2] * R[t, i, 2, b]
-    for a in range(3):
-        place = pZ[i, a] + RZ[i, a, 0] * p[t, i, 0] + RZ[i, a, 1] * p[t, i, 1] + RZ[i, a, 2] * p[t, i, 2]
-        for b in range(3):
-            turn = held[a, 0] * RG[i, b, 0] + held[a, 1] * RG[i, b, 1] + held[a, 2] * RG[i, b, 2]
-            B[i, 3 * a + b] = turn
-            place -= turn * pG[i, b]
-        B[i, 9 + a] = place
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _apart(X: Array, place: Array, B: Array, pG: Array, i: int, e: Array) -> None:
-    """Write rotation vector and position (6,) of grasp i from X G to B G, in the axes of X."""
-    u, v, w = B[i, 9] - place[0], B[i, 10] - place[1], B[i, 11] - place[2]
-    E00 = X[0, 0] * B[i, 0] + X[1, 0] * B[i, 3] + X[2, 0] * B[i, 6]
-    E01 = X[0, 0] * B[i, 1] + X[1, 0] * B[i, 4] + X[2, 0] * B[i, 7]
-    E02 = X[0, 0] * B[i, 2] + X[1, 0] * B[i, 5] + X[2, 0] * B[i, 8]
-    E10 = X[0, 1] * B[i, 0] + X[1, 1] * B[i, 3] + X[2, 1] * B[i, 6]
-    E11 = X[0, 1] * B[i, 1] + X[1, 1] * B[i, 4] + X[2, 1] * B[i, 7]
-    E12 = X[0, 1] * B[i, 2] + X[1, 1] * B[i, 5] + X[2, 1] * B[i, 8]
-    E20 = X[0, 2] * B[i, 0] + X[1, 2] * B[i, 3] + X[2, 2] * B[i, 6]
-    E21 = X[0, 2] * B[i, 1] + X[1, 2] * B[i, 4] + X[2, 2] * B[i, 7]
-    E22 = X[0, 2] * B[i, 2] + X[1, 2] * B[i, 5] + X[2, 2] * B[i, 8]
-    g, h, k = pG[i, 0], pG[i, 1], pG[i, 2]
-    e[i, 3] = X[0, 0] * u + X[1, 0] * v + X[2, 0] * w + (E00 - 1) * g + E01 * h + E02 * k
-    e[i, 4] = X[0, 1] * u + X[1, 1] * v + X[2, 1] * w + E10 * g + (E11 - 1) * h + E12 * k
-    e[i, 5] = X[0, 2] * u + X[1, 2] * v + X[2, 2] * w + E20 * g + E21 * h + (E22 - 1) * k
-    share = _log_share(E21 - E12, E02 - E20, E10 - E01, E00 + E11 + E22)
-    e[i, 0], e[i, 1], e[i, 2] = share * (E21 - E12), share * (E02 - E20), share * (E10 - E01)
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _home_pull(X: Array, place: Array, pG: Array, pZ: Array, f: Array, out: Array) -> None:
-    """Take what a push f (6,) in the axes of X at X G pulls on a home off out[6:12], in the reference home's axes."""
-    x = X[0, 0] * f[3] + X[0, 1] * f[4] + X[0, 2] * f[5]
-    y = X[1, 0] * f[3] + X[1, 1] * f[4] + X[1, 2] * f[5]
-    z = X[2, 0] * f[3] + X[2, 1] * f[4] + X[2, 2] * f[5]
-    u = place[0] - pZ[0] + X[0, 0] * pG[0] + X[0, 1] * pG[1] + X[0, 2] * pG[2]
-    v = place[1] - pZ[1] + X[1, 0] * pG[0] + X[1, 1] * pG[1] + X[1, 2] * pG[2]
-    w = place[2] - pZ[2] + X[2, 0] * pG[0] + X[2, 1] * pG[1] + X[2, 2] * pG[2]
-    out[6] -= X[0, 0] * f[0] + X[0, 1] * f[1] + X[0, 2] * f[2] + v * z - w * y
-    out[7] -= X[1, 0] * f[0] + X[1, 1] * f[1] + X[1, 2] * f[2] + w * x - u * z
-    out[8] -= X[2, 0] * f[0] + X[2, 1] * f[1] + X[2, 2] * f[2] + u * y - v * x
-    out[9] -= x
-    out[10] -= y
-    out[11] -= z
-
-
-@numba.njit(cache=True, error_model="numpy")
-def _into_own(R: Array, six: Array) -> None:
-    """Turn both parts of a six-vector by R^T in place."""
-    for k in range(0, 6, 3):
-        u, v, w = six[k], six[k + 1], six[k + 2]
-        for a in range(3):
-            six[k + a] = R[0, a] * u + R[1, a] * v + R[2, a] * w
 
 
 @numba.njit(cache=True, error_model="numpy")
@@ -297,44 +104,235 @@ def residuals(
 ) -> Array:
     """Return rotation vector and position (T, N, 6) from predicted to measured, in the axes of each predicted grasp."""
     T, N = p.shape[:2]
-    out, held, B = np.zeros((T, N, 6)), np.empty((3, 3)), np.empty((N, 12))
+    out = np.zeros((T, N, 6))
     for t in range(T):
+        X, place = _matrix(RX, t), _three(pX, t)
         for i in range(N):
             if valid[t, i]:
-                _seen(R, p, RG, pG, RZ, pZ, t, i, held, B)
-                _apart(RX[t], pX[t], B, pG, i, out[t])
-                _into_own(RG[i], out[t, i])
+                _write(out, t, i, _apart(X, place, R, p, RG, pG, RZ, pZ, t, i))
+                _into_own(RG, out, t, i, 0)
+                _into_own(RG, out, t, i, 3)
     return out
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _product(A: Array, B: Array, out: Array) -> None:
-    """Write A B (3, 3): at this size plain loops are much quicker than a call of BLAS."""
-    for a in range(3):
-        for b in range(3):
-            out[a, b] = A[a, 0] * B[0, b] + A[a, 1] * B[1, b] + A[a, 2] * B[2, b]
+def held(pG: Array, W: Array, found: Mask) -> Array:
+    """Return what a row says of the payload's motion (C, 6, 6), in its axes, for every set of robots found (C, N).
+
+    With weights W (N, 2) alike along the axes, only the places pG (N, 3) of the grasps count. Rows that nobody saw say
+    nothing: any motion will do.
+    """
+    out = np.zeros((len(found), 6, 6))
+    for c in range(len(found)):
+        A = out[c]
+        if not found[c].any():
+            for a in range(6):
+                A[a, a] = 1.0
+        for i in range(len(pG)):
+            if not found[c, i]:
+                continue
+            x, y, z, turn, w = pG[i, 0], pG[i, 1], pG[i, 2], W[i, 0], W[i, 1]
+            square = x * x + y * y + z * z
+            for a in range(3):
+                A[a, a] += turn + w * square
+                A[3 + a, 3 + a] += w
+                for b in range(3):
+                    A[a, b] -= w * pG[i, a] * pG[i, b]
+            A[0, 4] -= w * z
+            A[0, 5] += w * y
+            A[1, 3] += w * z
+            A[1, 5] -= w * x
+            A[2, 3] -= w * y
+            A[2, 4] += w * x
+        A[3:, :3] = A[:3, 3:].T
+    return out
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _turn(vector: Array, out: Array) -> None:
-    """Write the rotation (3, 3) about the first three of `vector` by their length [rad] (Rodrigues)."""
-    x, y, z = vector[0], vector[1], vector[2]
+def in_own(residual: Array, RG: Array) -> Array:
+    """Return residuals (T, N, 6) in the payload's axes in those of each grasp."""
+    out = residual.copy()
+    for t in range(out.shape[0]):
+        for i in range(out.shape[1]):
+            _into_own(RG, out, t, i, 0)
+            _into_own(RG, out, t, i, 3)
+    return out
+
+
+# What follows takes and gives numbers, not arrays: writes to arrays would make the compiler read every other one anew.
+_NOTHING = (0.0, 0.0, 0.0, 0.0, 0.0, 0.0)
+Six = tuple[float, float, float, float, float, float]
+Three = tuple[float, float, float]
+Nine = tuple[float, float, float, float, float, float, float, float, float]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _matrix(R: Array, t: int) -> Nine:
+    """Return the entries of one matrix of (T, 3, 3), row after row."""
+    return R[t, 0, 0], R[t, 0, 1], R[t, 0, 2], R[t, 1, 0], R[t, 1, 1], R[t, 1, 2], R[t, 2, 0], R[t, 2, 1], R[t, 2, 2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _three(p: Array, t: int) -> Three:
+    """Return one vector of (T, 3)."""
+    return p[t, 0], p[t, 1], p[t, 2]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _six(e: Array, t: int, i: int) -> Six:
+    """Return one vector of (T, N, 6)."""
+    return e[t, i, 0], e[t, i, 1], e[t, i, 2], e[t, i, 3], e[t, i, 4], e[t, i, 5]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _write(out: Array, t: int, i: int, e: Six) -> None:
+    """Set one vector of (T, N, 6)."""
+    out[t, i, 0], out[t, i, 1], out[t, i, 2], out[t, i, 3], out[t, i, 4], out[t, i, 5] = e
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _less(e: Six, x: Six) -> Six:
+    """Return e - x."""
+    return e[0] - x[0], e[1] - x[1], e[2] - x[2], e[3] - x[3], e[4] - x[4], e[5] - x[5]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _moved(x: Six, g: Three) -> Six:
+    """Return what a small motion x of the payload does to a grasp at g."""
+    return (
+        x[0], x[1], x[2],
+        x[3] + x[1] * g[2] - x[2] * g[1], x[4] + x[2] * g[0] - x[0] * g[2], x[5] + x[0] * g[1] - x[1] * g[0],
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _pushed(f: Six, turn: float, place: float, g: Three, e: Six) -> Six:
+    """Return f and what the residual e of a grasp at g, with weights `turn` and `place`, pushes the payload."""
+    u, v, w = place * e[3], place * e[4], place * e[5]
+    return (
+        f[0] + (turn * e[0] + g[1] * w - g[2] * v), f[1] + (turn * e[1] + g[2] * u - g[0] * w),
+        f[2] + (turn * e[2] + g[0] * v - g[1] * u), f[3] + u, f[4] + v, f[5] + w,
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _in_payload(RG: Array, twist: Array, t: int, i: int, factor: float) -> Six:
+    """Return `factor` times the twist of grasp i at row t in the payload's axes."""
+    G, s = _matrix(RG, i), _six(twist, t, i)
+    return (
+        factor * (G[0] * s[0] + G[1] * s[1] + G[2] * s[2]), factor * (G[3] * s[0] + G[4] * s[1] + G[5] * s[2]),
+        factor * (G[6] * s[0] + G[7] * s[1] + G[8] * s[2]), factor * (G[0] * s[3] + G[1] * s[4] + G[2] * s[5]),
+        factor * (G[3] * s[3] + G[4] * s[4] + G[5] * s[5]), factor * (G[6] * s[3] + G[7] * s[4] + G[8] * s[5]),
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _row(A: Array, k: int, a: int, f: Six) -> float:
+    """Return A[k, a] f for A (C, 6, 6)."""
+    front = A[k, a, 0] * f[0] + A[k, a, 1] * f[1] + A[k, a, 2] * f[2]
+    return float(front + A[k, a, 3] * f[3] + A[k, a, 4] * f[4] + A[k, a, 5] * f[5])
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _times(A: Array, k: int, f: Six) -> Six:
+    """Return A[k] f for A (C, 6, 6)."""
+    return _row(A, k, 0, f), _row(A, k, 1, f), _row(A, k, 2, f), _row(A, k, 3, f), _row(A, k, 4, f), _row(A, k, 5, f)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _product(A: Nine, B: Nine) -> Nine:
+    """Return A B of two matrices."""
+    return (
+        A[0] * B[0] + A[1] * B[3] + A[2] * B[6], A[0] * B[1] + A[1] * B[4] + A[2] * B[7],
+        A[0] * B[2] + A[1] * B[5] + A[2] * B[8], A[3] * B[0] + A[4] * B[3] + A[5] * B[6],
+        A[3] * B[1] + A[4] * B[4] + A[5] * B[7], A[3] * B[2] + A[4] * B[5] + A[5] * B[8],
+        A[6] * B[0] + A[7] * B[3] + A[8] * B[6], A[6] * B[1] + A[7] * B[4] + A[8] * B[7],
+        A[6] * B[2] + A[7] * B[5] + A[8] * B[8],
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _across(A: Nine) -> Nine:
+    """Return the transpose."""
+    return A[0], A[3], A[6], A[1], A[4], A[7], A[2], A[5], A[8]
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _apart(
+    X: Nine, place: Three, R: Array, p: Array, RG: Array, pG: Array, RZ: Array, pZ: Array, t: int, i: int
+) -> Six:
+    """Return rotation vector and position of grasp i at row t from X G to Z T, in the axes of X.
+
+    The rotation is that of E = X^T Z R G^T; the position X^T (Z p - X g) needs it not.
+    """
+    M = _product(_across(X), _matrix(RZ, i))
+    u, v, w = pZ[i, 0] - place[0], pZ[i, 1] - place[1], pZ[i, 2] - place[2]
+    x, y, z = p[t, i, 0], p[t, i, 1], p[t, i, 2]
+    seen = (
+        R[t, i, 0, 0], R[t, i, 0, 1], R[t, i, 0, 2], R[t, i, 1, 0], R[t, i, 1, 1], R[t, i, 1, 2], R[t, i, 2, 0],
+        R[t, i, 2, 1], R[t, i, 2, 2],
+    )  # fmt: skip
+    E = _product(_product(M, seen), _across(_matrix(RG, i)))
+    a, b, c = E[7] - E[5], E[2] - E[6], E[3] - E[1]
+    share = _log_share(a, b, c, E[0] + E[4] + E[8])
+    return (
+        share * a, share * b, share * c,
+        X[0] * u + X[3] * v + X[6] * w + M[0] * x + M[1] * y + M[2] * z - pG[i, 0],
+        X[1] * u + X[4] * v + X[7] * w + M[3] * x + M[4] * y + M[5] * z - pG[i, 1],
+        X[2] * u + X[5] * v + X[8] * w + M[6] * x + M[7] * y + M[8] * z - pG[i, 2],
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _home_pull(X: Nine, place: Three, g: Three, home: Three, f: Six) -> Six:
+    """Return what a push f in the axes of X at the grasp g pulls on a home, in the reference home's axes."""
+    x, y, z = (
+        X[0] * f[3] + X[1] * f[4] + X[2] * f[5],
+        X[3] * f[3] + X[4] * f[4] + X[5] * f[5],
+        X[6] * f[3] + X[7] * f[4] + X[8] * f[5],
+    )
+    u = place[0] - home[0] + X[0] * g[0] + X[1] * g[1] + X[2] * g[2]
+    v = place[1] - home[1] + X[3] * g[0] + X[4] * g[1] + X[5] * g[2]
+    w = place[2] - home[2] + X[6] * g[0] + X[7] * g[1] + X[8] * g[2]
+    return (
+        X[0] * f[0] + X[1] * f[1] + X[2] * f[2] + v * z - w * y,
+        X[3] * f[0] + X[4] * f[1] + X[5] * f[2] + w * x - u * z,
+        X[6] * f[0] + X[7] * f[1] + X[8] * f[2] + u * y - v * x,
+        x, y, z,
+    )  # fmt: skip
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _into_own(R: Array, out: Array, t: int, i: int, first: int) -> None:
+    """Turn three numbers of out[t, i] from `first` on by the transpose of R[i]."""
+    u, v, w = out[t, i, first], out[t, i, first + 1], out[t, i, first + 2]
+    for a in range(3):
+        out[t, i, first + a] = R[i, 0, a] * u + R[i, 1, a] * v + R[i, 2, a] * w
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _turn(x: float, y: float, z: float) -> Nine:
+    """Return the rotation about (x, y, z) by its length [rad] (Rodrigues)."""
     square = x * x + y * y + z * z
-    angle = np.sqrt(square)
-    if angle < 1e-4:
+    if square < 1e-8:
         a, b = 1 - square / 6, 0.5 - square / 24
     else:
+        angle = np.sqrt(square)
         a, b = np.sin(angle) / angle, 2 * (np.sin(0.5 * angle) / angle) ** 2
-    out[0, 0], out[0, 1], out[0, 2] = 1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y
-    out[1, 0], out[1, 1], out[1, 2] = b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x
-    out[2, 0], out[2, 1], out[2, 2] = b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y)
+    return (
+        1 - b * (y * y + z * z), b * x * y - a * z, b * x * z + a * y,
+        b * x * y + a * z, 1 - b * (x * x + z * z), b * y * z - a * x,
+        b * x * z - a * y, b * y * z + a * x, 1 - b * (x * x + y * y),
+    )  # fmt: skip
 
 
 @numba.njit(cache=True, error_model="numpy")
 def _log_share(x: float, y: float, z: float, trace: float) -> float:
     """Return what the skew part (x, y, z), twice the sine times the axis, is to be multiplied by for its vector."""
-    square = 0.25 * (x * x + y * y + z * z)
-    if square < 1e-6 and trace > 1:
-        return 0.5 + square / 12 + 3 * square * square / 80
-    sine = np.sqrt(square) + 1e-300
+    s = 0.25 * (x * x + y * y + z * z)
+    if s < 1e-2 and trace > 1:
+        # asin(sine) / sine: what is left out is below 1e-17 of it.
+        high = 63 / 2816 + s * (231 / 13312 + s * 143 / 10240)
+        return 0.5 + 0.5 * s * (1 / 6 + s * (3 / 40 + s * (5 / 112 + s * (35 / 1152 + s * high))))
+    sine = np.sqrt(s) + 1e-300
     return float(0.5 * np.arctan2(sine, 0.5 * (trace - 1)) / sine)

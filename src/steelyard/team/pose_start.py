@@ -14,6 +14,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.poses import Team, TeamMotion
+from steelyard.team.turns import turns_between
 
 # Turns about the one axis of rotation that are tried where it is the only one.
 TURNS = 24
@@ -61,7 +62,8 @@ def _grasp(T_r: Pose, T_i: Pose) -> Pose:
     """Return the grasp of i in that of r that explains their motions best, among a few."""
     middle = len(T_r.position) // 2
     A, B = T_r[middle].inverse() @ T_r, T_i[middle].inverse() @ T_i
-    alpha, beta = A.rotation.log(), B.rotation.log()
+    alpha = turns_between(T_r.rotation[middle], T_r.rotation)
+    beta = turns_between(T_i.rotation[middle], T_i.rotation)
     a, b = A.position - A.position.mean(0), B.position - B.position.mean(0)
     turning, moving = alpha.T @ beta, a.T @ b
     candidates = [_wahba(turning), _wahba(moving)]

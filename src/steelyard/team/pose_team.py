@@ -13,17 +13,16 @@ from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
-from steelyard.spatial.screws import log_pose
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
-from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
 from steelyard.team.slips import SlipAt, alone, edited, find_slip
 from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.turns import turns_between, twists_between
 
 # Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
 PUNCTUAL = 2e-4
@@ -97,9 +96,8 @@ class PoseTeam:
             timed = replace(data, twist=_twists(parts, team))
             fit = fit_poses(timed, replace(team, delays=np.zeros(len(log.names))), reference, fit.noise)
             step = fit.team.delays
-            doubt = np.sqrt(np.diag(fit.solved.inverse)[fit.unknown % OWN == OWN - 1])
             late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
-            if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * doubt)).all():
+            if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
                 break
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
@@ -143,7 +141,7 @@ class PoseTeam:
         """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
         path = self.fit.team.motion
         middle = Rotation.nearest(path.rotation.matrix.mean(0))
-        turned = float(np.sqrt(((middle.inverse() @ path.rotation).log() ** 2).mean()))
+        turned = float(np.sqrt((turns_between(middle, path.rotation) ** 2).mean()))
         moved = float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))
         return bool((self.fit.noise > LOUD * np.array([turned, moved])).any())
 
@@ -205,9 +203,9 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
         half = max(1, round(0.05 * part.rate))
         twist = np.zeros((len(part), 6))
         if len(part) > 2 * half:
-            between = motion[: -2 * half].inverse() @ motion[2 * half :]
-            twist[half:-half] = log_pose(between) * (part.rate / (2 * half))
-        out.append(-np.moveaxis(J @ twist.T, 2, 0))
+            between = twists_between(motion[: -2 * half], motion[2 * half :])
+            twist[half:-half] = between * (part.rate / (2 * half))
+        out.append(-(twist @ J.reshape(-1, 6).T).reshape(len(part), -1, 6))
     return np.concatenate(out)
 
 

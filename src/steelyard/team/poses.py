@@ -11,7 +11,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.log import Integers, Mask
 from steelyard.spatial import Pose
-from steelyard.team import pose_rows
+from steelyard.team.pose_statistic import scatter
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,14 +27,30 @@ class TeamMotion:
     valid: Mask
     twist: Array | None = None
 
+    def __post_init__(self) -> None:
+        # One layout, one compiled form of what passes over the rows.
+        object.__setattr__(self, "valid", np.ascontiguousarray(self.valid))
+        if self.twist is not None:
+            object.__setattr__(self, "twist", np.ascontiguousarray(self.twist))
+
     def rows(self, chosen: Any) -> TeamMotion:
         """Return some of the rows."""
         return TeamMotion(self.poses[chosen], self.valid[chosen], None if self.twist is None else self.twist[chosen])
 
     @property
+    def twists(self) -> Array:
+        """The twists, or (0, N, 6) where they were not asked for."""
+        return np.zeros((0, self.count, 6)) if self.twist is None else self.twist
+
+    @property
     def count(self) -> int:
         """Number of robots."""
         return int(self.valid.shape[1])
+
+    @cached_property
+    def complete(self) -> Mask:
+        """Rows (T,) in which all robots have poses."""
+        return np.asarray(self.valid.all(1))
 
     @cached_property
     def patterns(self) -> tuple[Mask, Integers]:
@@ -53,14 +69,10 @@ class TeamMotion:
 
     @cached_property
     def scatter(self) -> list[Array]:
-        """Scatter (25 N, 25 N) of the features of every row per pattern; see pose_rows."""
-        twist = np.zeros((*self.valid.shape, 6)) if self.twist is None else self.twist
-        rows = pose_rows.features(self.poses.rotation.matrix, self.poses.position, twist, self.valid)
+        """Scatter (25 N, 25 N) of the features of every row per pattern; see pose_statistic."""
         found, place = self.patterns
-        if len(found) == 1:
-            return [rows.T @ rows]
-        chosen = [rows[place == k] for k in range(len(found))]
-        return [F.T @ F for F in chosen]
+        every = [self] if len(found) == 1 else [self.rows(place == k) for k in range(len(found))]
+        return [scatter(r.poses.rotation.matrix, r.poses.position, r.twists, r.valid) for r in every]
 
 
 @dataclass(frozen=True, eq=False)

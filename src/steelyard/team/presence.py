@@ -11,6 +11,7 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from scipy.ndimage import uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.findings import Finding
@@ -42,11 +43,8 @@ def idle(parts: Sequence[Stretch]) -> list[Mask]:
 def _smoothed(part: Stretch) -> Array:
     """Return the size (T, N) [N] of the force averaged over MEAN_S."""
     width = max(1, round(MEAN_S * part.rate))
-    kernel = np.ones(width) / width
-    force = part.wrench[..., 3:].reshape(len(part), -1)
-    ends = np.pad(force, ((width // 2, width - 1 - width // 2), (0, 0)), mode="edge")
-    mean = np.stack([np.convolve(column, kernel, mode="valid") for column in ends.T], axis=1)
-    return np.asarray(np.linalg.norm(mean.reshape(len(part), -1, 3), axis=-1))
+    mean = uniform_filter1d(part.wrench[..., 3:], width, axis=0, mode="nearest")
+    return np.asarray(np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2))
 
 
 def _long(rows: Mask, least: float) -> Mask:

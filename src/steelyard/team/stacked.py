@@ -11,9 +11,10 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
-from steelyard.logs.team_rows import channel_at, common_time, mean_rotation
+from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.turns import turns_between
 
 # Rows that a gap may last and still be filled: far below what the payload can do in that time.
 BRIDGED = 3
@@ -84,6 +85,10 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
         if track.carrying is not None:
             nearest = np.clip(np.searchsorted(track.time, time - 0.5 / max(_rate(track.time), 1e-9)), 0, len(track) - 1)
             carries[:, i] &= track.carrying[nearest]
+        if _between(track, time):
+            turns[i], place[:, i], wrench[:, i], near = _together(track, time)
+            seen[:, i] = felt[:, i] = bridged(near)
+            continue
         if track.has("rotation", "position"):
             turned, had = rotation_at(track, time)
             turns[i] = turned[:, None]
@@ -97,6 +102,25 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
     return Stretch(
         recording.name, recording.kind, time, Pose(Rotation.joined(turns, 1), place), seen, wrench, felt, carries
     )
+
+
+def _between(track: Track, time: Array) -> bool:
+    """Return whether poses and forces were measured at every stamp, and `time` (M,) is not the stamps."""
+    whole = all(name in track.channels and bool(track.valid[name].all()) for name in ("rotation", "position", "force"))
+    whole = whole and len(track) > 1 and bool(track.valid.get("torque", track.valid["force"]).all())
+    return whole and not (len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6))
+
+
+def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
+    """Return rotations (M, 1), positions (M, 3) and wrenches (M, 6) at `time` (M,) from one curve, and where near.
+
+    It is that of `rotation_at`, `_place_at` and `channel_at` for each.
+    """
+    turn, pose = mean_rotation(track), track.pose
+    own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
+    curve = between(track.time, np.concatenate([*own, track.wrench()], axis=1), time)
+    near = near_samples(track.time, time, float(np.median(np.diff(track.time))))
+    return turn @ Rotation.exp(curve[:, None, :3]), turn.apply(curve[:, 3:6]), curve[:, 6:], near
 
 
 def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:

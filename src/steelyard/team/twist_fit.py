@@ -21,8 +21,9 @@ from steelyard.logs.log import Integers, Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
 from steelyard.team.pose_covariance import Spread
-from steelyard.team.pose_fit import EXACT, SHOWN
+from steelyard.team.pose_fit import EXACT
 from steelyard.team.pose_noise import noise_of_scatter
+from steelyard.team.pose_solver import SHOWN
 from steelyard.team.twist_statistic import TwistScatter
 
 STEPS = 25

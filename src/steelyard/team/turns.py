@@ -1,0 +1,74 @@
+"""Compiled passes over long paths: the small motions from one row of poses to another."""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.spatial import Pose, Rotation
+
+
+def turns_between(first: Rotation, second: Rotation) -> Array:
+    """Return the rotation vectors (T, 3) [rad], at most pi long, of first^-1 second; `first` (T,) or a single one."""
+    return _turns(first.matrix.reshape(-1, 3, 3), second.matrix)
+
+
+def twists_between(first: Pose, second: Pose) -> Array:
+    """Return the body twists (T, 6) [rad, m] that lead from poses (T,) to others in unit time; angles below pi."""
+    turn = turns_between(first.rotation, second.rotation)
+    return _twists(turn, first.rotation.matrix, second.position - first.position)
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _turns(A: Array, B: Array) -> Array:
+    """Return the logarithms (T, 3) of A^T B; A (T, 3, 3) or (1, 3, 3)."""
+    out, E, v = np.empty((len(B), 3)), np.empty((3, 3)), np.empty(3)
+    for t in range(len(B)):
+        s = t if len(A) > 1 else 0
+        for i in range(3):
+            for j in range(3):
+                E[i, j] = A[s, 0, i] * B[t, 0, j] + A[s, 1, i] * B[t, 1, j] + A[s, 2, i] * B[t, 2, j]
+        # The quaternion, four times its largest entry: no entry is then a difference of like numbers.
+        trace = E[0, 0] + E[1, 1] + E[2, 2]
+        big = 0
+        for i in range(1, 3):
+            if E[i, i] > E[big, big]:
+                big = i
+        if trace >= E[big, big]:
+            w, v[0], v[1], v[2] = 1 + trace, E[2, 1] - E[1, 2], E[0, 2] - E[2, 0], E[1, 0] - E[0, 1]
+        else:
+            i, j = (big + 1) % 3, (big + 2) % 3
+            w = E[j, i] - E[i, j]
+            v[big], v[i], v[j] = 1 + E[big, big] - E[i, i] - E[j, j], E[big, i] + E[i, big], E[big, j] + E[j, big]
+        size = np.sqrt(v[0] * v[0] + v[1] * v[1] + v[2] * v[2])
+        way = -1.0 if w < 0 else 1.0
+        share = 2 * way / np.sqrt(w * w + size * size)
+        if size > 1e-9 * abs(w):
+            share = 2 * way * np.arctan2(size, way * w) / size
+        for i in range(3):
+            out[t, i] = share * v[i]
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _twists(turn: Array, R: Array, off: Array) -> Array:
+    """Return twists (T, 6) from their rotations (T, 3) and displacements (T, 3) in the axes before R (T, 3, 3)."""
+    out = np.empty((len(turn), 6))
+    for t in range(len(turn)):
+        x, y, z = turn[t, 0], turn[t, 1], turn[t, 2]
+        u = R[t, 0, 0] * off[t, 0] + R[t, 1, 0] * off[t, 1] + R[t, 2, 0] * off[t, 2]
+        v = R[t, 0, 1] * off[t, 0] + R[t, 1, 1] * off[t, 1] + R[t, 2, 1] * off[t, 2]
+        w = R[t, 0, 2] * off[t, 0] + R[t, 1, 2] * off[t, 1] + R[t, 2, 2] * off[t, 2]
+        square = x * x + y * y + z * z
+        if square < 1e-4:
+            factor = 1 / 12 + square / 720 + square * square / 30240
+        else:
+            half = 0.5 * np.sqrt(square)
+            factor = (1 - half / np.tan(half)) / square
+        a, b, c = y * w - z * v, z * u - x * w, x * v - y * u
+        out[t, 0], out[t, 1], out[t, 2] = x, y, z
+        out[t, 3] = u - 0.5 * a + factor * (y * c - z * b)
+        out[t, 4] = v - 0.5 * b + factor * (z * a - x * c)
+        out[t, 5] = w - 0.5 * c + factor * (x * b - y * a)
+    return out
