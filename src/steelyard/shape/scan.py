@@ -12,7 +12,7 @@ from scipy.spatial import cKDTree
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.shape import depth_images as images
+from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.registration import agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, object_on_table, scene_of, surface_of, surfels
@@ -109,7 +109,7 @@ def _colours(scene: Scene, xyz: Array, normal: Array, seen: int) -> Any:
     """Return colours (N, 3): of the first `seen` points from the views, of the rest from the nearest seen point."""
     if scene.views.rgb is None:
         return None
-    rgb = images.colours(scene.views.rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise)
+    rgb = sight_lines.colours(scene.views.rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise)
     return np.concatenate([rgb, rgb[cKDTree(xyz[:seen]).query(xyz[seen:])[1]]]) if seen < len(xyz) else rgb
 
 
@@ -120,7 +120,7 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
         at = back.apply(points)
         order = in_cubes(at, 8 * scene.pixel)
         past = np.empty(len(at), np.int64)
-        past[order] = images.seen_past(*scene.images(), at[order], 0.0, scene.noise, LEAST_VIEWS)
+        past[order] = sight_lines.seen_past(*scene.images(), at[order], 0.0, scene.noise, LEAST_VIEWS)
         return (past >= min(LEAST_VIEWS, len(scene.R))) | bottom.below(at)
 
     return empty
