@@ -118,10 +118,12 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
 
     def empty(points: Array) -> Any:
         at = back.apply(points)
-        order = in_cubes(at, 8 * scene.pixel)
-        past = np.empty(len(at), np.int64)
-        past[order] = sight_lines.seen_past(*scene.images(), at[order], 0.0, scene.noise, LEAST_VIEWS)
-        return (past >= min(LEAST_VIEWS, len(scene.R))) | bottom.below(at)
+        found = np.asarray(bottom.below(at))
+        rows = np.flatnonzero(~found)
+        rows = rows[in_cubes(at[rows], 8 * scene.pixel)] if len(rows) else rows
+        past = sight_lines.seen_past(*scene.images(), at[rows], 0.0, scene.noise, LEAST_VIEWS)
+        found[rows] = past >= min(LEAST_VIEWS, len(scene.R))
+        return found
 
     return empty
 
