@@ -1,4 +1,4 @@
-"""Compiled passes over depth images: points out of pixels, and what each view says about a point.
+"""Compiled passes over depth images: points, heights and patches of surface out of pixels.
 
 All poses here are of the camera (optical axes) in one frame whose z is the height above the table.
 """
@@ -11,9 +11,7 @@ import numba
 import numpy as np
 
 FACING = 0.3  # cosine of incidence below which a view's word about a surface is not asked
-UPWARD = 0.7  # least upward component of the normal of a surface that faces up
 _STEEP = 3.0  # slope between neighbouring pixels that still counts as one surface (72 degrees)
-MOST_VIEWS = 1024  # views that can speak of one point
 
 
 @numba.njit(cache=True, nogil=True)
@@ -46,25 +44,45 @@ def height_map(
     low    (2,) corner of the grid [m]
     pitch  [m]
     """
-    fx, fy, cx, cy = camera
     out = np.zeros((rows, columns, 3))
+    first, count = stride // 2, (depth.shape[2] - stride // 2 + stride - 1) // stride
+    line = np.empty((3, count))
     for k in range(depth.shape[0]):
-        for v in range(stride // 2, depth.shape[1], stride):
-            b = (v - cy) / fy
-            x0, y0, z0 = R[k, 0, 1] * b + R[k, 0, 2], R[k, 1, 1] * b + R[k, 1, 2], R[k, 2, 1] * b + R[k, 2, 2]
-            for u in range(stride // 2, depth.shape[2], stride):
-                z = depth[k, v, u] * unit
-                if z <= 0:
-                    continue
-                a = (u - cx) / fx
-                i = int(np.floor((z * (R[k, 0, 0] * a + x0) + p[k, 0] - low[0]) / pitch))
-                j = int(np.floor((z * (R[k, 1, 0] * a + y0) + p[k, 1] - low[1]) / pitch))
+        for v in range(first, depth.shape[1], stride):
+            for m in range(count):
+                line[0, m] = depth[k, v, first + m * stride]
+            _line_of_points(unit, camera, R[k], p[k], first, v, stride, low, pitch, line)
+            for m in range(count):
+                i, j, h = line[0, m], line[1, m], line[2, m]
                 if 0 <= i < rows and 0 <= j < columns:
-                    h = z * (R[k, 2, 0] * a + z0) + p[k, 2]
-                    out[i, j, 0] += 1
-                    out[i, j, 1] += min(max(h, -cap), cap)
-                    out[i, j, 2] = max(out[i, j, 2], h)
+                    cell = out[np.uint32(i), np.uint32(j)]
+                    cell[0] += 1
+                    cell[1] += min(max(h, -cap), cap)
+                    cell[2] = max(cell[2], h)
     return out
+
+
+@numba.njit(cache=True, nogil=True, error_model="numpy")
+def _line_of_points(
+    unit: float, camera: Any, R: Any, p: Any, first: int, v: int, stride: int, low: Any, pitch: float, line: Any
+) -> None:
+    """Turn the depths in line (3, M) of the pixels of one row into their cell of the grid and height [m].
+
+    A pixel without depth has cell -1.
+    """
+    fx, fy, cx, cy = camera
+    b = (v - cy) / fy
+    r00, r10, r20 = R[0, 0], R[1, 0], R[2, 0]
+    x0, y0, z0 = R[0, 1] * b + R[0, 2], R[1, 1] * b + R[1, 2], R[2, 1] * b + R[2, 2]
+    px, py, pz, left, near = p[0], p[1], p[2], low[0], low[1]
+    row, column, height = line[0], line[1], line[2]
+    for m in range(len(row)):
+        z = row[m] * unit
+        a = (first + m * stride - cx) / fx
+        i = np.floor((z * (r00 * a + x0) + px - left) / pitch)
+        row[m] = i if z > 0 else -1.0
+        column[m] = np.floor((z * (r10 * a + y0) + py - near) / pitch)
+        height[m] = z * (r20 * a + z0) + pz
 
 
 @numba.njit(cache=True, nogil=True)
@@ -82,16 +100,20 @@ def surfels(
     """
     fx, fy, cx, cy = camera
     count, height, width = depth.shape
-    nx, ny = int(mask.shape[0] * pitch / cell) + 1, int(mask.shape[1] * pitch / cell) + 1
-    index = np.full((nx, ny, layers, 6), -1, np.int32)
+    box = _box_of(mask, low, pitch, floor, layers * cell)
+    # Cubes are counted from the corner of the table; the index holds those over the mask, with one to spare.
+    i0, j0 = max(int((box[0, 0] - low[0]) / cell) - 1, 0), max(int((box[0, 1] - low[1]) / cell) - 1, 0)
+    nx, ny = int((box[1, 0] - low[0]) / cell) + 2 - i0, int((box[1, 1] - low[1]) / cell) + 2 - j0
+    index = np.full((6, layers, nx, ny), -1, np.int32)  # neighbours on a level surface lie side by side
     size = 4096
     sums, last = np.zeros((size, 8)), np.full(size, -1, np.int32)
     n = 0
     d, e = np.empty(3), np.empty(3)
     for k in range(count):
-        for v in range(step, height - step, stride):
+        window = _window_of(box, camera, R, p, k, width, height)
+        for v in range(_first(window[2], step, stride), min(height - step, window[3] + 1), stride):
             b = (v - cy) / fy
-            for u in range(step, width - step, stride):
+            for u in range(_first(window[0], step, stride), min(width - step, window[1] + 1), stride):
                 z = depth[k, v, u] * unit
                 if z <= 0:
                     continue
@@ -134,13 +156,13 @@ def surfels(
                     main = 0 if nxw > 0 else 1
                 else:
                     main = 2 if nyw > 0 else 3
-                i, j = int((x - low[0]) / cell), int((y - low[1]) / cell)
-                row = index[i, j, layer, main]
+                i, j = int((x - low[0]) / cell) - i0, int((y - low[1]) / cell) - j0
+                row = index[main, layer, i, j]
                 if row < 0:
                     if n == size:
                         sums, last = _longer(sums, last)
                         size *= 2
-                    row = index[i, j, layer, main] = n
+                    row = index[main, layer, i, j] = n
                     n += 1
                 sums[row, 0] += x
                 sums[row, 1] += y
@@ -162,6 +184,41 @@ def surfels(
 
 
 @numba.njit(cache=True, nogil=True)
+def _box_of(mask: Any, low: Any, pitch: float, floor: float, tall: float) -> Any:
+    """Return the lower and upper corner (2, 3) of the space over the cells of a mask, `tall` from `floor` up [m]."""
+    box = np.array([[np.inf, np.inf, floor], [-np.inf, -np.inf, floor + tall]])
+    for i in range(mask.shape[0]):
+        for j in range(mask.shape[1]):
+            if mask[i, j]:
+                for axis, n in ((0, i), (1, j)):
+                    box[0, axis] = min(box[0, axis], low[axis] + n * pitch)
+                    box[1, axis] = max(box[1, axis], low[axis] + (n + 1) * pitch)
+    return box
+
+
+@numba.njit(cache=True, nogil=True)
+def _window_of(box: Any, camera: Any, R: Any, p: Any, k: int, width: int, height: int) -> tuple[int, int, int, int]:
+    """Return the first and last column and row of the pixels that may fall into a box (2, 3) seen by camera k.
+
+    A box's picture lies within those of its corners, where all of them are before the camera.
+    """
+    left, right, upper, lower = width, -1, height, -1
+    for corner in range(8):
+        z, u, v = pixel_of(camera, R, p, k, box[corner & 1, 0], box[(corner >> 1) & 1, 1], box[corner >> 2, 2])
+        if z <= 0:
+            return 0, width - 1, 0, height - 1
+        left, right = min(left, u - 1), max(right, u + 1)
+        upper, lower = min(upper, v - 1), max(lower, v + 1)
+    return left, right, upper, lower
+
+
+@numba.njit(cache=True, nogil=True, inline="always")
+def _first(least: int, step: int, stride: int) -> int:
+    """Return the first of `step`, `step + stride`, ... from `least` on, or one before it."""
+    return step + stride * (max(least - step, 0) // stride)
+
+
+@numba.njit(cache=True, nogil=True)
 def _longer(sums: Any, last: Any) -> Any:
     more, views = np.zeros((2 * len(sums), sums.shape[1])), np.full(2 * len(last), -1, np.int32)
     more[: len(sums)] = sums
@@ -179,173 +236,3 @@ def pixel_of(camera: Any, R: Any, p: Any, k: int, x: float, y: float, h: float) 
     u = camera[2] + camera[0] * (R[k, 0, 0] * x + R[k, 1, 0] * y + R[k, 2, 0] * h) / z
     v = camera[3] + camera[1] * (R[k, 0, 1] * x + R[k, 1, 1] * y + R[k, 2, 1] * h) / z
     return z, int(np.floor(u + 0.5)), int(np.floor(v + 0.5))
-
-
-@numba.njit(cache=True, nogil=True)
-def looked(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, x: Any, n: Any, window: float, noise: float, rows: Any
-) -> int:
-    """Write what the views measure near one point x (3,) with normal n (3,); return how many.
-
-    rows (MOST_VIEWS, 6): view, pixel row, pixel column, height of the measured point over the tangent plane [m],
-    cosine of incidence, whether the view saw past the point (1) or a surface within the window (0). A view that looks
-    from behind or along the surface, and one whose sight is blocked, says nothing.
-    window  heights looked at, in metres, beside 4 standard deviations of the depth noise
-    """
-    found = 0
-    for k in range(min(depth.shape[0], MOST_VIEWS)):
-        dx, dy, dh = x[0] - p[k, 0], x[1] - p[k, 1], x[2] - p[k, 2]
-        far = np.sqrt(dx * dx + dy * dy + dh * dh)
-        cosine = -(dx * n[0] + dy * n[1] + dh * n[2]) / far
-        if cosine < FACING:
-            continue
-        z, u, v = pixel_of(camera, R, p, k, x[0], x[1], x[2])
-        if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
-            continue
-        measured = depth[k, v, u] * unit
-        if measured <= 0:
-            continue
-        a, b = measured * (u - camera[2]) / camera[0], measured * (v - camera[3]) / camera[1]
-        height = 0.0
-        for i in range(3):
-            q = R[k, i, 0] * a + R[k, i, 1] * b + R[k, i, 2] * measured + p[k, i]
-            height += n[i] * (q - x[i])
-        limit = window + 4 * noise * z * z * cosine
-        if height > limit:
-            continue
-        rows[found, 0], rows[found, 1], rows[found, 2] = k, v, u
-        rows[found, 3], rows[found, 4] = height, cosine
-        rows[found, 5] = 1.0 if height < -limit else 0.0
-        found += 1
-    return found
-
-
-@numba.njit(cache=True, nogil=True)
-def settled(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float,
-    rounds: int,
-) -> Any:  # fmt: skip
-    """Move points (N, 3) along their normals to the median of what the views measure; return support (N, 3).
-
-    support  views that measure the surface, views that saw past it, and the rms of what is left [m]
-    """
-    rows = np.empty((MOST_VIEWS, 6))
-    heights = np.empty(MOST_VIEWS)
-    support = np.zeros((len(xyz), 3))
-    for i in range(len(xyz)):
-        for turn in range(rounds + 1):
-            found = looked(depth, unit, camera, R, p, xyz[i], normal[i], window, noise, rows)
-            on, past, square = 0, 0, 0.0
-            for r in range(found):
-                if rows[r, 5] > 0:
-                    past += 1
-                else:
-                    heights[on] = rows[r, 3]
-                    square += rows[r, 3] ** 2
-                    on += 1
-            support[i, 0], support[i, 1] = on, past
-            if on == 0:
-                break
-            support[i, 2] = np.sqrt(square / on)
-            if turn < rounds:
-                # the mean of the middle half: near the median's robustness, most of the mean's precision
-                order = np.sort(heights[:on])
-                low, high = on // 4, on - on // 4
-                step = order[low:high].mean()
-                for j in range(3):
-                    xyz[i, j] += step * normal[i, j]
-    return support
-
-
-@numba.njit(cache=True, nogil=True)
-def colours(
-    rgb: Any, depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float,
-    clear: float, enough: int,
-) -> Any:  # fmt: skip
-    """Return the median colour (N, 3) of the views that see each point, and which points `enough` of them saw (N,).
-
-    clear  height over the table [m] below which a pixel may show the table; it counts only for a surface that faces up,
-           which nothing but the table's own noise comes as near to
-    """
-    rows = np.empty((MOST_VIEWS, 6))
-    values = np.empty((3, MOST_VIEWS))
-    out, seen = np.zeros((len(xyz), 3), np.uint8), np.zeros(len(xyz), np.bool_)
-    for i in range(len(xyz)):
-        found = looked(depth, unit, camera, R, p, xyz[i], normal[i], window, noise, rows)
-        on = 0
-        for r in range(found):
-            if rows[r, 5] != 0:
-                continue
-            k, v, u = int(rows[r, 0]), int(rows[r, 1]), int(rows[r, 2])
-            z = depth[k, v, u] * unit
-            height = R[k, 2, 0] * (u - camera[2]) / camera[0] + R[k, 2, 1] * (v - camera[3]) / camera[1] + R[k, 2, 2]
-            if height * z + p[k, 2] < clear and normal[i, 2] < UPWARD:
-                continue
-            for c in range(3):
-                values[c, on] = rgb[k, v, u, c]
-            on += 1
-        seen[i] = on >= enough
-        for c in range(3):
-            if on:
-                out[i, c] = int(np.median(values[c, :on]) + 0.5)
-    return out, seen
-
-
-@numba.njit(cache=True, nogil=True)
-def seen_past(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, points: Any, margin: float, noise: float, enough: int
-) -> Any:
-    """Return how many views (N,), up to `enough`, measured something behind each point (N, 3): there it is empty.
-
-    margin  by how much farther, beside 3 standard deviations of the depth noise [m]
-    """
-    out = np.zeros(len(points), np.int64)
-    for i in range(len(points)):
-        for k in range(depth.shape[0]):
-            z, u, v = pixel_of(camera, R, p, k, points[i, 0], points[i, 1], points[i, 2])
-            if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
-                continue
-            if depth[k, v, u] * unit > z + margin + 3 * noise * z * z:
-                out[i] += 1
-                if out[i] >= enough:
-                    break
-    return out
-
-
-@numba.njit(cache=True, nogil=True)
-def feet(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, step: float, levels: int, noise: float
-) -> Any:
-    """Return how high above the table (z = 0) walls end (N,) [m]: 0 where they reach it.
-
-    xyz     (N, 3) points of walls; normal (N, 3) level unit vectors out of them
-
-    Down the wall, sight lines that still end on it are told from those that pass under it and end on the table, by
-    least squares over all views that face it.
-    """
-    rows = np.empty((MOST_VIEWS, 6))
-    out = np.zeros(len(xyz))
-    x = np.empty(3)
-    for i in range(len(xyz)):
-        for level in range(1, levels + 1):
-            x[0], x[1], x[2] = xyz[i, 0], xyz[i, 1], level * step
-            found = looked(depth, unit, camera, R, p, x, normal[i], 2 * step, noise, rows)
-            product, square, error = 0.0, 0.0, 0.0
-            for r in range(found):
-                k = int(rows[r, 0])
-                away = x - p[k]
-                # where the sight line meets the table, behind the wall
-                behind = (away * normal[i]).sum() * x[2] / (p[k, 2] - x[2])
-                sigma = noise * (away * away).sum() * rows[r, 4]
-                if behind > 0 or rows[r, 3] < 1.5 * behind - 4 * sigma:
-                    continue
-                product += rows[r, 3] * behind / sigma**2
-                square += behind * behind / sigma**2
-                error += 1
-            if error < 3 or square < 25.0:  # the two cannot be told apart yet: five standard deviations
-                continue
-            if product > 0.5 * square:
-                out[i] = x[2]
-            else:
-                break
-    return out

@@ -13,6 +13,7 @@ from scipy.spatial import cKDTree
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
+from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.registration import agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, object_on_table, scene_of, surface_of, surfels
@@ -116,7 +117,7 @@ def _colours(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any, A
         return None, None
     shown, rgb = np.zeros(len(xyz), bool), np.zeros((len(xyz), 3), np.uint8)
     clear, enough = _CLEAR * scene.sigma, min(LEAST_VIEWS, len(scene.R))
-    rgb[:seen], shown[:seen] = images.colours(
+    rgb[:seen], shown[:seen] = sight_lines.colours(
         images_rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise, clear, enough
     )
     # What lies as low as the table and looks like it may be its fringe.
@@ -148,10 +149,12 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
 
     def empty(points: Array) -> Any:
         at = back.apply(points)
-        order = in_cubes(at, 8 * scene.pixel)
-        past = np.empty(len(at), np.int64)
-        past[order] = images.seen_past(*scene.images(), at[order], 0.0, scene.noise, LEAST_VIEWS)
-        return (past >= min(LEAST_VIEWS, len(scene.R))) | bottom.below(at)
+        found = np.asarray(bottom.below(at))
+        rows = np.flatnonzero(~found)
+        rows = rows[in_cubes(at[rows], 8 * scene.pixel)] if len(rows) else rows
+        past = sight_lines.seen_past(*scene.images(), at[rows], 0.0, scene.noise, LEAST_VIEWS)
+        found[rows] = past >= min(LEAST_VIEWS, len(scene.R))
+        return found
 
     return empty
 

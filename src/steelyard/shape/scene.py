@@ -11,7 +11,8 @@ from scipy import ndimage
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
-from steelyard.shape.table_plane import find_table, table_frame
+from steelyard.shape import sight_lines
+from steelyard.shape.table_plane import find_table, table_frame, table_spreads
 from steelyard.shape.thinning import in_cubes, spread_to
 from steelyard.shape.views import TablePlane, Views
 from steelyard.spatial import Pose
@@ -83,25 +84,9 @@ def _looked_at(R: Array, p: Array) -> Array:
 
 def _depth_noise(sampled: Array, xyz: Array, unit: float, distance: float) -> float:
     """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points."""
-    spreads = []
-    view = sampled[:, 4].astype(int)
-    near = np.abs(xyz[:, 2]) < 0.03 * distance
-    for k in np.unique(view):
-        rows = near & (view == k)
-        if rows.sum() < 30:
-            continue
-        scale = sampled[rows, 3] ** 2
-        A = np.column_stack([np.ones(rows.sum()), xyz[rows, :2]]) / scale[:, None]
-        b = xyz[rows, 2] / scale
-        keep = np.ones(len(b), bool)
-        for _ in range(3):
-            plane = np.linalg.lstsq(A[keep], b[keep], rcond=None)[0]
-            rest = b - A @ plane
-            spread = float(np.subtract(*np.percentile(rest, (75, 25)))) / 1.35
-            keep = np.abs(rest) < 3 * max(spread, 1e-9)
-        spreads.append(spread)
+    spreads = table_spreads(sampled, xyz, 0.03 * distance)
     # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
-    found = float(np.median(spreads)) / 0.7 if spreads else 0.0
+    found = float(np.median(spreads)) / 0.7 if len(spreads) else 0.0
     return max(found, float(unit / np.sqrt(12) / distance**2))
 
 
@@ -144,10 +129,10 @@ def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
 
 
 def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int) -> Array:
-    """Move points (N, 3) along their normals to what the views measure; return support (N, 3), see `images.settled`."""
+    """Move points (N, 3) along their normals to what the views measure; return support (N, 3) as there."""
     order = in_cubes(xyz, _CUBE * scene.pixel)
     moved, support = xyz[order], np.empty((len(xyz), 3))
-    support[order] = images.settled(*scene.images(), moved, normal[order], window, scene.noise, rounds)
+    support[order] = sight_lines.settled(*scene.images(), moved, normal[order], window, scene.noise, rounds)
     xyz[order] = moved
     return support
 

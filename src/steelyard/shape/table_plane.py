@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+from typing import Any
+
+import numba
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.shape.middle import quantile
 from steelyard.shape.views import TablePlane
 from steelyard.spatial import Pose, Rotation
 
@@ -13,6 +17,7 @@ _TRIES, _JUDGED = 300, 3000  # planes tried, points that judge them
 _NEAR = 0.012  # of the distance: a point this near a plane counts as on it
 _LEAST = 0.2  # share of the points that must lie on the table
 _ROUNDS = 8
+_FEW = 30  # points of one view that its noise is not told from
 
 
 def find_table(points: Array, cameras: Array, distance: float, start: TablePlane | None = None) -> TablePlane:
@@ -62,7 +67,8 @@ def _largest_plane(points: Array, cameras: Array, near: float) -> TablePlane:
 def _fitted(points: Array, plane: TablePlane) -> TablePlane:
     """Return the plane of least squares through points (N, 3), on the same side."""
     middle = points.mean(0)
-    normal = np.linalg.eigh((points - middle).T @ (points - middle))[1][:, 0]
+    about = points - middle
+    normal = np.linalg.eigh(about.T @ about)[1][:, 0]
     normal = normal if normal @ plane.normal > 0 else -normal
     return TablePlane(normal, float(normal @ middle))
 
@@ -74,3 +80,50 @@ def table_frame(table: TablePlane, middle: Array) -> Pose:
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)
     return Pose(Rotation.nearest(np.stack([x, np.cross(z, x), z], axis=1)), middle - table.height(middle) * z)
+
+
+@numba.njit(cache=True, nogil=True)
+def table_spreads(sampled: Array, xyz: Array, near: float) -> Array:
+    """Return the spread (K,) of the table's points about a plane of each view's own, heights over squared depth [1/m].
+
+    sampled  (N, 5) with the depth [m] and the number of the view in the last two columns, view by view
+    xyz      (N, 3) the points in the table's frame
+    near     height within which points belong to the table [m]
+
+    Least squares, points beyond three spreads left out from the second round on. Views of few points have none.
+    """
+    out, count, a = np.empty(len(xyz) // _FEW + 1), 0, 0
+    A, b, rest = np.empty((len(xyz), 3)), np.empty(len(xyz)), np.empty(len(xyz))
+    while a < len(xyz):
+        n, i = 0, a
+        while i < len(xyz) and sampled[i, 4] == sampled[a, 4]:
+            if abs(xyz[i, 2]) < near:
+                scale = sampled[i, 3] ** 2
+                A[n, 0], A[n, 1], A[n, 2], b[n] = 1 / scale, xyz[i, 0] / scale, xyz[i, 1] / scale, xyz[i, 2] / scale
+                n += 1
+            i += 1
+        a = i
+        if n < _FEW:
+            continue
+        plane, spread = np.zeros(3), np.inf
+        for _ in range(3):
+            plane = _plane(A[:n], b[:n], plane, 3 * max(spread, 1e-9))
+            for j in range(n):
+                rest[j] = b[j] - A[j, 0] * plane[0] - A[j, 1] * plane[1] - A[j, 2] * plane[2]
+            spread = (quantile(rest, n, 0.75) - quantile(rest, n, 0.25)) / 1.35
+        out[count] = spread
+        count += 1
+    return out[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def _plane(A: Any, b: Any, before: Any, most: float) -> Any:
+    """Return the coefficients (3,) of least squares of the rows that those `before` leave less than `most`."""
+    H, g = 1e-12 * np.eye(3), np.zeros(3)
+    for j in range(len(b)):
+        if abs(b[j] - A[j, 0] * before[0] - A[j, 1] * before[1] - A[j, 2] * before[2]) < most:
+            for r in range(3):
+                g[r] += A[j, r] * b[j]
+                for c in range(3):
+                    H[r, c] += A[j, r] * A[j, c]
+    return np.linalg.solve(H, g)

@@ -14,11 +14,11 @@ from typing import Any
 
 import numpy as np
 from scipy import ndimage, sparse
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
 from steelyard.check import Array
-from steelyard.shape import depth_images as images
+from steelyard.shape import sight_lines
 from steelyard.shape.mesh import Integers
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene
 
@@ -80,7 +80,7 @@ def closed_below(scene: Scene, xyz: Array, normal: Array, pitch: float) -> Under
     i, j = np.nonzero(np.isfinite(top))
     foot = np.column_stack([low + pitch * (np.stack([i, j], axis=1) + 0.5), np.zeros(len(i))])
     up = np.tile([0.0, 0.0, 1.0], (len(foot), 1))
-    support = images.settled(*scene.images(), settled := foot.copy(), up, WINDOW, scene.noise, 2)
+    support = sight_lines.settled(*scene.images(), settled := foot.copy(), up, WINDOW, scene.noise, 2)
     table = np.zeros(size, bool)
     table[i, j] = (support[:, 0] + support[:, 1] >= LEAST_VIEWS) & (settled[:, 2] < 0.3 * scene.sigma)
     empty_to = np.full(size, np.inf)
@@ -108,7 +108,7 @@ def _raise_to_feet(
     level = normal[wall][nearest].copy()
     level[:, 2] = 0
     level /= np.linalg.norm(level, axis=1, keepdims=True)
-    foot = images.feet(
+    foot = sight_lines.feet(
         *scene.images(), xyz[wall][nearest].copy(), level, _FOOT, int(_HIGHEST_FOOT / _FOOT), scene.noise
     )
     empty_to[i, j] = np.maximum(empty_to[i, j], np.minimum(foot, top[i, j] - 1e-6))
@@ -130,7 +130,7 @@ def _empty_to(scene: Scene, foot: Array, table_seen: Any, top: Array, step: floa
         open_ = open_[top[open_] > height]
         at = foot[open_].copy()
         at[:, 2] = height
-        past = images.seen_past(*scene.images(), at, 0.0, scene.noise, LEAST_VIEWS) >= LEAST_VIEWS
+        past = sight_lines.seen_past(*scene.images(), at, 0.0, scene.noise, LEAST_VIEWS) >= LEAST_VIEWS
         open_ = open_[past]
         out[open_] = height + step / 2
         out[open_[top[open_] <= height + step]] = np.inf
@@ -213,7 +213,11 @@ def _spanned(height: Array, rim: Any, steep: Any, under: Any) -> Array:
     energy = (bend.T @ bend + _TAUT * laplace).tocsr()
     kept, open_ = number[fixed], number[free]
     rows = energy[open_]
-    out[free] = spsolve(rows[:, open_].tocsc(), -rows[:, kept] @ out[fixed])
+    # Symmetric and positive: rows need not be exchanged, and an order for symmetric matrices fills in less.
+    factor = splu(
+        rows[:, open_].tocsc(), permc_spec="MMD_AT_PLUS_A", diag_pivot_thresh=0.0, options={"SymmetricMode": True}
+    )
+    out[free] = factor.solve(-rows[:, kept] @ out[fixed])
     return out
 
 

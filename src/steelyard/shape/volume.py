@@ -13,6 +13,7 @@ from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
+from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented
 from steelyard.shape.sheets import stacked
 from steelyard.shape.tets import TetMesh
@@ -41,6 +42,8 @@ class Solid:
     volume_std  standard deviation of the volume, as a share of it
     surface_m   standard deviation of where the surface lies, all of it moved alike [m]
     findings    what one must know about it
+    around      all cells of the complex that `mesh` was chosen from; None where the cells are no longer of one
+    inside      (T,) which of those the cells of `mesh` are
     """
 
     mesh: TetMesh
@@ -49,6 +52,8 @@ class Solid:
     volume_std: float
     surface_m: float
     findings: tuple[Finding, ...]
+    around: TetMesh | None = None
+    inside: Integers | None = None
 
 
 def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
@@ -63,15 +68,17 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
     used, findings = working_cloud(cloud, points)
     X_CB, order = canonical(used.xyz)
-    made = _enclosed(used.chosen(order).in_frame(X_CB), findings)
+    made, around = _enclosed(used.chosen(order).in_frame(X_CB), findings)
     normals = np.empty_like(used.xyz)
     normals[order] = X_CB.inverse().rotation.apply(np.asarray(made.cloud.normals))
-    mesh = TetMesh.known(used.xyz, order[made.mesh.tets], made.mesh.volumes, made.mesh.neighbours)
-    return replace(made, mesh=mesh, cloud=replace(used, normals=normals))
+    mesh, around = (
+        TetMesh.known(used.xyz, order[cells.tets], cells.volumes, cells.neighbours) for cells in (made.mesh, around)
+    )
+    return replace(made, mesh=mesh, around=around, cloud=replace(used, normals=normals))
 
 
-def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> Solid:
-    """Return the closed volume of points that need no more work, in their canonical frame and order."""
+def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> tuple[Solid, TetMesh]:
+    """Return the closed volume of points that need no more work, in their canonical frame and order, and all cells."""
     surface, turned = _oriented(used)
     mesh, centres, votes = complex_of(used.xyz, surface)
     found = _winding_number(surface, centres)
@@ -88,7 +95,8 @@ def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> Solid:
     doubt = _doubt(mesh.volumes, found, votes)
     if doubt > _CLEAR:
         doubt += stacked(surface.xyz, surface.normals, surface.near.index, SLOPE)
-    return _solid(used, surface, solid, score[score > 0], doubt, (*findings, *turned))
+    made = _solid(used, surface, solid, score[score > 0], doubt, (*findings, *turned))
+    return replace(made, inside=np.flatnonzero(score > 0)), mesh
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
