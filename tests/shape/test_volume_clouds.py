@@ -14,6 +14,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.nesting import winding_number
 from steelyard.shape.volume import Solid, enclose
 from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
 from steelyard.workshop.solids import block, ring
@@ -56,6 +57,25 @@ def test_volumes_of_known_bodies(body: object) -> None:
     assert solid.mesh.volume == pytest.approx(made.volume, rel=0.1)
     assert codes(solid) == set()
     assert score(solid.mesh, true_solid(made.mesh, 20_000)).iou > 0.85
+
+
+@pytest.mark.parametrize(
+    ("body", "least"),
+    [
+        (folded([(-120, -34, 8), (-70, -28, 9), (-14, -12, 10), (6, -7, 9)], 14, 1.5, 12), 0.9),
+        (ring(18.5, 17.2, 0, 159), 0.85),
+        (channel(155, 16.3, 17, 1.4), 0.85),
+        (channel(120, 12, 15, 1.5) + block((0, 120), (6, 50), (0, 1.5)), 0.9),
+    ],
+    ids=["folded handle", "wide tube", "channel", "channel on a plate"],
+)
+@pytest.mark.parametrize("turn", [0.0, 1.0], ids=["", "turned"])
+def test_sheet_metal_of_which_both_faces_are_seen_stays_thin(body: object, least: float, turn: float) -> None:
+    made = sheet(body, 2000)
+    pose = Pose(Rotation.exp(turn * np.array([1.0, 0.3, -0.8])), np.zeros(3))
+    solid = enclose(Cloud(pose.apply(made.cloud.xyz)))
+    assert least < solid.mesh.volume / made.volume < 1.1
+    assert "thin-thickened" not in codes(solid)
 
 
 def test_the_inside_of_a_round_body_is_full() -> None:
