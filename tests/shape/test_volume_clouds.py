@@ -11,7 +11,10 @@ from steelyard.errors import BadValue
 from steelyard.evaluate.solids import SAMPLES, score, true_solid, winding_of
 from steelyard.io.object_folders import read_object
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.islands import without_islands
 from steelyard.shape.nesting import winding_number
+from steelyard.shape.tets import TetMesh
+from steelyard.shape.ties import Complex
 from steelyard.shape.volume import Solid, enclose
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
@@ -76,6 +79,23 @@ def test_sheet_metal_of_which_both_faces_are_seen_stays_thin(body: object, least
     solid = enclose(Cloud(pose.apply(made.cloud.xyz)))
     assert least < solid.mesh.volume / made.volume < 1.1
     assert "thin-thickened" not in codes(solid)
+
+
+def test_small_free_groups_of_cells_go_unless_a_point_needs_them(brick: Sheet) -> None:
+    mesh = Complex.of(brick.cloud.xyz / 0.078)
+    a = brick.cloud.xyz[mesh.simplices]
+    volumes = np.abs(np.linalg.det(a[:, 1:] - a[:, :1])) / 6
+    whole = TetMesh.known(brick.cloud.xyz, mesh.simplices.astype(np.int64), volumes, mesh.beside.astype(np.int64))
+    middle = whole.centroids[:, 0]
+    body, cells = middle < 0.02, np.flatnonzero((middle > 0.05) & (volumes > 1e-12))
+    body[cells[0]] = True
+    assert np.array_equal(without_islands(whole, body), body)
+    beside = ~body & np.isin(whole.tets, whole.tets[body]).all(1)
+    free = np.flatnonzero(beside & ~body[np.where(whole.neighbours < 0, cells[1], whole.neighbours)].any(1))
+    assert len(free)
+    more = body.copy()
+    more[free[0]] = True
+    assert np.array_equal(without_islands(whole, more), body)
 
 
 def test_the_inside_of_a_round_body_is_full() -> None:

@@ -13,6 +13,7 @@ from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
+from steelyard.shape.islands import without_islands
 from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links
 from steelyard.shape.sheets import sheet_planes, stacked
 from steelyard.shape.tets import TetMesh
@@ -79,7 +80,8 @@ def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> Solid:
         raise BadValue(
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
-    solid = mesh.chosen(score > 0)
+    inside = without_islands(mesh, score > 0)
+    solid = mesh.chosen(inside)
     against = _against(surface, solid)
     if used.normals is not None and against > _TURNED:
         text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
@@ -87,7 +89,7 @@ def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> Solid:
     doubt = _doubt(mesh.volumes, found, votes)
     if doubt > _CLEAR:
         doubt += _contradictions(surface)
-    return _solid(used, surface, solid, score[score > 0], doubt, (*findings, *turned))
+    return _solid(used, surface, solid, score[inside], doubt, (*findings, *turned))
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
