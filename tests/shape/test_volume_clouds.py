@@ -11,9 +11,13 @@ from steelyard.errors import BadValue
 from steelyard.evaluate.solids import SAMPLES, score, true_solid, winding_of
 from steelyard.io.object_folders import read_object
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.islands import without_islands
 from steelyard.shape.nesting import winding_number
+from steelyard.shape.tets import TetMesh
+from steelyard.shape.ties import Complex
 from steelyard.shape.volume import Solid, enclose
 from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
 from steelyard.workshop.solids import block, ring
@@ -56,6 +60,42 @@ def test_volumes_of_known_bodies(body: object) -> None:
     assert solid.mesh.volume == pytest.approx(made.volume, rel=0.1)
     assert codes(solid) == set()
     assert score(solid.mesh, true_solid(made.mesh, 20_000)).iou > 0.85
+
+
+@pytest.mark.parametrize(
+    ("body", "least"),
+    [
+        (folded([(-120, -34, 8), (-70, -28, 9), (-14, -12, 10), (6, -7, 9)], 14, 1.5, 12), 0.9),
+        (ring(18.5, 17.2, 0, 159), 0.85),
+        (channel(155, 16.3, 17, 1.4), 0.85),
+        (channel(120, 12, 15, 1.5) + block((0, 120), (6, 50), (0, 1.5)), 0.9),
+    ],
+    ids=["folded handle", "wide tube", "channel", "channel on a plate"],
+)
+@pytest.mark.parametrize("turn", [0.0, 1.0], ids=["", "turned"])
+def test_sheet_metal_of_which_both_faces_are_seen_stays_thin(body: object, least: float, turn: float) -> None:
+    made = sheet(body, 2000)
+    pose = Pose(Rotation.exp(turn * np.array([1.0, 0.3, -0.8])), np.zeros(3))
+    solid = enclose(Cloud(pose.apply(made.cloud.xyz)))
+    assert least < solid.mesh.volume / made.volume < 1.1
+    assert "thin-thickened" not in codes(solid)
+
+
+def test_small_free_groups_of_cells_go_unless_a_point_needs_them(brick: Sheet) -> None:
+    mesh = Complex.of(brick.cloud.xyz / 0.078)
+    a = brick.cloud.xyz[mesh.simplices]
+    volumes = np.abs(np.linalg.det(a[:, 1:] - a[:, :1])) / 6
+    whole = TetMesh.known(brick.cloud.xyz, mesh.simplices.astype(np.int64), volumes, mesh.beside.astype(np.int64))
+    middle = whole.centroids[:, 0]
+    body, cells = middle < 0.02, np.flatnonzero((middle > 0.05) & (volumes > 1e-12))
+    body[cells[0]] = True
+    assert np.array_equal(without_islands(whole, body), body)
+    beside = ~body & np.isin(whole.tets, whole.tets[body]).all(1)
+    free = np.flatnonzero(beside & ~body[np.where(whole.neighbours < 0, cells[1], whole.neighbours)].any(1))
+    assert len(free)
+    more = body.copy()
+    more[free[0]] = True
+    assert np.array_equal(without_islands(whole, more), body)
 
 
 def test_the_inside_of_a_round_body_is_full() -> None:

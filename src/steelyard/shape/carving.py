@@ -10,6 +10,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.shape.islands import without_islands
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import Solid
 
@@ -33,7 +34,7 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     corners = around.vertices[around.tets]
     asked = np.einsum("pk,tkd->ptd", _PLACES, corners)
     share = np.asarray(empty(asked.reshape(-1, 3)), float).reshape(len(_PLACES), -1).mean(0)
-    inside = ((known >= 0) & (share < _EMPTY)) | (share < _FULL)
+    inside = without_islands(around, ((known >= 0) & (share < _EMPTY)) | (share < _FULL))
     # A cell that only the views put inside is as sure as they are.
     sure = np.where(known >= 0, known, 1 - share / _EMPTY)
     findings = tuple(f for f in solid.findings if f.code != "surface-open")

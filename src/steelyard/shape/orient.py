@@ -10,8 +10,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
-from steelyard.shape.sheets import sheet_planes, spread
+from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours, areas
+from steelyard.shape.ties import Complex, Ties
 from steelyard.shape.winding import Sight, Tree
 
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
@@ -22,6 +23,7 @@ SLOPE = 0.12  # of the line between neighbours on one sheet against its plane
 _SIGN_STEPS = 10
 _FREE = 4  # steps before signs are driven to plus or minus one
 _SWEEPS, _KEPT = 4, 0.3
+_LAST_SWEEPS, _LAST_KEPT = 10, 2.0  # of the last look at signs: a normal turns where at least two ties deny it
 _LINKED = 3.0  # links of a point that lies on a sheet
 _CERTAIN = 0.3  # of a sign
 _EDGE = 0.5  # width, in spacings, of the field that gives the normals off the sheets
@@ -38,6 +40,7 @@ class Oriented:
     area     (N,) of surface that each point stands for
     near     its neighbours
     tree     of the points
+    complex  their Delaunay complex
     spacing  median of the points
     """
 
@@ -46,6 +49,7 @@ class Oriented:
     area: Array
     near: Neighbours
     tree: Tree
+    complex: Complex
     spacing: float
 
 
@@ -58,12 +62,12 @@ def oriented(cloud: Cloud) -> Oriented:
     """Return the surface elements of a cloud; normals that it carries are kept."""
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
     near, tree = cloud.near.scaled(1 / cloud.diagonal), Tree.of(xyz)
-    spacing = float(np.median(near.spacing))
+    complex, spacing = Complex.of(xyz), float(np.median(near.spacing))
     normals = cloud.normals
     if normals is None:
         sight = Sight.of(tree, tree)
-        normals = on_sheets(xyz, consistent(sight, spacing), near, sight, spacing)
-    return Oriented(xyz, normals, areas(near, normals), near, tree, spacing)
+        normals = on_sheets(xyz, consistent(sight, spacing), near, complex, sight, spacing)
+    return Oriented(xyz, normals, areas(near, normals), near, tree, complex, spacing)
 
 
 def consistent(sight: Sight, spacing: float) -> Array:
@@ -84,27 +88,36 @@ def consistent(sight: Sight, spacing: float) -> Array:
     return np.asarray(tree.back(_units(dipoles)).T, np.float64)
 
 
-def on_sheets(xyz: Array, first: Array, near: Neighbours, sight: Sight, spacing: float) -> Array:
+def on_sheets(xyz: Array, first: Array, near: Neighbours, complex: Complex, sight: Sight, spacing: float) -> Array:
     """Return unit normals (N, 3), those of points on flat pieces of surface decided piece by piece.
 
     In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
-    toward a winding number of 1/2 at every point and spread along each sheet, in turn. Points on edges take their
-    normal from the field of all.
+    toward a winding number of 1/2 at every point and spread along each sheet and across to those that face it, in
+    turn. Points on edges take their normal from the field of all.
     """
     tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
     plane, link = sheet_planes(xyz, near.index, SLOPE)
-    sign = spread(np.sign((plane * first).sum(1)), near.index, link, _SWEEPS, _KEPT)
+    ties = Ties.of(xyz, plane, near.index, link, complex, spacing)
+    sign = ties.spread(np.sign((plane * first).sum(1)), _SWEEPS, _KEPT)
     discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing).response(sight)
     for step in range(_SIGN_STEPS):
         push = discs.adjoint(np.float32(0.5) - discs.winding(sign[order]))
         sign[order] += _length(push, discs.winding(push, _SAMPLED)[sampled]) * push
-        sign = spread(np.clip(sign, -1, 1), near.index, link, _SWEEPS, _KEPT)
+        sign = ties.spread(np.clip(sign, -1, 1), _SWEEPS, _KEPT)
         if step >= _FREE:
             sign = np.clip(2 * sign, -1, 1)
     flat = (np.abs(link).sum(1) > _LINKED) & (np.abs(sign) > _CERTAIN)
     normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
+    ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), complex, spacing)
+    normals *= ties.settled(_LAST_SWEEPS, _LAST_KEPT)[:, None]
     gradient = sight.winding_and_gradient(np.ascontiguousarray(normals[order].T, np.float32), _EDGE * spacing)[1]
     return np.where(flat[:, None], normals, -tree.back(_units(gradient)).T)
+
+
+def signed_links(link: Array, plane: Array, normals: Array, index: Any) -> Array:
+    """Return links (N, K) between planes (N, 3) as those between normals (N, 3): negative where these disagree."""
+    sign = np.sign((plane * normals).sum(1))
+    return np.asarray(link * sign[:, None] * sign[index])
 
 
 def _length(push: Any, moved: Any) -> np.float32:

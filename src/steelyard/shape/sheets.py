@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import math
-from typing import Any
 
 import numba
 import numpy as np
@@ -29,24 +28,19 @@ def sheet_planes(xyz: Array, index: Integers, slope: float) -> tuple[Array, Arra
     return normal, np.asarray(_links(xyz, normal, index, slope))
 
 
-def spread(values: Array, index: Integers, link: Array, sweeps: int, kept: float) -> Array:
-    """Return values (N,) pulled toward those of linked neighbours in `sweeps`; `kept` weighs a point's own."""
-    return np.asarray(_spread(values, index, link, sweeps, kept))
-
-
-def stacked(xyz: Array, normals: Array, index: Integers, slope: float) -> float:
+def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
     """Return the share of points (N, 3) beside another sheet that looks the same way, closer than their neighbours.
 
     Between two such sheets of a solid there must be one that looks the other way: one of the two is wrong. Only
     points on flat pieces count, and only with three such neighbours, as the steps of a body have a few.
     """
-    link = np.abs(sheet_planes(xyz, index, slope)[1]).sum(1)
+    linked = np.abs(link).sum(1)
     away = xyz[index] - xyz[:, None]
     steep = _STEEP * np.linalg.norm(away, axis=2)
     off = np.abs(np.einsum("nkd,nd->nk", away, normals)) > steep
     off &= np.abs(np.einsum("nkd,nkd->nk", away, normals[index])) > steep
     off &= np.einsum("nkd,nd->nk", normals[index], normals) > _ALIKE
-    off &= (link[:, None] > _FLAT) & (link[index] > _FLAT)
+    off &= (linked[:, None] > _FLAT) & (linked[index] > _FLAT)
     return float((off.sum(1) >= _FEW).mean())
 
 
@@ -148,17 +142,3 @@ def _links(xyz: Array, normal: Array, index: Integers, slope: float) -> Array:
             if abs(turn) > _PARALLEL and square > 0:
                 out[i, a] = turn * math.exp(-(rise * rise + other * other) / (square * slope * slope))
     return out
-
-
-@numba.njit(cache=True, nogil=True)
-def _spread(values: Array, index: Integers, link: Array, sweeps: int, kept: float) -> Any:
-    old, new = values.astype(np.float64), np.empty(len(values))
-    for _ in range(sweeps):
-        for i in range(len(values)):
-            total, weight = kept * values[i], kept
-            for a in range(index.shape[1]):
-                total += link[i, a] * old[index[i, a]]
-                weight += abs(link[i, a])
-            new[i] = total / weight
-        old, new = new, old
-    return old

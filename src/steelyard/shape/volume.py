@@ -13,19 +13,20 @@ from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
+from steelyard.shape.islands import without_islands
 from steelyard.shape.mesh import Integers
-from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented
-from steelyard.shape.sheets import stacked
+from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links
+from steelyard.shape.sheets import sheet_planes, stacked
+>>>>>>> visegrip
 from steelyard.shape.tets import TetMesh
+from steelyard.shape.ties import Ties
 from steelyard.shape.winding import Sight, Tree
 
 POINTS = 4000
-_NUDGE = 1e-7  # of the diagonal
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
-_BLURRED = 0.36  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
+_BLURRED = 0.41  # doubt (see `_doubt`) above which walls could not be told from gaps; clean solids have 0.05 to 0.25
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
-_SIDES = 100  # directions that are asked which way is out
 _OPEN = 0.07  # length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
@@ -80,58 +81,44 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> tuple[Solid, TetMesh]:
     """Return the closed volume of points that need no more work, in their canonical frame and order, and all cells."""
     surface, turned = _oriented(used)
-    mesh, centres, votes = complex_of(used.xyz, surface)
+    mesh, centres, votes = cells_of(used.xyz, surface)
     found = _winding_number(surface, centres)
     score = found - 0.5 + votes
     if not (score > 0).any():
         raise BadValue(
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
-    solid = mesh.chosen(score > 0)
+    inside = without_islands(mesh, score > 0)
+    solid = mesh.chosen(inside)
     against = _against(surface, solid)
     if used.normals is not None and against > _TURNED:
         text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
         return _enclosed(replace(used, normals=None), (*findings, Finding.of("normals-flipped", text)))
     doubt = _doubt(mesh.volumes, found, votes)
     if doubt > _CLEAR:
-        doubt += stacked(surface.xyz, surface.normals, surface.near.index, SLOPE)
-    made = _solid(used, surface, solid, score[score > 0], doubt, (*findings, *turned))
-    return replace(made, inside=np.flatnonzero(score > 0)), mesh
+        doubt += _contradictions(surface)
+    made = _solid(used, surface, solid, score[inside], doubt, (*findings, *turned))
+    return replace(made, inside=np.flatnonzero(inside)), mesh
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
     """Return the cloud's surface elements; normals that came with it and all point inward are turned."""
     surface = oriented(cloud)
-    # Where a direction ends on the solid its normal points that way: true also of a surface with holes, whose total
-    # flux may have any sign.
-    ahead = _directions(_SIDES)
-    ends = (surface.xyz @ ahead.T).argmax(0)
-    if (surface.normals[ends] * ahead).sum() >= 0:
+    # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
+    if surface.complex.flux(surface.xyz, surface.normals, surface.spacing) >= 0:
         return surface, ()
     text = "All normals that came with the cloud point into the solid; they were turned."
     found = (Finding.of("normals-flipped", text),) if cloud.normals is not None else ()
     return replace(surface, normals=-surface.normals), found
 
 
-def _directions(count: int) -> Array:
-    """Return directions (count, 3) spread evenly over the sphere, along a spiral of golden steps."""
-    k = np.arange(count) + 0.5
-    z, turn = 1 - 2 * k / count, np.pi * (1 + np.sqrt(5)) * k
-    flat = np.sqrt(1 - z**2)
-    return np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
-
-
-def complex_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
+def cells_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
     """Return the Delaunay cells of points (N, 3) [m], their centroids (T, 3) in units of the surface, and votes (T,).
 
     A vote is how much the normals (-1..1) of its corners say that a cell lies inside.
     """
-    from scipy.spatial import Delaunay
-
-    # Qhull spends most of its time on points in one plane: they are moved by less than any measurement notices.
-    moved = surface.xyz + _NUDGE * np.random.default_rng(0).uniform(-1, 1, surface.xyz.shape)
-    made = Delaunay(moved)
-    tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.neighbors)
+    made = surface.complex
+    tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.beside)
     unit = (np.ptp(xyz, axis=0) ** 2).sum() ** 1.5
     return TetMesh.known(xyz, tets, volumes * unit, neighbours), centres, votes
 
@@ -151,6 +138,15 @@ def _doubt(volumes: Array, found: Array, votes: Array) -> float:
     """
     inside = volumes * (found - 0.5 + votes > 0)
     return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
+
+
+def _contradictions(surface: Oriented) -> float:
+    """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
+    xyz, normals, index = surface.xyz, surface.normals, surface.near.index
+    plane, link = sheet_planes(xyz, index, SLOPE)
+    link = signed_links(link, plane, normals, index)
+    ties = Ties.of(xyz, normals, index, link, surface.complex, surface.spacing)
+    return stacked(xyz, normals, index, link) + ties.torn
 
 
 def _against(surface: Oriented, solid: TetMesh) -> float:

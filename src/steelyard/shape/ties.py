@@ -1,0 +1,155 @@
+"""What points of a surface say of one another's sides: neighbours on one sheet, and sheets that face each other."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.mesh import Integers
+
+_NUDGE = 1e-7  # of the diagonal
+_STEEP = 0.35  # cosine between an edge and a normal, at both ends, above which the edge leaves the surface there
+_SIDES = 100  # facets of the hull that are asked which way is out
+_LEVEL = 0.2  # spacings below a facet within which points lie on it
+_SEEN = 0.3  # cosine between a point's plane and a facet of the hull above which the facet shows its outer side
+
+
+@dataclass(frozen=True, eq=False)
+class Complex:
+    """The Delaunay complex of N points.
+
+    simplices  (S, 4) its cells
+    beside     (S, 4) the cell opposite each corner, -1 without one
+    start      (N + 1,) and other: the points joined to point i by edges are other[start[i]:start[i + 1]]
+    hull       (F, 3) corners of the facets around all points
+    across     (F, 3) their outward normals, as long as twice their area
+    """
+
+    simplices: Integers
+    beside: Integers
+    start: Integers
+    other: Integers
+    hull: Integers
+    across: Array
+
+    @classmethod
+    def of(cls, xyz: Array) -> Complex:
+        """Return the complex of points (N, 3) in units of their diagonal."""
+        from scipy.spatial import Delaunay
+
+        # Qhull spends most of its time on points in one plane: they are moved by less than any measurement notices.
+        made = Delaunay(xyz + _NUDGE * np.random.default_rng(0).uniform(-1, 1, xyz.shape))
+        start, other = made.vertex_neighbor_vertices
+        hull = made.convex_hull
+        a, b, c = xyz[hull].transpose(1, 0, 2)
+        across = np.cross(b - a, c - a)
+        outward = ((a - xyz[np.unique(hull)].mean(0)) * across).sum(1) >= 0
+        across = np.where(outward[:, None], across, -across)
+        return cls(made.simplices, made.neighbors, start.astype(np.int64), other.astype(np.int64), hull, across)
+
+    def flux(self, xyz: Array, normals: Array, spacing: float) -> float:
+        """Return how squarely the normals (N, 3) of points on the largest facets leave the hull: -1 to 1."""
+        twice = np.linalg.norm(self.across, axis=1)
+        largest = np.argsort(-twice, kind="stable")[:_SIDES]
+        out = self.across[largest] / np.maximum(twice[largest], 1e-30)[:, None]
+        on = xyz @ out.T > (xyz[self.hull[largest, 0]] * out).sum(1) - _LEVEL * spacing
+        along = ((normals @ out.T) * on).sum(0) / np.maximum(on.sum(0), 1)
+        return float((along * twice[largest]).sum() / twice[largest].sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Ties:
+    """How much each point's side depends on those of others, and on its being seen from outside.
+
+    index    (N, K) neighbours
+    link     (N, K) how much a neighbour lies on the same sheet; negative where its normal has the other sign
+    start    (N + 1,) and other, faced: point other[k] faces point i from across a wall or a gap by faced[k],
+             negative where the two normals must not both keep their sign; k from start[i] to start[i + 1]
+    outward  (N,) how much the normal is one that leaves the hull of all, negative where it enters it
+    """
+
+    index: Integers
+    link: Array
+    start: Integers
+    other: Integers
+    faced: Array
+    outward: Array
+
+    @classmethod
+    def of(cls, xyz: Array, normals: Array, index: Integers, link: Array, near: Complex, spacing: float) -> Ties:
+        """Return the ties between points (N, 3) whose normals (N, 3) may have either sign.
+
+        An edge of the Delaunay complex meets no surface between its ends. Where it leaves the surface at both, all of
+        it is in the solid or all of it outside, so that both normals point along it or neither. And what the hull of
+        all points shows is the outer side; facets narrower than the spacing have no direction to rely on.
+        """
+        start, other, faced = _faced(xyz, normals, near.start, near.other)
+        twice = np.linalg.norm(near.across, axis=1)
+        seen = np.einsum("fkd,fd->fk", normals[near.hull], near.across / np.maximum(twice, 1e-30)[:, None])
+        seen *= (np.abs(seen) > _SEEN) * np.minimum(twice / spacing**2, 1)[:, None]
+        outward = np.asarray(np.bincount(near.hull.ravel(), seen.ravel(), len(xyz)), float)
+        return cls(index, link, start, other, faced, outward)
+
+    def spread(self, values: Array, sweeps: int, kept: float) -> Array:
+        """Return values (N,) pulled toward what their ties say in `sweeps`; `kept` weighs a point's own."""
+        return self._swept(values, sweeps, kept, 1.0)
+
+    def settled(self, sweeps: int, kept: float) -> Array:
+        """Return 1 for each point (N,) whose normal agrees with its ties, -1 where it is to be turned."""
+        return np.where(self._swept(np.ones(len(self.index)), sweeps, kept, 2.0) < 0, -1.0, 1.0)
+
+    def _swept(self, values: Array, sweeps: int, kept: float, gain: float) -> Array:
+        ties = self.index, self.link, self.start, self.other, self.faced, self.outward
+        return np.asarray(_swept(values, *ties, sweeps, kept, gain))
+
+    @property
+    def torn(self) -> float:
+        """Share of the ties between points, by weight, that contradict the normals they were made from."""
+        broken = -(np.minimum(self.link, 0).sum() + np.minimum(self.faced, 0).sum())
+        return float(broken / max(np.abs(self.link).sum() + np.abs(self.faced).sum(), 1e-30))
+
+
+@numba.njit(cache=True, nogil=True)
+def _faced(xyz: Array, normals: Array, start: Integers, other: Integers) -> tuple[Integers, Integers, Array]:
+    """Return the edges (start, other) that leave the surface at both ends, and by how much (E,)."""
+    count = 0
+    first, kept, faced = np.zeros(len(start), np.int64), np.empty(len(other), np.int64), np.empty(len(other))
+    for i in range(len(xyz)):
+        for k in range(start[i], start[i + 1]):
+            j = other[k]
+            square, here, there = 0.0, 0.0, 0.0
+            for d in range(3):
+                away = xyz[j, d] - xyz[i, d]
+                square += away * away
+                here += normals[i, d] * away
+                there -= normals[j, d] * away
+            least = min(abs(here), abs(there))
+            if square > 0 and least * least > _STEEP * _STEEP * square:
+                kept[count] = j
+                faced[count] = np.sign(here * there) * least / np.sqrt(square)
+                count += 1
+        first[i + 1] = count
+    return first, kept[:count].copy(), faced[:count].copy()
+
+
+@numba.njit(cache=True, nogil=True)
+def _swept(
+    values: Array, index: Integers, link: Array, start: Integers, other: Integers, faced: Array, outward: Array,
+    sweeps: int, kept: float, gain: float,
+) -> Array:  # fmt: skip
+    old, new = values.astype(np.float64), np.empty(len(values))
+    for _ in range(sweeps):
+        for i in range(len(values)):
+            total, weight = kept * values[i] + outward[i], kept + abs(outward[i])
+            for a in range(index.shape[1]):
+                total += link[i, a] * old[index[i, a]]
+                weight += abs(link[i, a])
+            for k in range(start[i], start[i + 1]):
+                total += faced[k] * old[other[k]]
+                weight += abs(faced[k])
+            new[i] = min(1.0, max(-1.0, gain * total / weight))
+        old, new = new, old
+    return old
