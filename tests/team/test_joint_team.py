@@ -19,7 +19,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.consistent import consistent
-from steelyard.team.hinge import bodies, find_hinge, moving_twists, rigidity_findings
+from steelyard.team.hinge import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches
 from steelyard.team.twist_fit import fit_twists
@@ -235,7 +235,7 @@ def test_a_hinge_is_found() -> None:
     assert abs(float(axis @ true_axis)) > np.cos(np.deg2rad(1.0))
     assert np.linalg.norm(np.cross(true_axis, point - true_point)) < 0.01
     assert share > 0.9
-    (finding,) = rigidity_findings(team, made.log.names)
+    (finding,) = rigidity_findings(find_split(team), made.log.names)
     assert finding.code == "payload-jointed"
     assert "'robot2' and 'robot3' another" in finding.message
     assert "payload-jointed" in JointTeam().identify(made.log).codes()
@@ -244,7 +244,7 @@ def test_a_hinge_is_found() -> None:
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_rigid_payloads_are_not_called_otherwise(motion: str) -> None:
     made = trial(freedom=MOTIONS[motion][0], kinds=("motion",))
-    assert not rigidity_findings(stretches(made.log, {}), made.log.names)
+    assert find_split(stretches(made.log, {})) is None
 
 
 def test_a_robot_that_joins_is_noticed() -> None:

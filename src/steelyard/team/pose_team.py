@@ -149,7 +149,7 @@ class PoseTeam:
 
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""
-        return _gravity(log, self.fit.team.homes)
+        return mean_gravity(log, self.fit.team.homes)
 
     def residuals(self, raw: Stretch, start: int) -> Array:
         """Return rotation vector and position (T, N, 6) from where the team says to what was measured, used or not."""
@@ -211,7 +211,7 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
     return np.concatenate(out)
 
 
-def _gravity(log: TeamLog, homes: Pose) -> Array:
+def mean_gravity(log: TeamLog, homes: Pose) -> Array:
     """Return gravity (3,) [m/s^2] in the reference home: the mean of what the robots' level bases say."""
     said = [homes[i].rotation.apply(r.gravity) for i, r in enumerate(log.robots) if r.gravity is not None]
     if not said:
