@@ -371,3 +371,15 @@ def test_a_mass_that_may_be_a_third_off_is_not_called_identified() -> None:
     found = JointTeam().identify(made.log)
     assert abs(found.mass - 12) > 1
     assert not found.identified[0]
+
+
+@pytest.mark.parametrize("lost", [("rotation", "position", "force"), ("force",), ("rotation", "position")])
+def test_half_a_robots_rows_missing_in_motion_alone_cost_no_more_than_those_rows(lost: tuple[str, ...]) -> None:
+    made = trial(kinds=("motion",), motion_samples=2000)
+    (last,) = made.log.recordings
+    track = last.tracks["robot2"]
+    half = np.arange(len(track)) < len(track) // 2
+    valid = {name: mask & half if name in lost else mask for name, mask in track.valid.items()}
+    missing = replace(last, tracks={**last.tracks, "robot2": replace(track, valid=valid)})
+    found = JointTeam().identify(made.log.with_recordings(missing))
+    assert (error(made, found) < [2e-3, 2e-3, 0.05, 0.01, 0.3]).all()

@@ -22,7 +22,7 @@ from steelyard.team.pose_rows import OWN
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
-from steelyard.team.slips import SlipAt, alone, edited, find_slip
+from steelyard.team.slips import SlipAt, alone, edited, find_slip, noise_alone
 from steelyard.team.stacked import Stretch, all_poses, stretches
 
 # Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
@@ -122,11 +122,11 @@ class PoseTeam:
 
     def _slip(self, log: TeamLog) -> SlipAt | None:
         best, start = None, 0
-        apart = alone(self.fit.rows.residual, self.fit.J, self.fit.W)
+        apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
         for number, part in enumerate(self.parts):
             rows = slice(start, start + len(part))
             start += len(part)
-            slip = find_slip(apart[rows], part.seen, part.rate)
+            slip = find_slip(apart[rows], part.seen, part.rate, noise)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.time[slip.row]), slip)
         return best
@@ -136,7 +136,8 @@ class PoseTeam:
         raw = stretches(log, self.late)[found.recording]
         start = sum(len(part) for part in self.parts[: found.recording])
         apart = self.residuals(raw, start)[:, found.slip.robot]
-        return found.renewed(apart, raw.seen[:, found.slip.robot], raw)
+        noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
+        return found.renewed(apart, raw.seen[:, found.slip.robot], raw, noise)
 
     @property
     def rough(self) -> bool:
