@@ -53,7 +53,7 @@ REMEDIES: dict[str, str] = {
     "robot-joined": "Nothing to do if the robot was meant to join; its rows before that were left out.",
     "robot-excluded": "Check this robot's encoders, kinematics and columns, or leave it out of the team.",
     "common-gain-unseen": "Weigh a known mass with the team once; a gain error that all robots share looks like mass.",
-    "payload-jointed": "Lock the hinge, or identify each body by itself.",
+    "payload-jointed": "Weigh one body by itself to know each mass; lock the hinge to weigh both as one.",
     "payload-not-rigid": "Stiffen the payload or its grasps, or move slower.",
     "tool-included": "Give --tool (a result or a tool-only log) if you want the object alone.",
     "rows-missing": "Check the robot's network and logger if they were not meant to be missing; they were left out.",

@@ -19,7 +19,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.consistent import consistent
-from steelyard.team.hinge import bodies, find_hinge, moving_twists, rigidity_findings
+from steelyard.team.hinge import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches
 from steelyard.team.twist_fit import fit_twists
@@ -235,7 +235,7 @@ def test_a_hinge_is_found() -> None:
     assert abs(float(axis @ true_axis)) > np.cos(np.deg2rad(1.0))
     assert np.linalg.norm(np.cross(true_axis, point - true_point)) < 0.01
     assert share > 0.9
-    (finding,) = rigidity_findings(team, made.log.names)
+    (finding,) = rigidity_findings(find_split(team), made.log.names)
     assert finding.code == "payload-jointed"
     assert "'robot2' and 'robot3' another" in finding.message
     assert "payload-jointed" in JointTeam().identify(made.log).codes()
@@ -244,7 +244,7 @@ def test_a_hinge_is_found() -> None:
 @pytest.mark.parametrize("motion", MOTIONS)
 def test_rigid_payloads_are_not_called_otherwise(motion: str) -> None:
     made = trial(freedom=MOTIONS[motion][0], kinds=("motion",))
-    assert not rigidity_findings(stretches(made.log, {}), made.log.names)
+    assert find_split(stretches(made.log, {})) is None
 
 
 def test_a_robot_that_joins_is_noticed() -> None:
@@ -371,3 +371,15 @@ def test_a_mass_that_may_be_a_third_off_is_not_called_identified() -> None:
     found = JointTeam().identify(made.log)
     assert abs(found.mass - 12) > 1
     assert not found.identified[0]
+
+
+@pytest.mark.parametrize("lost", [("rotation", "position", "force"), ("force",), ("rotation", "position")])
+def test_half_a_robots_rows_missing_in_motion_alone_cost_no_more_than_those_rows(lost: tuple[str, ...]) -> None:
+    made = trial(kinds=("motion",), motion_samples=2000)
+    (last,) = made.log.recordings
+    track = last.tracks["robot2"]
+    half = np.arange(len(track)) < len(track) // 2
+    valid = {name: mask & half if name in lost else mask for name, mask in track.valid.items()}
+    missing = replace(last, tracks={**last.tracks, "robot2": replace(track, valid=valid)})
+    found = JointTeam().identify(made.log.with_recordings(missing))
+    assert (error(made, found) < [2e-3, 2e-3, 0.05, 0.01, 0.3]).all()

@@ -26,7 +26,8 @@ def plus_minus(value: float, std: float, unit: str) -> str:
     if not np.isfinite(std):
         return f"{value:.4g} ± ? {unit}"
     places = decimals(std)
-    return f"{value:.{places}f} ± {std:.{places}f} {unit}"
+    # Adding zero turns a minus zero, which rounding leaves, into a plain one.
+    return f"{round(value, places) + 0.0:.{places}f} ± {std:.{places}f} {unit}"
 
 
 def estimate_table(

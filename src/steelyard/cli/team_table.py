@@ -27,7 +27,7 @@ def team_table(estimate: TeamEstimate, title: str, known: Known | None = None) -
     """Return the table: the payload with ±, where every robot holds it, clocks, evidence, findings with remedies."""
     whole = estimate_table(estimate, title, None if known is None else known.people)
     head, gap, rest = whole.partition("\n\n")
-    blocks = [head, *_principal_lines(estimate), "", *_grasp_lines(estimate, known)]
+    blocks = [head, *_principal_lines(estimate), *_hinge_lines(estimate), "", *_grasp_lines(estimate, known)]
     return "\n".join(blocks) + gap + rest
 
 
@@ -38,6 +38,30 @@ def _principal_lines(estimate: TeamEstimate) -> list[str]:
     moments, std, _ = principal(estimate)
     rows = [(f"J{k + 1}", plus_minus(float(moments[k]), float(std[k]), "kg m²")) for k in range(3)]
     return ["", "  principal moments of inertia", columns([(f"  {name}", said) for name, said in rows])]
+
+
+def _hinge_lines(estimate: TeamEstimate) -> list[str]:
+    """Return what is known of each of two bodies with a hinge between them."""
+    if estimate.hinge is None:
+        return []
+    rows = [("", "moment about the hinge", "mass times lever", "mass between")]
+    for body in estimate.hinge.bodies:
+        lever = float(np.linalg.norm(body.first_moment))
+        std = float(np.abs(body.first_moment) @ body.first_moment_std) / max(lever, 1e-300)
+        low, high = body.mass_range
+        rows.append(
+            (
+                "  held by " + ", ".join(body.robots),
+                _or_open(body.hinge_moment, body.hinge_moment_std, "kg m²"),
+                _or_open(lever, std, "kg m"),
+                f"{low:.1f} and {high:.1f} kg" if np.isfinite(low) else "not shown",
+            )
+        )
+    return ["", click.style("  two bodies with a hinge", bold=True), columns(rows)]
+
+
+def _or_open(value: float, std: float, unit: str) -> str:
+    return plus_minus(value, std, unit) if np.isfinite(value) else "not shown"
 
 
 def _grasp_lines(estimate: TeamEstimate, known: Known | None) -> list[str]:

@@ -12,6 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadInput
 from steelyard.identify.estimate import Estimate
+from steelyard.io.hinge_results import hinge_entries, hinge_of
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
@@ -30,6 +31,7 @@ def team_entries(estimate: TeamEstimate) -> dict[str, Any]:
             name: {"rotation": pose.rotation.matrix, "position_m": pose.position}
             for name, pose in estimate.principal_frames.items()
         },
+        **hinge_entries(estimate.hinge),
     }
 
 
@@ -59,6 +61,7 @@ def team_of(path: Path, values: Mapping[str, Any], plain: Estimate) -> TeamEstim
         grasps={str(name): _grasp(path, str(name), entry) for name, entry in grasps.items()},
         clock_offsets_s=_seconds(path, values, "clock_offsets_s"),
         clock_offset_std_s=_seconds(path, values, "clock_offset_std_s"),
+        hinge=hinge_of(path, values),
     )
 
 

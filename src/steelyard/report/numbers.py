@@ -23,7 +23,10 @@ def decimals(std: float) -> int:
 
 def fixed(value: float, places: int) -> str:
     """Return a number with a true minus sign."""
-    return f"{value:.{places}f}".replace("-", "−") if np.isfinite(value) else "?"
+    if not np.isfinite(value):
+        return "?"
+    # Adding zero turns a minus zero, which rounding leaves, into a plain one.
+    return f"{round(float(value), places) + 0.0:.{places}f}".replace("-", "−")
 
 
 def general(value: float | None, figures: int = 3) -> str:

@@ -17,7 +17,6 @@ from steelyard.shape.islands import without_islands
 from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links
 from steelyard.shape.sheets import sheet_planes, stacked
->>>>>>> visegrip
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.ties import Ties
 from steelyard.shape.winding import Sight, Tree

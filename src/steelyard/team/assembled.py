@@ -40,6 +40,7 @@ def assembled(
     body = InertialParameters(consistent(payload.parameters, payload.covariance, payload.scale)).in_frame(balance)
     change = np.stack([InertialParameters(row).in_frame(balance).vector for row in np.eye(10)], axis=1)
     estimates = {name: GraspEstimate(grasps[i], spread.of(i), spread.lost(i)) for i, name in enumerate(log.names)}
+    shown = not payload.lost.shape[1] and not spread.blind.size
     samples = {g.parts[0].still: sum(p.samples for p in g.parts) for g in payload.groups}
     moment, force = payload.residual[:3], payload.residual[3:]
     return TeamEstimate(
@@ -50,7 +51,7 @@ def assembled(
             10 - payload.lost.shape[1], payload.condition, sum(samples.values()), samples.get(True, 0),
             float(np.sqrt((force**2).mean())), float(np.sqrt((moment**2).mean())), payload.chi2,
         ),
-        identified=_identified(body, change @ inner @ change.T, payload, bool(spread.blind.size)),
+        identified=np.ones(10, np.bool_) if shown else known(body, change @ inner @ change.T, payload.scale),
         frame=log.reference,
         reference=log.reference,
         grasps=estimates,
@@ -59,19 +60,17 @@ def assembled(
     )  # fmt: skip
 
 
-def _identified(body: InertialParameters, covariance: Array, payload: PayloadFit, open_grasps: bool) -> Mask:
+def known(body: InertialParameters, covariance: Array, units: Array) -> Mask:
     """Return which (10,) of mass, centre of mass and inertia about it are known: two standard deviations are below
-    SHOWN of what a body of this mass and size can have.
+    SHOWN of what a body of this mass and size can have, `units` (10,).
     """
-    if not payload.lost.shape[1] and not open_grasps:
-        return np.ones(10, np.bool_)
     jacobian = np.zeros((10, 10))
     jacobian[0, 0] = 1
     jacobian[1:] = com_jacobian(body.vector)
     std = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
-    scale = payload.scale / np.concatenate([[1.0], np.full(3, payload.scale[0]), np.ones(6)])
+    scale = units / np.concatenate([[1.0], np.full(3, units[0]), np.ones(6)])
     scale[0] = min(scale[0], abs(float(body.mass)))
-    known = 2 * std < SHOWN * scale
+    small = 2 * std < SHOWN * scale
     # The centre of mass is the first moment over the mass.
-    known[1:] &= known[0]
-    return np.asarray(known)
+    small[1:] &= small[0]
+    return np.asarray(small)

@@ -43,6 +43,42 @@ class GraspEstimate:
 
 
 @dataclass(frozen=True, eq=False)
+class BodyEstimate:
+    """One of two bodies with a hinge between them, as far as any motion tells it, in the reference grasp's axes.
+
+    robots             who holds it
+    hinge_moment       moment of inertia about the hinge [kg m^2], with standard deviation; NaN where not shown
+    first_moment       (3,) mass times the way from the hinge's line to the centre of mass [kg m], across the hinge,
+                       with the hinge at zero; with standard deviations (3,), NaN where not shown
+    mass_range         (2,) [kg] least and most that a body with these moments can weigh; NaN where not shown
+    Mass alone, and the place of the centre of mass along the hinge, no motion tells: see `hinged_rows`.
+    """
+
+    robots: tuple[str, ...]
+    hinge_moment: float
+    hinge_moment_std: float
+    first_moment: Array
+    first_moment_std: Array
+    mass_range: Array
+
+
+@dataclass(frozen=True, eq=False)
+class HingeEstimate:
+    """The hinge between two bodies, in the reference grasp, and the bodies: that of the reference first.
+
+    axis    (3,) unit vector, point (3,) [m] nearest to the middle of the grasps; largest standard deviations of both
+    swing   how far it turned to either side of its mean, which counts as zero [rad]
+    """
+
+    axis: Array
+    point: Array
+    axis_std_deg: float
+    point_std_m: float
+    swing: float
+    bodies: tuple[BodyEstimate, BodyEstimate]
+
+
+@dataclass(frozen=True, eq=False)
 class TeamEstimate(Estimate):
     """What the team found: the ten parameters about the origin of the reference grasp R, and where everybody holds.
 
@@ -50,12 +86,15 @@ class TeamEstimate(Estimate):
     grasps              pose of every grasp in R, by name; the reference's own is exact
     clock_offsets_s     by how much each robot's stamps are late, against the reference; empty where not estimated
     clock_offset_std_s  their standard deviations
+    hinge               where the payload is two bodies with a hinge: then everything above is for both together, with
+                        the hinge at the mean of its angles; None for one body
     """
 
     reference: str = ""
     grasps: Mapping[str, GraspEstimate] = field(default_factory=dict)
     clock_offsets_s: Mapping[str, float] = field(default_factory=dict)
     clock_offset_std_s: Mapping[str, float] = field(default_factory=dict)
+    hinge: HingeEstimate | None = None
 
     @cached_property
     def principal_moments(self) -> Array | None:

@@ -9,6 +9,7 @@ Source: own; the paper names jointed payloads as future work.
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -100,28 +101,52 @@ def find_hinge(first: Array, second: Array, rate: float) -> tuple[Array, Array, 
     return screw[:3], point, float(np.abs(angle).max()), share
 
 
-def rigidity_findings(parts: Sequence[Stretch], names: Sequence[str]) -> list[Finding]:
-    """Return payload-jointed with the hinge's axis, or payload-not-rigid, where the grasps are not on one body."""
+@dataclass(frozen=True, eq=False)
+class Split:
+    """Grasps that are not on one body: `groups` of robots, and between two of them the hinge, if it is one.
+
+    axis, point, swing  of the hinge in the first grasp of the second group; None where it is no hinge
+    twist               (T, N, 6) of all grasps, low-passed
+    """
+
+    groups: tuple[tuple[int, ...], ...]
+    twist: Array
+    hinge: tuple[Array, Array, float] | None
+
+
+def find_split(parts: Sequence[Stretch], first: int = 0) -> Split | None:
+    """Return how the grasps fall apart, the group of robot `first` before the others; None for one rigid body."""
     twist, noise, rate = moving_twists(parts)
     if not len(twist):
-        return []
-    groups = bodies(twist, noise)
+        return None
+    groups = sorted(bodies(twist, noise), key=lambda group: first not in group)
     if len(groups) == 1:
-        return []
-    called = [" and ".join(f"'{names[i]}'" for i in group) for group in groups]
+        return None
     if len(groups) == 2:
         one, two = (group[0] for group in groups)
         axis, point, swing, share = find_hinge(twist[:, one], twist[:, two], rate)
         if share > ONE_SCREW:
-            text = ", ".join(f"{a:.3f}" for a in axis), ", ".join(f"{1e3 * a:.0f}" for a in point)
-            return [
-                Finding.of(
-                    "payload-jointed",
-                    f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) "
-                    f"through ({text[1]}) mm of grasp '{names[two]}', which swung by {np.rad2deg(swing):.0f} deg. What "
-                    "is given is for the payload as if it were one; lock the hinge to weigh it.",
-                )
-            ]
+            return Split(tuple(groups), twist, (axis, point, swing))
+    return Split(tuple(groups), twist, None)
+
+
+def rigidity_findings(split: Split | None, names: Sequence[str]) -> list[Finding]:
+    """Return payload-jointed with the hinge's axis, or payload-not-rigid, where the grasps are not on one body."""
+    if split is None:
+        return []
+    called = [" and ".join(f"'{names[i]}'" for i in group) for group in split.groups]
+    if split.hinge is not None:
+        axis, point, swing = split.hinge
+        text = ", ".join(f"{a:.3f}" for a in axis), ", ".join(f"{1e3 * a:.0f}" for a in point)
+        return [
+            Finding.of(
+                "payload-jointed",
+                f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) "
+                f"through ({text[1]}) mm of grasp '{names[split.groups[1][0]]}', which swung by "
+                f"{np.rad2deg(swing):.0f} deg. The motion shows too little of it to weigh the bodies: what is given is "
+                "for the payload as if it were one. Open and close the hinge while tilting the payload about two axes.",
+            )
+        ]
     return [
         Finding.of(
             "payload-not-rigid",

@@ -19,7 +19,9 @@ from steelyard.team.assembled import assembled, team_size
 from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge import rigidity_findings
+from steelyard.team.hinge import Split, find_split, rigidity_findings
+from steelyard.team.hinged_bodies import hinge_findings
+from steelyard.team.hinged_team import identify_two_bodies
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
@@ -50,6 +52,7 @@ class JointTeam:
     def identify(self, log: TeamLog) -> TeamEstimate:
         """Return the team's answer in the reference grasp. Raises CannotAnswer where the data leave it open."""
         require_wrenches(log)
+        self._require_wrists(log)
         if needs_twists(log):
             moving = TwistTeam.of(log, self.clocks)
             grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
@@ -59,7 +62,11 @@ class JointTeam:
             standing = PoseTeam.of(log, self.clocks)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
             late, order = _against(standing.late, log.reference), 2
-            found = [*standing.findings, *(rigidity_findings(standing.parts, log.names) if standing.rough else [])]
+            split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
+            jointed = None if split is None else self._jointed(log, split)
+            if jointed is not None:
+                return jointed
+            found = [*standing.findings, *rigidity_findings(split, log.names)]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
         placed = balance_frame(grasps).inverse() @ grasps
@@ -79,14 +86,32 @@ class JointTeam:
         ]
         return replace(team, findings=tuple(found))
 
+    def _jointed(self, log: TeamLog, split: Split) -> TeamEstimate | None:
+        """Return the estimate of two bodies with a hinge, None where there is no hinge or too little is shown of it."""
+        if split.hinge is None:
+            return None
+        try:
+            team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
+        except CannotAnswer:
+            return None
+        found = [
+            *hinge_findings(team),
+            *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
+            *gains(payload.gain),
+        ]
+        return replace(team, findings=tuple(found))
+
+    def _require_wrists(self, log: TeamLog) -> None:
+        """Raise BadValue where the wrist of a robot that is not there is given a mass."""
+        unknown = sorted(set(self.wrists) - set(log.names))
+        if unknown:
+            raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
+
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:
-    """Return the estimate less a point mass at every grasp named; raises BadValue for a robot that is not there."""
+    """Return the estimate less a point mass at every grasp named."""
     if not wrists:
         return team
-    unknown = sorted(set(wrists) - set(team.grasps))
-    if unknown:
-        raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
     return replace(team, parameters=team.parameters - points)

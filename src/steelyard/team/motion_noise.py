@@ -24,7 +24,7 @@ def motion_noise(
     residuals  (T, N, 6) of each recording's rows     path  (6, 6) covariance of a row of the path, in B's axes
     order      differences from path to acceleration: 2 for poses, 1 for twists
     """
-    shares = _shares(recordings, residuals, edges, highest_hz)
+    shares = shares_of(recordings, residuals, edges, highest_hz)
     out = np.zeros((len(edges), 6, 6))
     if not recordings[0].still:
         out += shares[order, :, None, None] * path
@@ -35,7 +35,7 @@ def motion_noise(
     return out
 
 
-def _shares(recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: Array, highest_hz: float) -> Array:
+def shares_of(recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: Array, highest_hz: float) -> Array:
     """Return the mean square per row (3, K) of noise of unit variance after 0, 1 and 2 differences."""
     total, rows = np.zeros((3, len(edges))), np.zeros(len(edges))
     for recording, residual in zip(recordings, residuals, strict=True):

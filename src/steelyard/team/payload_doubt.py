@@ -14,7 +14,7 @@ from steelyard.team.payload_model import gain_columns
 def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
     """Return d phi / d grasps (10, 6 N) for steps in each grasp's own axes; X_BG (N,) in the balance frame."""
     count = len(X_BG.position)
-    turned = _turned(X_BG)
+    turned = turned_by_step(X_BG)
     right = np.zeros((10, count, 6))
     for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
         for part, blind in zip(group.parts, blinds, strict=True):
@@ -51,7 +51,7 @@ def _kept(fit: PayloadFit) -> Array:
     return np.asarray(keep @ inverse)
 
 
-def _turned(X_BG: Pose) -> Array:
+def turned_by_step(X_BG: Pose) -> Array:
     """Return how the summing block (6, 6) of each grasp changes per step k of its own (N, 6, 6, 6)."""
     R, P = X_BG.rotation.matrix, cross_matrix(X_BG.position)
     out = np.zeros((len(R), 6, 6, 6))

@@ -74,7 +74,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             for group, W in zip(groups, weights, strict=True)
             for part in group.parts
         ]
-        models = _Models.of(normals, C, ladder, scale)
+        models = Models.of(normals, C, ladder, scale)
         chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(NO_GAIN_ERROR), 0.0)
         weight = np.exp(chance - chance.max())
         weight /= weight.sum()
@@ -99,7 +99,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     noise = sum((n.noise for n in normals), np.zeros((10, 10)))
     unit = np.outer(scale, scale)
     values, vectors = np.linalg.eigh((models.information[best] - noise) * unit)
-    shown = _shown(values, vectors, noise * unit)
+    shown = shown_of(values, vectors, noise * unit)
     condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
     return PayloadFit(
         phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, float(bias), float(gain),
@@ -124,7 +124,7 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
         normal(part, D, np.repeat(weight, len(g.wrench_noise), 0), g.motion_noise) for g in loud for part in g.parts
     ]
     flat = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)])
-    first = _Models.of(every, np.diag(unit), np.array([[1.0, 0.0]]), flat)
+    first = Models.of(every, np.diag(unit), np.array([[1.0, 0.0]]), flat)
     left, count = np.zeros(6), 0.0
     for k, part in enumerate(part for group in loud for part in group.parts):
         left += residual_scatter(part, D, first.solution(0, k), np.zeros((16, 16))).sum(0)
@@ -135,11 +135,11 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
 
 
 @dataclass(frozen=True, eq=False)
-class _Models:
-    """The answers at L sizes (bias, gain), and the bias of every recording beside each.
+class Models:
+    """The answers at L sizes (bias, gain), and the bias of every recording beside each: P parameters, B of a bias.
 
-    phi (L, 10)     covariance, information (L, 10, 10)     evidence, chi2 (L,)
-    inner (L, R, 6, 6) covariance of a bias beside a known body     blind (L, R, 10, 6) H_pb H_bb^-1
+    phi (L, P)     covariance, information (L, P, P)     evidence, chi2 (L,)
+    inner (L, R, B, B) covariance of a bias beside a known body     blind (L, R, P, B) H_pb H_bb^-1
     """
 
     phi: Array
@@ -152,58 +152,59 @@ class _Models:
     right: Array
 
     @classmethod
-    def of(cls, normals: list[Normal], C: Array, ladder: Array, scale: Array) -> _Models:
-        """Return the models at every (bias, gain) of the ladder (L, 2)."""
+    def of(cls, normals: list[Normal], C: Array, ladder: Array, scale: Array) -> Models:
+        """Return the models at every (bias, gain) of the ladder (L, 2); C (B, B) of a unit bias, scale (P,) units."""
+        size = len(scale)
         H, g = np.stack([n.H for n in normals]), np.stack([n.g for n in normals])
         pulled = np.stack([n.pulled for n in normals])
         bias, gain = np.square(ladder.T)[..., None, None, None]
         spread = bias * C + gain * pulled
-        held = H[:, 10:, 10:] + np.linalg.inv(spread)
+        held = H[:, size:, size:] + np.linalg.inv(spread)
         inner = np.linalg.inv(held)
-        blind = H[:, :10, 10:] @ inner
-        plain = H[:, :10, :10].sum(0) - (blind @ H[:, 10:, :10]).sum(1)
-        right = g[:, :10].sum(0) - (blind @ g[:, 10:, None])[..., 0].sum(1)
-        taken = np.einsum("ri,lrij,rj->l", g[:, 10:], inner, g[:, 10:])
+        blind = H[:, :size, size:] @ inner
+        plain = H[:, :size, :size].sum(0) - (blind @ H[:, size:, :size]).sum(1)
+        right = g[:, :size].sum(0) - (blind @ g[:, size:, None])[..., 0].sum(1)
+        taken = np.einsum("ri,lrij,rj->l", g[:, size:], inner, g[:, size:])
         unit = np.outer(scale, scale)
         full = plain * unit
-        ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(10)
+        ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(size)
         seen = np.linalg.solve(full + ridge, (scale * right)[..., None])[..., 0]
         chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
-        evidence = -0.5 * (chi2 + np.linalg.slogdet(np.eye(10) + full)[1])
+        evidence = -0.5 * (chi2 + np.linalg.slogdet(np.eye(size) + full)[1])
         evidence -= 0.5 * (np.linalg.slogdet(spread)[1] + np.linalg.slogdet(held)[1]).sum(1)
-        phi, covariance = _answers(full, sum((n.noise for n in normals), np.zeros((10, 10))) * unit, scale * right)
+        phi, covariance = _answers(full, sum((n.noise for n in normals), np.zeros((size, size))) * unit, scale * right)
         return cls(
-            scale * phi, unit * covariance, plain, evidence, np.asarray(chi2), np.asarray(inner), blind, g[:, 10:]
+            scale * phi, unit * covariance, plain, evidence, np.asarray(chi2), np.asarray(inner), blind, g[:, size:]
         )
 
     def solution(self, model: int, recording: int) -> Array:
-        """Return [phi, bias] (16,) of one recording."""
+        """Return [phi, bias] (P + B,) of one recording."""
         phi, blind = self.phi[model], self.blind[model, recording]
         return np.concatenate([phi, self.inner[model, recording] @ self.right[recording] - blind.T @ phi])
 
     def doubt(self, model: int, recording: int) -> Array:
-        """Return their covariance (16, 16)."""
+        """Return their covariance (P + B, P + B)."""
         covariance, blind = self.covariance[model], self.blind[model, recording]
         cross = -blind.T @ covariance
         return np.block([[covariance, cross.T], [cross, self.inner[model, recording] - cross @ blind]])
 
 
 def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
-    """Return phi (L, 10) and covariance (L, 10, 10) in units of `scale`.
+    """Return phi (L, P) and covariance (L, P, P) in units of `scale`.
 
     What noise in the motion adds to the information is taken out. A lost direction stays at zero, as unsure as a body
     of this mass and size can be.
     """
     values, vectors = np.linalg.eigh(full - noise)
-    shown = _shown(values, vectors, noise)
+    shown = shown_of(values, vectors, noise)
     inverse = (vectors * np.where(shown, 1 / np.where(shown, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
     lost = vectors * ~shown[:, None]
     covariance = inverse @ full @ inverse + lost @ lost.swapaxes(1, 2)
     return (inverse @ right[..., None])[..., 0], covariance
 
 
-def _shown(values: Array, vectors: Array, noise: Array) -> Mask:
-    """Return which rising information (..., 10), in units of what a body can be, is more than noise and rounding.
+def shown_of(values: Array, vectors: Array, noise: Array) -> Mask:
+    """Return which rising information (..., P), in units of what a body can be, is more than noise and rounding.
 
     What noise in the motion alone would seem to say, `noise`, is known to no better than its own size.
     """
@@ -211,7 +212,7 @@ def _shown(values: Array, vectors: Array, noise: Array) -> Mask:
     return np.asarray((values > SHOWN**-2.0) & (values > RANK * values[..., -1:]) & (values > seeming))
 
 
-def _judged(group: Group, D: Array, models: _Models, best: int, start: int) -> Group:
+def _judged(group: Group, D: Array, models: Models, best: int, start: int) -> Group:
     """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
     squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
     for k, part in enumerate(group.parts):

@@ -20,7 +20,7 @@ from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
-from steelyard.team.slips import SlipAt, alone, edited, find_slip
+from steelyard.team.slips import SlipAt, alone, edited, find_slip, noise_alone
 from steelyard.team.stacked import Stretch, all_poses, stretches
 from steelyard.team.turns import turns_between, twists_between
 
@@ -120,11 +120,11 @@ class PoseTeam:
 
     def _slip(self, log: TeamLog) -> SlipAt | None:
         best, start = None, 0
-        apart = alone(self.fit.rows.residual, self.fit.J, self.fit.W)
+        apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
         for number, part in enumerate(self.parts):
             rows = slice(start, start + len(part))
             start += len(part)
-            slip = find_slip(apart[rows], part.seen, part.rate)
+            slip = find_slip(apart[rows], part.seen, part.rate, noise)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.time[slip.row]), slip)
         return best
@@ -134,7 +134,8 @@ class PoseTeam:
         raw = stretches(log, self.late)[found.recording]
         start = sum(len(part) for part in self.parts[: found.recording])
         apart = self.residuals(raw, start)[:, found.slip.robot]
-        return found.renewed(apart, raw.seen[:, found.slip.robot], raw)
+        noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
+        return found.renewed(apart, raw.seen[:, found.slip.robot], raw, noise)
 
     @property
     def rough(self) -> bool:
@@ -147,7 +148,7 @@ class PoseTeam:
 
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""
-        return _gravity(log, self.fit.team.homes)
+        return mean_gravity(log, self.fit.team.homes)
 
     def residuals(self, raw: Stretch, start: int) -> Array:
         """Return rotation vector and position (T, N, 6) from where the team says to what was measured, used or not."""
@@ -209,7 +210,7 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
     return np.concatenate(out)
 
 
-def _gravity(log: TeamLog, homes: Pose) -> Array:
+def mean_gravity(log: TeamLog, homes: Pose) -> Array:
     """Return gravity (3,) [m/s^2] in the reference home: the mean of what the robots' level bases say."""
     said = [homes[i].rotation.apply(r.gravity) for i, r in enumerate(log.robots) if r.gravity is not None]
     if not said:

@@ -1,7 +1,8 @@
 """A grasp that slips: found as a step of one grasp against all others, timed, and told from every other robot's.
 
 The residual of a robot against the motion that the others alone show is flat but for noise; a slip is a step in it.
-Means over a second before and after are compared; how much they differ by noise alone is measured on the log itself.
+Means over a second before and after are compared. How much they differ by noise alone is measured on the log itself,
+along directions that err independently of each other: what turns the others' motion also moves a grasp that is far off.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
+from scipy.special import gammainccinv
 
 from steelyard.check import Array
 from steelyard.findings import Finding
@@ -21,8 +23,8 @@ from steelyard.team.stacked import Stretch
 
 # [s] on either side that are averaged, and left out between, where the slip itself may last.
 WINDOW_S, GAP_S = 1.0, 0.1
-# A step counts from so many times its own spread (a chi-square of six numbers), and from this size [m, rad].
-THRESHOLD, LEAST_M, LEAST_RAD = 60.0, 1e-3, 2e-3
+# How likely noise alone may be taken for a slip in one recording, and the size [m, rad] from which a step counts.
+CHANCE, LEAST_M, LEAST_RAD = 1e-4, 1e-3, 2e-3
 # Share of rows of a window that must have been measured.
 FILLED = 0.5
 # [s] around a slip in which nothing of its robot is used.
@@ -52,9 +54,9 @@ class SlipAt:
     slip: Slip
     step: Array | None = None
 
-    def renewed(self, apart: Array, seen: Mask, part: Stretch) -> SlipAt:
-        """Return the slip from the residuals (T, 6) of its robot against the others' motion."""
-        score = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)))[0]
+    def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array) -> SlipAt:
+        """Return the slip from the residuals (T, 6) of its robot against the others' motion; noise (6, 6) of a row."""
+        score = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)), noise)[0]
         row = int(np.argmax(score))
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
@@ -138,34 +140,48 @@ def _mapped(through: Array, residual: Array) -> Array:
     return out
 
 
-def find_slip(apart: Array, seen: Mask, rate: float) -> Slip | None:
+def noise_alone(J: Array, W: Array) -> Array:
+    """Return the covariance (N, 6, 6) of one row of such residuals: the robot's own noise and the others' motion's."""
+    each = np.einsum("nia,ni,nib->nab", J, W, J)
+    out = J @ np.linalg.inv(each.sum(0) - each) @ np.swapaxes(J, 1, 2)
+    out[:, range(6), range(6)] += 1 / W
+    return np.asarray(out)
+
+
+def find_slip(apart: Array, seen: Mask, rate: float, noise: Array) -> Slip | None:
     """Return the clearest slip of one recording, None where there is none.
 
     apart  (T, N, 6) rotation vector and position of each grasp against what the others say
+    noise  (N, 6, 6) of a row of it, as far as its directions go
     """
     width, gap = round(WINDOW_S * rate), max(1, round(GAP_S * rate / 2))
     rows, count = seen.shape
     if rows < 4 * (width + gap) or count < 2:
         return None
     best: Slip | None = None
+    # Every row of every robot is a look; a chi-square of six numbers.
+    threshold = float(2 * gammainccinv(3.0, CHANCE / (rows * count)))
     for i in range(count):
-        score, step = _steps(apart[:, i], seen[:, i], width, gap)
+        score, step = _steps(apart[:, i], seen[:, i], width, gap, noise[i])
         row = int(np.argmax(score))
         angle, distance = float(np.linalg.norm(step[row, :3])), float(np.linalg.norm(step[row, 3:]))
         large = distance > LEAST_M or angle > LEAST_RAD
-        if score[row] > THRESHOLD and large and (best is None or score[row] > best.score):
+        if score[row] > threshold and large and (best is None or score[row] > best.score):
             best = Slip(i, row, distance, angle, float(score[row]))
     return best
 
 
-def _steps(apart: Array, seen: Mask, width: int, gap: int) -> tuple[Array, Array]:
-    """Return, for every row, how clear a step there is (T,) and the step (T, 6)."""
-    full, good = _means_apart(np.ascontiguousarray(apart), np.ascontiguousarray(seen), width, gap, FILLED * width)
-    known = full if good.all() else np.compress(good, full, axis=1)
-    spread = np.median(np.abs(known), axis=1) / 0.6745 if good.any() else np.full(6, np.inf)
-    score = ((full / np.maximum(spread, 1e-9)[:, None]) ** 2).sum(0) * good
-    ends = np.zeros(width + gap)
-    return np.concatenate([ends, score, ends]), np.pad(full.T, ((width + gap, width + gap), (0, 0)))
+def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tuple[Array, Array]:
+    """Return, for every row, how clear a step there is (T,) and the step (T, 6); noise (6, 6) of a row."""
+    step, good = _means_apart(np.ascontiguousarray(apart), np.ascontiguousarray(seen), width, gap, FILLED * width)
+    score = np.zeros(len(good))
+    if good.any():
+        along = np.abs(np.linalg.solve(np.linalg.cholesky(noise), step if good.all() else step[:, good]))
+        # The few windows of a recording tell the spread along one direction poorly: it is not taken below that of all.
+        spread = np.maximum(np.median(along, axis=1), np.median(along)) / 0.6745
+        score[good] = ((along / np.maximum(spread, 1e-300)[:, None]) ** 2).sum(0)
+    ends = width + gap
+    return np.pad(score, ends), np.pad(step.T, ((ends, ends), (0, 0)))
 
 
 @numba.njit(cache=True, error_model="numpy")

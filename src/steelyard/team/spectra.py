@@ -86,11 +86,11 @@ def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
         if not recording.still:
             flat *= fade(len(flat), run.rate)[:, None]
         z = dct(flat, axis=0, norm="ortho")[: len(hz)]
-        for band, chosen in enumerate(_bands(hz, edges)):
+        for band, chosen in enumerate(bands(hz, edges)):
             scatter[band] += z[chosen].T @ z[chosen]
             rows[band] += chosen.stop - chosen.start
         first = int(recording.still)
-        for band, chosen in enumerate(_bands(hz[first:], edges)):
+        for band, chosen in enumerate(bands(hz[first:], edges)):
             part = z[first:][chosen]
             judged[band] += part.T @ part
             judged_rows[band] += len(part)
@@ -108,13 +108,13 @@ def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Arra
     power = (dct(tapered, axis=0, norm="ortho")[: len(hz)] ** 2).mean(1)
     gain = (2 * run.rate * np.sin(np.pi * hz / run.rate)) ** 2
     out = np.full((3, len(edges)), np.nan)
-    for band, chosen in enumerate(_bands(hz, edges)):
+    for band, chosen in enumerate(bands(hz, edges)):
         if chosen.stop > chosen.start:
             out[:, band] = [(power[chosen] * gain[chosen] ** k).mean() for k in range(3)]
     return out
 
 
-def _bands(hz: Array, edges: Array) -> list[slice]:
+def bands(hz: Array, edges: Array) -> list[slice]:
     """Return which rows each band holds."""
     ends: Integers = np.searchsorted(hz, edges, side="right")
     return [slice(int(a), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True)]

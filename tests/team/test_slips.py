@@ -1,0 +1,56 @@
+"""Laws of finding a slip: noise is never one, whatever its directions share, and a slip is found where it is."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.simulate.team_sensing import autoregressive
+from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.slips import alone, find_slip, noise_alone
+
+ROWS, RATE = 1500, 100.0
+NOISE = np.array([1e-3, 1e-3, 1e-3, 3e-4, 3e-4, 3e-4])
+
+
+def team(seed: int) -> tuple[Array, Array, Array]:
+    """Return J, W of three grasps far apart, and what the joint fit of noise alone leaves (T, 3, 6)."""
+    rng = np.random.default_rng(seed)
+    grasps = Pose(Rotation.exp(rng.normal(size=(3, 3))), rng.normal(size=(3, 3)) * [0.8, 0.6, 0.1])
+    J, W = adjoint_inverse(grasps), np.tile(NOISE**-2.0, (3, 1))
+    noise = NOISE * autoregressive(rng, ROWS, 18).reshape(ROWS, 3, 6)
+    A = np.einsum("nia,ni,nib->ab", J, W, J)
+    path = np.einsum("ab,nib,ni,tni->ta", np.linalg.inv(A), J, W, noise)
+    return J, W, noise - np.einsum("nia,ta->tni", J, path)
+
+
+def test_noise_alone_is_what_residuals_show() -> None:
+    rows = []
+    for seed in range(20):
+        J, W, left = team(seed)
+        apart = alone(left, J, W)
+        factor = np.linalg.cholesky(noise_alone(J, W)[1])
+        rows.append(np.linalg.solve(factor, apart[:, 1].T).T)
+    seen = np.cov(np.concatenate(rows).T)
+    np.testing.assert_allclose(seen, np.eye(6), atol=0.15)
+
+
+def test_noise_that_directions_share_is_no_slip() -> None:
+    seen = np.ones((ROWS, 3), np.bool_)
+    for seed in range(200):
+        J, W, left = team(seed)
+        # A hundred times the noise: sizes alone would all pass.
+        assert find_slip(100 * alone(left, J, W), seen, RATE, noise_alone(J, W)) is None
+
+
+def test_a_slip_is_found_where_it_is() -> None:
+    seen = np.ones((ROWS, 3), np.bool_)
+    for seed in range(20):
+        J, W, left = team(seed)
+        apart = alone(left, J, W)
+        apart[700:, 1, 3:] += np.array([0.003, 0.0, 0.004])
+        slip = find_slip(apart, seen, RATE, noise_alone(J, W))
+        assert slip is not None
+        assert slip.robot == 1
+        assert abs(slip.row - 700) < 30
