@@ -153,16 +153,17 @@ def _stepped(rows: int, at: int) -> tuple[Array, Array]:
 
 def test_a_slip_is_found_where_it_is_and_missing_rows_do_not_matter() -> None:
     apart, seen = _stepped(1500, 700)
-    slip = find_slip(apart, seen, 100.0)
+    noise = np.tile(1e-8 * np.eye(6), (3, 1, 1))
+    slip = find_slip(apart, seen, 100.0, noise)
     assert slip is not None
     assert slip.robot == 1
     assert abs(slip.row - 700) <= 2
     assert slip.distance == pytest.approx(0.005, rel=0.02)
     seen[500:520, 1], apart[500:520, 1] = False, 0.0
-    again = find_slip(apart, seen, 100.0)
+    again = find_slip(apart, seen, 100.0, noise)
     assert again is not None
     assert abs(again.row - 700) <= 2
-    assert find_slip(_stepped(1500, 1500)[0], np.ones((1500, 3), np.bool_), 100.0) is None
+    assert find_slip(_stepped(1500, 1500)[0], np.ones((1500, 3), np.bool_), 100.0, noise) is None
 
 
 def test_residuals_against_the_others_alone() -> None:
