@@ -14,7 +14,9 @@ from steelyard.shape.cloud import Cloud
 
 RNG = np.random.default_rng(0)
 NORMALS = RNG.normal(size=(50, 3)).astype(np.float32)
-CLOUD = Cloud(RNG.normal(size=(50, 3)), RNG.integers(0, 256, (50, 3)), RNG.integers(0, 4, 50), NORMALS)
+CLOUD = Cloud(
+    RNG.normal(size=(50, 3)), RNG.integers(0, 256, (50, 3)), RNG.integers(0, 4, 50), NORMALS, RNG.integers(0, 2, 50)
+)
 
 
 @pytest.mark.parametrize("suffix", [".ply", ".npz"])
@@ -22,7 +24,7 @@ def test_a_written_cloud_is_read_again(tmp_path: Path, suffix: str) -> None:
     path = tmp_path / f"cloud{suffix}"
     write_cloud(CLOUD, path)
     read = read_cloud(path)
-    for name in ("xyz", "rgb", "label", "normals"):
+    for name in ("xyz", "rgb", "label", "normals", "seen"):
         assert np.array_equal(getattr(read, name), getattr(CLOUD, name))
     assert [file.name for file in tmp_path.iterdir()] == [path.name]
 

@@ -100,7 +100,7 @@ def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> l
             name, mass = truth[part.label]
             known = f"truth {1e3 * mass:.{decimals(1e3 * part.std)}f}"
         mass_cell = plus_minus(1e3 * part.mass, 1e3 * part.std, "g")
-        place = ", ".join(f"{1e3 * value:.0f}" for value in part.centroid)
+        place = ", ".join(f"{round(1e3 * value) + 0}" for value in part.centroid)
         row = (
             f"part {part.label} {name}".rstrip(), mass_cell, known, f"{part.density:.0f} kg/m³", f"at ({place}) mm",
             part.material or "",

@@ -45,9 +45,8 @@ def read_cloud(path: Path | str) -> Cloud:
         raise BadFile(f'{path}: points need x, y and z; "{missing[0]}" is missing.')
     normals = next((names for names in _NORMALS if set(names) <= set(columns)), None)
     label = next((columns[name] for name in _LABELS if name in columns), None)
-    return _checked(
-        path, _stacked(columns, "xyz"), _rgb(columns), label, None if normals is None else _stacked(columns, normals)
-    )
+    turned = None if normals is None else _stacked(columns, normals)
+    return _checked(path, _stacked(columns, "xyz"), _rgb(columns), label, turned, columns.get("seen"))
 
 
 def _require_points_only(path: Path, faces: int) -> None:
@@ -85,7 +84,7 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing.')
     found: list[Any] = []
     with np.load(path, allow_pickle=False) as archive:
-        for name in ("xyz", "rgb", "label", "normals"):
+        for name in ("xyz", "rgb", "label", "normals", "seen"):
             try:
                 values = archive.get(name)
             except Exception as error:  # zip, zlib and numpy each raise their own
@@ -96,14 +95,14 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
     return tuple(found)
 
 
-def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any) -> Cloud:
+def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any) -> Cloud:
     """Return the cloud of finite points; raises BadFile where none is left or columns differ in length."""
     xyz = np.asarray(xyz, np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
     holes = np.isnan(xyz).all(1)
     try:
-        whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals)]
+        whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
         if holes.any() and not holes.all():
             xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
         return Cloud(xyz, *whole)
@@ -119,8 +118,9 @@ def write_cloud(cloud: Cloud, path: Path | str) -> None:
             write_bytes(path, _ply(cloud))
         case ".npz":
             content = io.BytesIO()
-            columns = {"xyz": cloud.xyz, "rgb": cloud.rgb, "label": cloud.label, "normals": cloud.normals}
-            np.savez_compressed(content, allow_pickle=False, **{k: v for k, v in columns.items() if v is not None})
+            names = ("xyz", "rgb", "label", "normals", "seen")
+            columns = {name: getattr(cloud, name) for name in names if getattr(cloud, name) is not None}
+            np.savez_compressed(content, allow_pickle=False, **columns)
             write_bytes(path, content.getvalue())
         case other:
             raise BadFile(f'{path}: a cloud is written as .ply or .npz, not as "{other}".')
@@ -134,6 +134,8 @@ def _ply(cloud: Cloud) -> bytes:
         fields += [(name, "uchar", "u1", cloud.rgb[:, k]) for k, name in enumerate(("red", "green", "blue"))]
     if cloud.label is not None:
         fields.append(("label", "int", "<i4", cloud.label))
+    if cloud.seen is not None:
+        fields.append(("seen", "uchar", "u1", cloud.seen))
     table = np.zeros(len(cloud), [(name, kind) for name, _, kind, _ in fields])
     for name, _, _, values in fields:
         table[name] = values

@@ -55,7 +55,7 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     normals  (V, 3) outward at the vertices, where they are known better than the triangles tell
     seen     (V,) whose colour was measured; the rest take the colour that the nearest of those has without the lamp
     """
-    seen = np.ones(len(rgb), dtype=bool) if seen is None else seen
+    seen = np.ones(len(rgb), dtype=bool) if seen is None or not seen.any() else seen
     colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near
     facing, flatness = skin.normals, skin.flatness
     if normals is not None:

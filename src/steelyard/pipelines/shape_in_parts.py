@@ -96,7 +96,7 @@ def shape_of(
     solid = carved(enclose(seen.cloud), seen.empty) if isinstance(seen, Scan) else enclose(seen)
     if refill is not None:
         mesh = refill(solid.mesh)
-        solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)))
+        solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)), around=None, inside=None)
     # Normals that were found and not measured blur at edges: they would split one colour by its shading.
     measured = (seen.cloud if isinstance(seen, Scan) else seen).normals is not None
     cloud = solid.cloud if measured else replace(solid.cloud, normals=None)

@@ -113,7 +113,7 @@ def settled(
     depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float,
     rounds: int,
 ) -> Any:  # fmt: skip
-    """Move points (N, 3) along their normals to the median of what the views measure; return support (N, 3).
+    """Move points (N, 3) along their normals to the middle of what the views measure; return support (N, 3).
 
     support  views that measure the surface, views that saw past it, and the rms of what is left [m]
     """
