@@ -194,14 +194,13 @@ def fit_poses(
     timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
     team, path = start, None
     noise = known = np.full((count, 2), GUESS) if noise is None else noise
-    H, common, solver = _informed(data, team.grasps, noise, unknown)
     for step_number in range(STEPS):
         here = Rows.settled(data, team, noise, 1, path)
         # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
         new = here.noise(noise) if step_number >= near else noise
         quiet = step_number >= near and bool(np.abs(np.log(new / noise)).max() < close.noise)
         noise = new
-        if 0 < step_number <= near or np.abs(np.log(noise / known)).max() > RENEWED:
+        if step_number <= near or np.abs(np.log(noise / known)).max() > RENEWED:
             known, (H, common, solver) = noise, _informed(data, team.grasps, noise, unknown)
         pull = here.pull(noise)[unknown] - common * timed * team.delays.sum()
         step = solver.step(pull)
