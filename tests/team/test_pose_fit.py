@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp, log
-from steelyard.team.pose_fit import PoseFit, fit_poses
+from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import TeamMotion
 
@@ -135,3 +137,26 @@ def test_robots_that_never_met_are_named() -> None:
     valid[50:, 0] = False
     with pytest.raises(CannotAnswer, match="robots 'a' and 'b' have 0 rows in common"):
         first_team(TeamMotion(data.poses, valid), 0, NAMES)
+
+
+@pytest.mark.parametrize("axes", [3, 1])
+def test_every_robot_starts_as_it_would_alone_with_the_reference(axes: int) -> None:
+    data, _ = trial(8, 4, turn=np.eye(3)[:axes])
+    valid = data.valid.copy()
+    valid[::3, 2] = False
+    together = first_team(TeamMotion(data.poses, valid), 0, NAMES)
+    for i in (1, 2, 3):
+        pair = first_team(TeamMotion(data.poses[:, [0, i]], valid[:, [0, i]]), 0, NAMES)
+        for one, two in ((together.grasps, pair.grasps), (together.homes, pair.homes)):
+            np.testing.assert_allclose(log(one[i].inverse() @ two[1]), 0, atol=1e-9)
+
+
+def test_where_the_fit_starts_does_not_move_the_optimum() -> None:
+    data, _ = trial(9, 4)
+    few = data.rows(slice(None, None, 4))
+    rough = fit_poses(few, first_team(few, 0, NAMES), 0, close=ROUGHLY)
+    seen = replace(rough.team, motion=data.motion_seen(rough.team.grasps, rough.team.homes))
+    start = Rows.settled(data, seen, rough.noise, 2).team
+    first, second = found(data), fit_poses(data, start, 0, rough.noise)
+    deviation = np.sqrt(np.diag(first.solved.inverse)[first.unknown % 13 < 6]).reshape(-1, 6)
+    np.testing.assert_array_less(np.abs(log(first.team.grasps.inverse() @ second.team.grasps)[1:]), 1e-6 * deviation)

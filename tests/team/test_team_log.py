@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from steelyard.errors import BadInput
+from steelyard.errors import BadInput, BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
@@ -150,3 +150,14 @@ def test_renaming_keeps_order_and_reference() -> None:
     assert renamed.names == ("port", "right")
     assert renamed.reference == "port"
     assert set(renamed.recordings[0].tracks) == {"port", "right"}
+
+
+def test_a_shifted_track_keeps_what_was_measured() -> None:
+    first = track()
+    later = first.shifted(0.25)
+    np.testing.assert_array_equal(later.time, first.time + 0.25)
+    assert later.channels == first.channels
+    assert later.valid == first.valid
+    assert not later.time.flags.writeable
+    with pytest.raises(BadValue, match="time must be finite"):
+        first.shifted(float("nan"))

@@ -18,7 +18,7 @@ from steelyard.team.pose_noise import _scores
 from steelyard.team.pose_rows import held
 from steelyard.team.pose_solver import SHOWN, Solver, unit
 from steelyard.team.slips import alone, find_slip
-from steelyard.team.turns import turns_between, twists_between
+from steelyard.team.turns import turned_by, turns_between, twists_between
 
 
 @pytest.mark.parametrize("rows", [4, 5, 300])
@@ -42,6 +42,14 @@ def test_turns_and_twists_between_poses(size: float) -> None:
     one = A.rotation[0]
     np.testing.assert_allclose(turns_between(one, B.rotation), (one.inverse() @ B.rotation).log(), atol=1e-13)
     np.testing.assert_allclose(twists_between(A, B), log_pose(A.inverse() @ B), atol=2e-14)
+
+
+@pytest.mark.parametrize("size", [0.0, 1e-9, 1e-4, 0.3, 3.0])
+def test_turns_lead_where_they_say(size: float) -> None:
+    rng = np.random.default_rng(4)
+    one, turns = Rotation.exp(rng.normal(size=3)), rng.normal(0, size, (20, 3))
+    led = turned_by(one, turns)
+    np.testing.assert_allclose(led.matrix, (one @ Rotation.exp(turns[:, None])).matrix, atol=2e-15)
 
 
 def test_scores_of_noise_from_six_columns() -> None:

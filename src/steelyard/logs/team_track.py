@@ -7,6 +7,7 @@ number that is missing is NaN when it comes in and a False in the mask of its ch
 from __future__ import annotations
 
 from collections.abc import Mapping
+from copy import copy
 from dataclasses import dataclass, replace
 from types import MappingProxyType
 from typing import Any
@@ -107,7 +108,8 @@ class Track:
     @property
     def pose(self) -> Pose:
         """Poses X_HG (T,); identity in rows where `mask("rotation", "position")` is False."""
-        return Pose(Rotation(self.channels["rotation"]), self.channels["position"])
+        # They were judged when the track was made.
+        return Pose(Rotation._trusted(self.channels["rotation"]), self.channels["position"])
 
     def wrench(self) -> Array:
         """Return wrenches (T, 6) [N m, N], moment zero for a passive gimbal; zero where `mask("force")` is False."""
@@ -125,7 +127,10 @@ class Track:
 
     def shifted(self, seconds: float) -> Track:
         """Return the track with `seconds` added to its stamps."""
-        return replace(self, time=self.time + seconds)
+        # Stamps still rise, and the channels were judged when the track was made.
+        moved = copy(self)
+        object.__setattr__(moved, "time", check.finite("time", self.time + seconds))
+        return moved
 
     def without(self, *names: str) -> Track:
         """Return the track without these channels."""

@@ -30,8 +30,6 @@ from steelyard.team.poses import Team, TeamMotion
 STEPS = 25
 # Noise to begin with [rad, m].
 GUESS = 1e-3
-# The information is taken anew where the noise has changed by this share.
-RENEWED = 0.02
 # Steps after which grasps are near enough for noise to be judged, and for the information to stay as it is.
 NEAR = 2
 
@@ -40,14 +38,16 @@ NEAR = 2
 class Close:
     """When a fit is done: a step lowers chi^2 by less than `chi2`, and noise changes by a smaller share than `noise`.
 
-    A chi^2 of x is a step of sqrt(x) standard deviations.
+    A chi^2 of x is a step of sqrt(x) standard deviations. The information is taken anew where the noise has changed by
+    the share `renewed`: what it is off by is left over from every step, which a fit that ends early can bear.
     """
 
     chi2: float
     noise: float
+    renewed: float
 
 
-EXACT, ROUGHLY = Close(1e-13, 1e-7), Close(1e-6, 1e-3)
+EXACT, ROUGHLY = Close(1e-13, 1e-7, 0.02), Close(1e-2, 1e-2, 0.2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,14 +194,13 @@ def fit_poses(
     timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
     team, path = start, None
     noise = known = np.full((count, 2), GUESS) if noise is None else noise
-    H, common, solver = _informed(data, team.grasps, noise, unknown)
     for step_number in range(STEPS):
         here = Rows.settled(data, team, noise, 1, path)
         # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
         new = here.noise(noise) if step_number >= near else noise
         quiet = step_number >= near and bool(np.abs(np.log(new / noise)).max() < close.noise)
         noise = new
-        if 0 < step_number <= near or np.abs(np.log(noise / known)).max() > RENEWED:
+        if step_number <= near or np.abs(np.log(noise / known)).max() > close.renewed:
             known, (H, common, solver) = noise, _informed(data, team.grasps, noise, unknown)
         pull = here.pull(noise)[unknown] - common * timed * team.delays.sum()
         step = solver.step(pull)

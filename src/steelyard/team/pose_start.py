@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.logs.log import Integers
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.turns import turns_between
@@ -31,72 +32,77 @@ ENOUGH = 300
 def first_team(data: TeamMotion, reference: int, names: tuple[str, ...]) -> Team:
     """Return grasps and homes from pairs with the reference; raises CannotAnswer where two have no rows in common."""
     count = data.valid.shape[1]
-    grasps, homes = [], []
-    for i in range(count):
-        if i == reference:
-            grasps.append(Pose.identity())
-            homes.append(Pose.identity())
-            continue
-        both = np.flatnonzero(data.valid[:, reference] & data.valid[:, i])
+    turns, places = np.tile(np.eye(3), (2, count, 1, 1)), np.zeros((2, count, 3))
+    for both, robots in _rows_in_common(data, reference):
         if len(both) < FEWEST:
             raise CannotAnswer(
-                f"robots '{names[reference]}' and '{names[i]}' have {len(both)} rows in common; at least {FEWEST} are "
-                "needed to find where one holds the payload from the other. Record them together."
+                f"robots '{names[reference]}' and '{names[robots[0]]}' have {len(both)} rows in common; at least "
+                f"{FEWEST} are needed to find where one holds the payload from the other. Record them together."
             )
         both = both[:: max(1, len(both) // ENOUGH)]
-        T_r, T_i = data.poses[both, reference], data.poses[both, i]
-        G = _grasp(T_r, T_i)
+        T_r, T = data.poses[both, reference], data.poses[both[:, None], robots]
+        G = _grasps(T_r, T)
         middle = len(both) // 2
-        grasps.append(G)
-        homes.append(T_r[middle] @ G @ T_i[middle].inverse())
-    G, Z = _stack(grasps), _stack(homes)
+        Z = T_r[middle] @ G @ T[middle].inverse()
+        turns[:, robots] = G.rotation.matrix, Z.rotation.matrix
+        places[:, robots] = G.position, Z.position
+    G, Z = (Pose(Rotation(turn), place) for turn, place in zip(turns, places, strict=True))
     return Team(G, Z, data.motion_seen(G, Z), np.zeros(count))
 
 
-def _stack(poses: list[Pose]) -> Pose:
-    matrix = np.stack([p.rotation.matrix for p in poses])
-    return Pose(Rotation(matrix), np.stack([p.position for p in poses]))
+def _rows_in_common(data: TeamMotion, reference: int) -> list[tuple[Integers, list[int]]]:
+    """Return rows that the reference has in common with other robots, and which robots these are."""
+    groups: dict[bytes, tuple[Integers, list[int]]] = {}
+    for i in range(data.count):
+        if i != reference:
+            both = data.valid[:, reference] & data.valid[:, i]
+            groups.setdefault(both.tobytes(), (np.flatnonzero(both), []))[1].append(i)
+    return list(groups.values())
 
 
-def _grasp(T_r: Pose, T_i: Pose) -> Pose:
-    """Return the grasp of i in that of r that explains their motions best, among a few."""
-    middle = len(T_r.position) // 2
-    A, B = T_r[middle].inverse() @ T_r, T_i[middle].inverse() @ T_i
-    alpha = turns_between(T_r.rotation[middle], T_r.rotation)
-    beta = turns_between(T_i.rotation[middle], T_i.rotation)
+def _grasps(T_r: Pose, T: Pose) -> Pose:
+    """Return the grasps (K,) in that of r that explain their motions best, among a few; poses T_r (M,), T (M, K)."""
+    middle, rows = len(T_r.position) // 2, len(T_r.position)
+    A, B = T_r[middle].inverse() @ T_r, T[middle].inverse() @ T
+    alpha, beta = (turns_between(Rotation.identity(), X.rotation) for X in (A, B))
     a, b = A.position - A.position.mean(0), B.position - B.position.mean(0)
-    turning, moving = alpha.T @ beta, a.T @ b
-    candidates = [_wahba(turning), _wahba(moving)]
+    turning, moving = (np.einsum("mi,mkj->kij", x, y, optimize=True) for x, y in ((alpha, beta), (a, b)))
+    first = _wahba(turning)
     seen, axes = np.linalg.eigh(alpha.T @ alpha)
-    axis = axes[:, 2]
-    if seen[1] > ONE_AXIS**2 * seen[2] and seen[1] > len(alpha) * (10 * ROTATION_NOISE) ** 2:
-        return Pose(candidates[0], _position(A, B, candidates[0])[0])
-    for angle in np.arange(TURNS) * (2 * np.pi / TURNS):
-        candidates.append(Rotation.exp(angle * axis) @ candidates[0])
-    found = [_position(A, B, R) for R in candidates]
+    if seen[1] > ONE_AXIS**2 * seen[2] and seen[1] > rows * (10 * ROTATION_NOISE) ** 2:
+        return Pose(first, _positions(A, B, first)[0])
+    about = [Rotation.exp(angle * axes[:, 2]) for angle in np.arange(TURNS) * (2 * np.pi / TURNS)]
+    candidates = [first, _wahba(moving), *(turn @ first for turn in about)]
+    found = [_positions(A, B, R) for R in candidates]
     spread = float(np.linalg.norm(alpha, axis=1).mean()) + 1e-12
     size = float(np.linalg.norm(a, axis=1).mean()) + 1e-12
     cost = [
-        left / size**2 + float(((alpha - R.apply(beta)) ** 2).sum()) / spread**2
+        left / size**2 + ((alpha[:, None] - R.apply(beta)) ** 2).sum((0, 2)) / spread**2
         for R, (_, left) in zip(candidates, found, strict=True)
     ]
-    best = int(np.argmin(cost))
-    return Pose(candidates[best], found[best][0])
+    best, each = np.argmin(cost, axis=0), np.arange(len(first.matrix))
+    turns = np.stack([R.matrix for R in candidates])[best, each]
+    return Pose(Rotation(turns), np.stack([place for place, _ in found])[best, each])
 
 
 def _wahba(H: Array) -> Rotation:
-    """Return R that minimises sum |alpha - R beta|^2 for H = sum alpha beta^T. Source: the paper, eq. 5."""
+    """Return R (K,) that minimise sum |alpha - R beta|^2 for H (K, 3, 3) = sum alpha beta^T.
+
+    Source: the paper, eq. 5.
+    """
     u, _, vt = np.linalg.svd(H)
-    u[:, 2] *= np.linalg.det(u @ vt)
+    u[..., 2] *= np.linalg.det(u @ vt)[:, None]
     return Rotation(u @ vt)
 
 
-def _position(A: Pose, B: Pose, R: Rotation) -> tuple[Array, float]:
-    """Return the position (3,) by least squares, near zero where no rotation shows it, and the squares left."""
+def _positions(A: Pose, B: Pose, R: Rotation) -> tuple[Array, Array]:
+    """Return positions (K, 3) by least squares, near zero where no rotation shows them, and the squares left (K,)."""
     left = A.rotation.matrix - np.eye(3)
-    right = R.apply(B.position) - A.position
+    right = R.apply(B.position) - A.position[:, None]
     # An offset of the row m itself is noise: means are taken away.
     left, right = left - left.mean(0), right - right.mean(0)
     ridge = len(left) * ROTATION_NOISE**2
-    p = np.linalg.solve(np.einsum("tki,tkj->ij", left, left) + ridge * np.eye(3), np.einsum("tki,tk->i", left, right))
-    return p, float(((left @ p - right) ** 2).sum() + ridge * (p @ p))
+    along = np.einsum("mai,mka->ik", left, right, optimize=True)
+    p = np.linalg.solve(np.einsum("mai,maj->ij", left, left) + ridge * np.eye(3), along).T
+    off = np.einsum("mai,ki->mka", left, p, optimize=True) - right
+    return p, (off**2).sum((0, 2)) + ridge * (p**2).sum(1)

@@ -17,7 +17,7 @@ from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
-from steelyard.team.pose_start import first_team
+from steelyard.team.pose_start import ENOUGH, first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
 from steelyard.team.slips import SlipAt, alone, edited, find_slip, noise_alone
@@ -29,8 +29,9 @@ PUNCTUAL = 2e-4
 # A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
 DOUBTED = 4.0
 CLOCK_ROUNDS = 6
-# Rows that are enough to come near the optimum; all rows then finish.
-FEW_ROWS = 1500
+# Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
+# that so many poses of all robots together are enough.
+FEW_ROWS, FEW_POSES = 1500, 4500
 # Sweeps over a row with which the motion follows grasps and homes from wherever it was.
 FOLLOWED = 2
 MOST_SLIPS = 3
@@ -87,7 +88,8 @@ class PoseTeam:
         parts = edit(parts)
         data = TeamMotion(*all_poses(parts))
         start = first_team(data, reference, log.names)
-        few = slice(None, None, max(1, len(data.valid) // FEW_ROWS))
+        enough = min(FEW_ROWS, max(ENOUGH, FEW_POSES // data.count))
+        few = slice(None, None, max(1, len(data.valid) // enough))
         fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
         if not clocks:
             return cls(parts, fit_poses(data, _followed(data, fit), reference, fit.noise), late)

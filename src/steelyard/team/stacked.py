@@ -14,7 +14,7 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.turns import turns_between
+from steelyard.team.turns import turned_by, turns_between
 
 # Rows that a gap may last and still be filled: far below what the payload can do in that time.
 BRIDGED = 3
@@ -120,7 +120,7 @@ def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
     own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
     curve = between(track.time, np.concatenate([*own, track.wrench()], axis=1), time)
     near = near_samples(track.time, time, float(np.median(np.diff(track.time))))
-    return turn @ Rotation.exp(curve[:, None, :3]), turn.apply(curve[:, 3:6]), curve[:, 6:], near
+    return turned_by(turn, curve[:, :3]), turn.apply(curve[:, 3:6]), curve[:, 6:], near
 
 
 def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:

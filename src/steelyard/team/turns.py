@@ -10,8 +10,14 @@ from steelyard.spatial import Pose, Rotation
 
 
 def turns_between(first: Rotation, second: Rotation) -> Array:
-    """Return the rotation vectors (T, 3) [rad], at most pi long, of first^-1 second; `first` (T,) or a single one."""
-    return _turns(first.matrix.reshape(-1, 3, 3), second.matrix)
+    """Return the rotation vectors (..., 3) [rad], at most pi long, of first^-1 second; `first` is alike or single."""
+    turns = _turns(first.matrix.reshape(-1, 3, 3), second.matrix.reshape(-1, 3, 3))
+    return turns.reshape(second.matrix.shape[:-1])
+
+
+def turned_by(first: Rotation, turns: Array) -> Rotation:
+    """Return the rotations (T, 1) that a single one comes to by rotation vectors (T, 3) [rad] in its own axes."""
+    return Rotation._trusted(_turned_by(first.matrix, turns)[:, None])
 
 
 def twists_between(first: Pose, second: Pose) -> Array:
@@ -48,6 +54,25 @@ def _turns(A: Array, B: Array) -> Array:
             share = 2 * way * np.arctan2(size, way * w) / size
         for i in range(3):
             out[t, i] = share * v[i]
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _turned_by(A: Array, turns: Array) -> Array:
+    """Return A exp(v) (T, 3, 3) for vectors v (T, 3) (Rodrigues; the half angle keeps digits near zero)."""
+    out = np.empty((len(turns), 3, 3))
+    for t in range(len(turns)):
+        x, y, z = turns[t, 0], turns[t, 1], turns[t, 2]
+        square = x * x + y * y + z * z
+        a, b = 1 - square / 6, 0.5 - square / 24
+        if square > 1e-8:
+            angle = np.sqrt(square)
+            a, b = np.sin(angle) / angle, 2 * (np.sin(0.5 * angle) / angle) ** 2
+        for i in range(3):
+            u, v, w = A[i, 0], A[i, 1], A[i, 2]
+            out[t, i, 0] = u * (1 - b * (y * y + z * z)) + v * (b * x * y + a * z) + w * (b * x * z - a * y)
+            out[t, i, 1] = u * (b * x * y - a * z) + v * (1 - b * (x * x + z * z)) + w * (b * y * z + a * x)
+            out[t, i, 2] = u * (b * x * z + a * y) + v * (b * y * z - a * x) + w * (1 - b * (x * x + y * y))
     return out
 
 
