@@ -140,10 +140,14 @@ def _slopes(team: Hinged, along: Array, turned: Array, speed: Array | None, robo
 
 
 def _inner(along: Array, W: Array) -> Array:
-    """Return the inverse information (T, 7, 7) about the motion; a breath of ridge where a body is not seen."""
+    """Return the inverse information (T, 7, 7) about the motion; a breath of ridge where a body is not seen.
+
+    Rows that nobody saw say nothing: any motion will do, and the identity stands for what is known of it.
+    """
     A = np.einsum("tnai,tna,tnaj->tij", along, W, along, optimize=True)
-    size = A[:, range(7), range(7)].max(1)[:, None] + 1e-300
-    return np.asarray(np.linalg.inv(A + 1e-10 * size[..., None] * np.eye(7)))
+    size = A[:, range(7), range(7)].max(1)
+    ridge = np.where(size > 0, 1e-10 * size, 1.0)
+    return np.asarray(np.linalg.inv(A + ridge[:, None, None] * np.eye(7)))
 
 
 def followed(data: TeamMotion, team: Hinged, noise: Array, sweeps: int) -> Hinged:
