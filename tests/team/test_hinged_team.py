@@ -21,9 +21,11 @@ from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
+from steelyard.team.hinge import find_split
 from steelyard.team.hinged_bodies import FROM_TEN, least_mass
 from steelyard.team.hinged_rows import COUNT, EXCHANGED, SEVEN, about_z, equations
 from steelyard.team.joint import JointTeam
+from steelyard.team.stacked import stretches
 
 QUIET = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.2, torque_white_Nm=0.02)
 HELD = Hinge(
@@ -123,6 +125,23 @@ def test_one_robot_on_a_body_is_enough_and_clocks_are_put_right() -> None:
     assert found.hinge is not None
     assert found.clock_offsets_s["robot1"] == pytest.approx(0.013, abs=3e-4)
     assert found.clock_offsets_s["robot2"] == pytest.approx(0.008, abs=3e-4)
+    whole, each = scores(made, found)
+    assert np.abs(np.concatenate([whole, each])).max() < 4.5
+
+
+@pytest.mark.parametrize("changes", [{"dropout": 0.02}, {"gaps": {1: ((8.0, 8.15),)}}, {"gaps": {2: ((5.0, 6.0),)}}])
+def test_the_hinge_is_noticed_where_rows_are_missing(changes: dict[str, Any]) -> None:
+    made = trial(100, **changes)
+    split = find_split(stretches(made.log, {}))
+    assert split is not None
+    assert split.groups == ((0, 1), (2, 3))
+    assert split.hinge is not None
+
+
+def test_rows_that_nobody_saw_do_no_harm() -> None:
+    made = trial(100, gaps=dict.fromkeys(range(4), ((8.0, 8.15),)))
+    found = JointTeam().identify(made.log)
+    assert found.hinge is not None
     whole, each = scores(made, found)
     assert np.abs(np.concatenate([whole, each])).max() < 4.5
 
