@@ -91,8 +91,8 @@ class JointTeam:
     def _jointed(self, log: TeamLog, split: Split, standing: Sequence[Finding]) -> TeamEstimate | None:
         """Return the estimate of two bodies with a hinge, None where there is no hinge or too little is shown of it.
 
-        Numbers that degenerate on the way count as too little. Of the rigid fit's findings (`standing`), only who let go
-        or took hold is said again: that shows in the wrenches. The hinge itself may pass for a slip.
+        Numbers that degenerate on the way count as too little. Of the rigid fit's findings (`standing`), only who let
+        go or took hold is said again: that shows in the wrenches. The hinge itself may pass for a slip.
         """
         if split.hinge is None:
             return None
