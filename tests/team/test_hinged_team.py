@@ -120,6 +120,18 @@ def test_both_bodies_are_found_within_their_error_bars(quiet: tuple[TeamTrial, T
         assert np.abs(values).max() < 4.5
 
 
+def test_a_long_log_is_used_whole(quiet: tuple[TeamTrial, TeamEstimate]) -> None:
+    made = trial(100, motion_samples=6000)
+    found = JointTeam().identify(made.log)
+    whole, each = scores(made, found)
+    assert np.abs(np.concatenate([whole, each])).max() < 4.5
+    first, second = (max(float(g.std_m.max()) for g in one.grasps.values()) for one in (quiet[1], found))
+    assert second < 0.65 * first
+    where = found.grasps["robot1"]
+    off = where.pose.position - made.truth.grasps.position[1]
+    assert np.abs(off / where.std_m).max() < 4.5
+
+
 def test_one_robot_on_a_body_is_enough_and_clocks_are_put_right() -> None:
     held = replace(HELD, robots=frozenset({2}))
     scene = TeamScene(QUIET, 3, "poses", frozenset({0, 1, 2}), kinds=("still", "motion"), motion_samples=1500)
