@@ -12,18 +12,23 @@ import pytest
 
 from steelyard.check import Array
 from steelyard.cli.team_table import team_table
-from steelyard.errors import BadFile
+from steelyard.errors import BadFile, BadValue
 from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters, forms
 from steelyard.io.result_files import result_dict, write_result
 from steelyard.io.result_reading import read_result
+from steelyard.report import render
+from steelyard.report.team_page import team_page
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
+from steelyard.team.hinge import find_split
 from steelyard.team.hinged_bodies import FROM_TEN, least_mass
 from steelyard.team.hinged_rows import COUNT, EXCHANGED, SEVEN, about_z, equations
 from steelyard.team.joint import JointTeam
+from steelyard.team.stacked import stretches
+from steelyard.team.team_findings import open_parameters
 
 QUIET = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.2, torque_white_Nm=0.02)
 HELD = Hinge(
@@ -115,6 +120,18 @@ def test_both_bodies_are_found_within_their_error_bars(quiet: tuple[TeamTrial, T
         assert np.abs(values).max() < 4.5
 
 
+def test_a_long_log_is_used_whole(quiet: tuple[TeamTrial, TeamEstimate]) -> None:
+    made = trial(100, motion_samples=6000)
+    found = JointTeam().identify(made.log)
+    whole, each = scores(made, found)
+    assert np.abs(np.concatenate([whole, each])).max() < 4.5
+    first, second = (max(float(g.std_m.max()) for g in one.grasps.values()) for one in (quiet[1], found))
+    assert second < 0.65 * first
+    where = found.grasps["robot1"]
+    off = where.pose.position - made.truth.grasps.position[1]
+    assert np.abs(off / where.std_m).max() < 4.5
+
+
 def test_one_robot_on_a_body_is_enough_and_clocks_are_put_right() -> None:
     held = replace(HELD, robots=frozenset({2}))
     scene = TeamScene(QUIET, 3, "poses", frozenset({0, 1, 2}), kinds=("still", "motion"), motion_samples=1500)
@@ -123,6 +140,23 @@ def test_one_robot_on_a_body_is_enough_and_clocks_are_put_right() -> None:
     assert found.hinge is not None
     assert found.clock_offsets_s["robot1"] == pytest.approx(0.013, abs=3e-4)
     assert found.clock_offsets_s["robot2"] == pytest.approx(0.008, abs=3e-4)
+    whole, each = scores(made, found)
+    assert np.abs(np.concatenate([whole, each])).max() < 4.5
+
+
+@pytest.mark.parametrize("changes", [{"dropout": 0.02}, {"gaps": {1: ((8.0, 8.15),)}}, {"gaps": {2: ((5.0, 6.0),)}}])
+def test_the_hinge_is_noticed_where_rows_are_missing(changes: dict[str, Any]) -> None:
+    made = trial(100, **changes)
+    split = find_split(stretches(made.log, {}))
+    assert split is not None
+    assert split.groups == ((0, 1), (2, 3))
+    assert split.hinge is not None
+
+
+def test_rows_that_nobody_saw_do_no_harm() -> None:
+    made = trial(100, gaps=dict.fromkeys(range(4), ((8.0, 8.15),)))
+    found = JointTeam().identify(made.log)
+    assert found.hinge is not None
     whole, each = scores(made, found)
     assert np.abs(np.concatenate([whole, each])).max() < 4.5
 
@@ -139,6 +173,37 @@ def test_wrists_are_taken_out_of_the_body_that_they_move_with(quiet: tuple[TeamT
     assert apart == pytest.approx(0.5 * float(arm @ arm))
 
 
+def test_the_length_of_a_lever_errs_no_more_than_all_its_axes_together(quiet: tuple[TeamTrial, TeamEstimate]) -> None:
+    assert quiet[1].hinge is not None
+    for body in quiet[1].hinge.bodies:
+        assert body.first_moment_std.min() / 2 < body.lever_std < np.linalg.norm(body.first_moment_std)
+
+
+@pytest.mark.parametrize("failure", [BadValue("a rotation vector must be finite."), np.linalg.LinAlgError()])
+def test_numbers_that_degenerate_leave_the_rigid_answer_with_the_cause(
+    quiet: tuple[TeamTrial, TeamEstimate], failure: Exception, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    def fails(*_: object) -> None:
+        raise failure
+
+    monkeypatch.setattr("steelyard.team.joint.identify_two_bodies", fails)
+    found = JointTeam().identify(quiet[0].log)
+    assert found.hinge is None
+    assert "payload-jointed" in found.codes()
+
+
+def test_open_inertia_of_two_bodies_is_named_out_of_seventeen() -> None:
+    (finding,) = open_parameters(np.arange(10) < 4, 15, COUNT)
+    assert finding.code == "inertia-not-identified"
+    assert "15 of the 17 parameters" in finding.message
+
+
+def test_the_page_shows_both_bodies(quiet: tuple[TeamTrial, TeamEstimate]) -> None:
+    page = render(team_page("team", quiet[1], quiet[0].log))
+    assert "17 of 17" in page
+    assert "robot2, robot3" in page
+
+
 def test_least_mass_is_that_of_a_body_with_these_moments() -> None:
     # All mass at one distance from the hinge weighs exactly so much.
     ten = InertialParameters.from_point_masses(np.array([2.0]), np.array([[0.3, 0.1, 0.5]])).vector
@@ -152,6 +217,7 @@ def test_the_finding_says_who_holds_what_and_what_to_do(quiet: tuple[TeamTrial, 
     (finding,) = [f for f in found.findings if f.code == "payload-jointed"]
     assert "No motion tells how their mass is shared" in finding.message
     assert "Weigh one body by itself" in finding.remedy
+    assert "'robot0' and 'robot1' hold one body, 'robot2' and 'robot3' another" in finding.message
     table = team_table(found, "team")
     assert "two bodies with a hinge" in table
     assert "held by robot2, robot3" in table
@@ -169,6 +235,7 @@ def test_result_files_hold_the_hinge_and_both_bodies(quiet: tuple[TeamTrial, Tea
     assert found.hinge is not None
     for one, two in zip(again.hinge.bodies, found.hinge.bodies, strict=True):
         assert one.hinge_moment == two.hinge_moment
+        assert one.lever_std == two.lever_std
         np.testing.assert_array_equal(one.mass_range, two.mass_range)
     values["bodies"] = []
     (tmp_path / "bad.json").write_text(json.dumps(values))

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.cli.table import columns, decimals, estimate_table, plus_minus
-from steelyard.report.numbers import principal, rpy_deg
+from steelyard.report.numbers import general, principal, rpy_deg
 from steelyard.spatial import Pose
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
@@ -47,14 +47,13 @@ def _hinge_lines(estimate: TeamEstimate) -> list[str]:
     rows = [("", "moment about the hinge", "mass times lever", "mass between")]
     for body in estimate.hinge.bodies:
         lever = float(np.linalg.norm(body.first_moment))
-        std = float(np.abs(body.first_moment) @ body.first_moment_std) / max(lever, 1e-300)
-        low, high = body.mass_range
+        low, high = map(float, body.mass_range)
         rows.append(
             (
                 "  held by " + ", ".join(body.robots),
                 _or_open(body.hinge_moment, body.hinge_moment_std, "kg m²"),
-                _or_open(lever, std, "kg m"),
-                f"{low:.1f} and {high:.1f} kg" if np.isfinite(low) else "not shown",
+                _or_open(lever, body.lever_std, "kg m"),
+                f"{general(low)} and {general(high)} kg" if np.isfinite(low) else "not shown",
             )
         )
     return ["", click.style("  two bodies with a hinge", bold=True), columns(rows)]

@@ -30,7 +30,7 @@ def hinge_entries(hinge: HingeEstimate | None) -> dict[str, Any]:
                 "hinge_moment_kgm2": _shown(body.hinge_moment), "first_moment_kgm": _shown(body.first_moment),
                 "std": {
                     "hinge_moment_kgm2": _shown(body.hinge_moment_std),
-                    "first_moment_kgm": _shown(body.first_moment_std),
+                    "first_moment_kgm": _shown(body.first_moment_std), "lever_kgm": _shown(body.lever_std),
                 },
             }
             for body in hinge.bodies
@@ -67,7 +67,7 @@ def _body(path: Path, body: Any) -> BodyEstimate:
         tuple(str(name) for name in body["robots"]),
         float(_numbers(path, body, "hinge_moment_kgm2", 1)[0]), float(_numbers(path, std, "hinge_moment_kgm2", 1)[0]),
         _numbers(path, body, "first_moment_kgm", 3), _numbers(path, std, "first_moment_kgm", 3),
-        _numbers(path, body, "mass_range_kg", 2),
+        float(_numbers(path, std, "lever_kgm", 1)[0]), _numbers(path, body, "mass_range_kg", 2),
     )  # fmt: skip
 
 

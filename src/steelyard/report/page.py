@@ -46,6 +46,7 @@ def render(report: Report, version: str | None = None) -> str:
         sections.headline(report),
         viewer(report),
         team_sections.grasps(report),
+        team_sections.bodies(report),
         sections.comparison(report),
         sections.residuals(report),
         sections.findings(report),

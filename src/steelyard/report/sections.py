@@ -12,6 +12,7 @@ from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import decimals, fixed, general, inertia_unit, mass_unit, measured, people, principal
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, residual_plot
+from steelyard.team.estimate import TeamEstimate
 
 _ENTRIES = ("mass", "x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")
 _MOST = 60  # findings, notes: what a person may still read
@@ -218,7 +219,7 @@ def evidence(report: Report) -> Html:
     if seen.samples:
         rows += [
             ("samples", f"{seen.samples}, of which {seen.still_samples} at rest", ""),
-            ("rank", f"{seen.rank} of 10", "directions of the ten parameters that the motion shows"),
+            ("rank", *_rank(report.estimate)),
             ("condition", general(seen.condition), "1 would be the best motion possible"),
             ("residual", f"{general(seen.residual_force_N)} N, {general(seen.residual_torque_Nm)} N m",
              "root mean square per axis"),
@@ -236,6 +237,13 @@ def evidence(report: Report) -> Html:
     rows += [("note", note, "") for note in report.estimate.notes[:_MOST]]
     items = [tag("div", tag("dt", n), tag("dd", v, tag("small", why) if why else "")) for n, v, why in rows]
     return section("Evidence", tag("dl", *items, class_="facts"), name="evidence")
+
+
+def _rank(seen: Estimate) -> tuple[str, str]:
+    """Return how many directions of how many parameters the motion shows: a hinge adds seven."""
+    if isinstance(seen, TeamEstimate) and seen.hinge is not None:
+        return f"{seen.evidence.rank} of 17", "directions of the parameters of two bodies with a hinge that show"
+    return f"{seen.evidence.rank} of 10", "directions of the ten parameters that the motion shows"
 
 
 def _vector(values: Array) -> str:

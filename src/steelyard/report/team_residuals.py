@@ -21,6 +21,8 @@ _PAUSE_S = 0.1
 def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     """Return the residuals in the reference grasp of all rows with complete wrenches, below 3 Hz; None without any.
 
+    None also for two bodies with a hinge: what one rigid body would need leaves their motion over.
+
     Recordings follow each other without the pauses between them. The motion is the mean over the robots that saw it.
     Raises BadValue where the log is another team's.
     """
@@ -29,6 +31,8 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
             f"the log must be that of the result; it is of {', '.join(log.names)} with reference '{log.reference}', "
             f"the result of {', '.join(estimate.grasps)} with '{estimate.reference}'."
         )
+    if estimate.hinge is not None:
+        return None
     grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
     start, parts = 0.0, []
     for recording in log.recordings:

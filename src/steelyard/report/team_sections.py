@@ -27,11 +27,36 @@ def grasps(report: Report) -> Html:
     lines = [_line(report, seen, name, true.get(name), bool(true), late) for name in seen.grasps]
     lead = (
         f"Pose of every grasp in that of {seen.reference}, one standard deviation. Nobody measured these: they follow "
-        "from how the robots saw one rigid body move."
+        f"from how the robots saw {'one rigid body' if seen.hinge is None else 'two bodies with a hinge'} move."
     )
     return section(
         "Where the robots hold", table(tuple(heads), lines), *_rivals(report, seen), name="grasps", lead=lead
     )
+
+
+def bodies(report: Report) -> Html:
+    """Return the table of two bodies with a hinge; nothing for one body."""
+    seen = report.estimate
+    if not isinstance(seen, TeamEstimate) or seen.hinge is None:
+        return Html("")
+    lines = []
+    for body in seen.hinge.bodies:
+        lever, (low, high) = float(np.linalg.norm(body.first_moment)), map(float, body.mass_range)
+        cells = (
+            _shown(body.hinge_moment, body.hinge_moment_std, "kg m²"), _shown(lever, body.lever_std, "kg m"),
+            f"{general(low)} to {general(high)} kg" if np.isfinite(low) else "not shown",
+        )  # fmt: skip
+        lines.append(tag("tr", tag("th", ", ".join(body.robots), scope="row"), *(tag("td", cell) for cell in cells)))
+    lead = (
+        f"The hinge between them swung by {fixed(float(np.rad2deg(seen.hinge.swing)), 0)}° to either side of its mean, "
+        "where the other numbers of this page hold for both bodies together. No motion tells how their mass is shared."
+    )
+    heads = ("held by", "moment about the hinge", "mass times lever", "mass")
+    return section("Two bodies with a hinge", table(heads, lines), name="bodies", lead=lead)
+
+
+def _shown(value: float, std: float, unit: str) -> Html | str:
+    return measured(value, std, unit) if np.isfinite(value) else "not shown"
 
 
 def _line(report: Report, seen: TeamEstimate, name: str, true: Pose | None, compared: bool, late: bool) -> Html:

@@ -50,6 +50,7 @@ class BodyEstimate:
     hinge_moment       moment of inertia about the hinge [kg m^2], with standard deviation; NaN where not shown
     first_moment       (3,) mass times the way from the hinge's line to the centre of mass [kg m], across the hinge,
                        with the hinge at zero; with standard deviations (3,), NaN where not shown
+    lever_std          standard deviation of its length [kg m]
     mass_range         (2,) [kg] least and most that a body with these moments can weigh; NaN where not shown
     Mass alone, and the place of the centre of mass along the hinge, no motion tells: see `hinged_rows`.
     """
@@ -59,6 +60,7 @@ class BodyEstimate:
     hinge_moment_std: float
     first_moment: Array
     first_moment_std: Array
+    lever_std: float
     mass_range: Array
 
 

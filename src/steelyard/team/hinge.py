@@ -16,6 +16,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.log import Integers
 from steelyard.team.adjoint import adjoint, exp
 from steelyard.team.stacked import Stretch
 from steelyard.team.twist_rows import differenced
@@ -32,23 +33,33 @@ LOUD = 5.0
 PARTS = (slice(0, 3), slice(3, 6))
 # Rows that must be there.
 FEWEST = 200
+# Gaps up to so long [s] are bridged: half a period of the fastest motion that is kept.
+BRIDGED_S = 0.5 / CUTOFF_HZ
 
 
 def moving_twists(parts: Sequence[Stretch]) -> tuple[Array, Array, float]:
-    """Return low-passed twists (T, N, 6) of the longest recording in motion, in rows that all robots saw.
+    """Return low-passed twists (T, N, 6) of the longest recording in motion, its longest run of rows without long gaps.
 
-    Also the mean square (N, 2) of what the filter took away, turning and moving, and the rate [Hz].
+    Rows that some robot missed are bridged by straight lines, in the twists of all robots alike, so that what is a
+    fixed linear map of another twist stays one. Also the mean square (N, 2) of what the filter took away of the rows
+    that all saw, turning and moving, and the rate [Hz].
     """
     part = max((p for p in parts if p.kind != "still"), key=len, default=parts[0])
     every = [differenced(part.poses[:, i], part.seen[:, i], part.rate) for i in range(part.seen.shape[1])]
-    good = np.flatnonzero(np.all([seen for _, seen in every], axis=0))
-    if len(good) < FEWEST or (np.diff(good) > 1).any():
+    good = longest_run(np.flatnonzero(np.all([seen for _, seen in every], axis=0)), round(BRIDGED_S * part.rate))
+    if len(good) < FEWEST:
         return np.zeros((0, len(every), 6)), np.zeros((len(every), 2)), part.rate
-    twist = np.stack([values[good] for values, _ in every], axis=1)
-    flat = lowpass(twist.reshape(len(twist), -1), min(CUTOFF_HZ, 0.4 * part.rate), part.rate)
-    smooth = flat.reshape(twist.shape)
-    taken = ((twist - smooth) ** 2).mean(0).reshape(-1, 2, 3).mean(2)
-    return smooth, taken, part.rate
+    seen = np.stack([values[good] for values, _ in every], axis=1).reshape(len(good), -1)
+    rows = np.arange(good[0], good[-1] + 1)
+    twist = np.stack([np.interp(rows, good, column) for column in seen.T], axis=1)
+    smooth = lowpass(twist, min(CUTOFF_HZ, 0.4 * part.rate), part.rate)
+    taken = ((twist - smooth)[good - good[0]] ** 2).mean(0).reshape(-1, 2, 3).mean(2)
+    return smooth.reshape(len(rows), -1, 6), taken, part.rate
+
+
+def longest_run(rows: Integers, bridged: int) -> Integers:
+    """Return the longest of the pieces into which gaps of more than `bridged` rows cut rising row numbers."""
+    return max(np.split(rows, np.flatnonzero(np.diff(rows) > bridged + 1) + 1), key=len)
 
 
 def unexplained(first: Array, second: Array, noise: Array) -> float:

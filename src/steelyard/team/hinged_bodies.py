@@ -92,6 +92,8 @@ def both_bodies(
         values, (spread, vector) = map_ @ parameters, spreads[k]
         moment, std = float(values[2] + values[3]), float(np.sqrt(max(spread[2:4, 2:4].sum(), 0.0)))
         first, first_std = across @ values[:2], np.sqrt(np.maximum(np.diag(vector), 0))
+        along = first / max(float(np.linalg.norm(first)), 1e-300)
+        lever_std = float(np.sqrt(max(float(along @ vector @ along), 0.0)))
         turned = 2 * std < SHOWN * scale[WHOLE + 2]
         levered = 2 * float(np.sqrt(max(float(np.linalg.eigvalsh(vector)[-1]), 0.0))) < SHOWN * scale[WHOLE]
         (low, low_std), (other, other_std) = least[k], least[1 - k]
@@ -100,7 +102,8 @@ def both_bodies(
         made.append(
             BodyEstimate(
                 names, moment if turned else np.nan, std if turned else np.nan, np.where(levered, first, np.nan),
-                np.where(levered, first_std, np.nan), np.where(turned and levered, weighs, np.nan),
+                np.where(levered, first_std, np.nan), lever_std if levered else np.nan,
+                np.where(turned and levered, weighs, np.nan),
             )
         )  # fmt: skip
     return made[0], made[1]
@@ -114,14 +117,14 @@ def hinge_findings(team: TeamEstimate) -> list[Finding]:
     one, two = (" and ".join(f"'{name}'" for name in body.robots) for body in hinge.bodies)
     axis, point = ", ".join(f"{a:.3f}" for a in hinge.axis), ", ".join(f"{1e3 * a:.0f}" for a in hinge.point)
     said = (
-        f"{one} and {two} hold two bodies with a hinge about ({axis}) through ({point}) mm of grasp "
+        f"{one} hold one body, {two} another: between them is a hinge about ({axis}) through ({point}) mm of grasp "
         f"'{team.reference}', which swung by {np.rad2deg(hinge.swing):.0f} deg. What is given is for both together "
-        "with the hinge at the middle of its angles. "
+        "with the hinge at the mean of its angles. "
     )
     if np.isnan([body.mass_range[0] for body in hinge.bodies]).any():
         said += "Too little is shown of each body: open and close the hinge faster while tilting the payload."
     else:
-        ranges = (f"{body.mass_range[0]:.2g} to {body.mass_range[1]:.3g} kg" for body in hinge.bodies)
+        ranges = (f"{body.mass_range[0]:.3g} to {body.mass_range[1]:.3g} kg" for body in hinge.bodies)
         said += (
             f"No motion tells how their mass is shared: {' and '.join(ranges)} are possible. Weigh one body by itself."
         )

@@ -31,6 +31,8 @@ CLOSE, SETTLED = 1e-6, 1e-3
 GUESS, LEAST = np.array([1e-3, 1e-3]), np.array([1e-7, 1e-7])
 # Rows on which what the motion takes up is worked out for the noise, and batches that tell how noise is correlated.
 JUDGED, BATCHES = 40, 30
+# Rows that are worked on at a time where all are: they need some 10 kB each with four robots.
+CHUNK = 2000
 # Information along a direction, in units of its parameters' own, below which it is one that nothing can show.
 NULL = 1e-9
 # Directions that nothing can show: the hinge along and about itself, the angle that counts as zero.
@@ -140,10 +142,14 @@ def _slopes(team: Hinged, along: Array, turned: Array, speed: Array | None, robo
 
 
 def _inner(along: Array, W: Array) -> Array:
-    """Return the inverse information (T, 7, 7) about the motion; a breath of ridge where a body is not seen."""
+    """Return the inverse information (T, 7, 7) about the motion; a breath of ridge where a body is not seen.
+
+    Rows that nobody saw say nothing: any motion will do, and the identity stands for what is known of it.
+    """
     A = np.einsum("tnai,tna,tnaj->tij", along, W, along, optimize=True)
-    size = A[:, range(7), range(7)].max(1)[:, None] + 1e-300
-    return np.asarray(np.linalg.inv(A + 1e-10 * size[..., None] * np.eye(7)))
+    size = A[:, range(7), range(7)].max(1)
+    ridge = np.where(size > 0, 1e-10 * size, 1.0)
+    return np.asarray(np.linalg.inv(A + ridge[:, None, None] * np.eye(7)))
 
 
 def followed(data: TeamMotion, team: Hinged, noise: Array, sweeps: int) -> Hinged:
@@ -198,6 +204,11 @@ class _Normal:
         scores -= np.einsum("tip,ti->tp", pulled, inside)
         return cls(H, scores, inside, carried, inner, left, along)
 
+    def path(self, data: TeamMotion) -> Array:
+        """Return the mean covariance (7, 7) of a row of the motion: one that all robots saw, where there is any."""
+        whole = data.valid.all(1)
+        return np.asarray(self.inner[whole if whole.any() else data.valid.any(1)].mean(0))
+
     def noise(self, data: TeamMotion, noise: Array) -> Array:
         """Return the noise (2,) after one step of restricted maximum likelihood, which knows what the motion takes up.
 
@@ -227,9 +238,7 @@ def fit_hinged(
 ) -> HingedFit:
     """Return the optimum near `start`; delays are estimated where the motion's `speed` (T, 7) is given."""
     count, team = data.count, start
-    fixed = OWN * reference + np.arange(12)
-    timed = np.zeros(0, np.int64) if speed is not None else np.arange(count) * OWN + 12
-    unknown = np.setdiff1d(np.arange(OWN * count + 6), np.concatenate([fixed, timed]))
+    unknown = _unknown(count, reference, speed is not None)
     for _ in range(steps):
         now = _Normal.of(data, team, noise, speed)
         H, pull = now.H[np.ix_(unknown, unknown)], now.scores[:, unknown].sum(0)
@@ -242,14 +251,41 @@ def fit_hinged(
         noise = new
         if settled and float(step[unknown] @ pull) < CLOSE:
             break
-    kept = np.zeros((OWN * count + 6, len(unknown)))
-    kept[unknown] = np.eye(len(unknown))
-    team, shift = _centred(team, kept, now.carried[..., unknown])
-    spread = kept + shift
+    team, spread = _centred(team, unknown, now.carried[:, 6].mean(0))
     inflated = _inflation(now.scores[:, unknown], H) * inverse
-    path = now.inner[data.valid.all(1)].mean(0) if data.valid.all(1).any() else now.inner.mean(0)
     lost = null - FREE - int(speed is not None)
-    return HingedFit(team, spread @ inflated @ spread.T, now.left, noise, path, max(lost, 0))
+    return HingedFit(team, spread @ inflated @ spread.T, now.left, noise, now.path(data), max(lost, 0))
+
+
+def finished(data: TeamMotion, fit: HingedFit, reference: int, speed: Array | None) -> HingedFit:
+    """Return a fit of some rows, whose team has the motion (T,) of all, after one step with all rows, CHUNK at a time.
+
+    One step is enough so near the optimum; the residuals are those after it.
+    """
+    count, rows = data.count, len(data.valid)
+    unknown = _unknown(count, reference, speed is not None)
+    H, scores, answer = np.zeros((OWN * count + 6,) * 2), [], np.zeros(OWN * count + 6)
+    for start in range(0, rows, CHUNK):
+        some = slice(start, start + CHUNK)
+        now = _Normal.of(data.rows(some), fit.team.rows(some), fit.noise, None if speed is None else speed[some])
+        H += now.H
+        scores.append(now.scores[:, unknown])
+        answer += now.carried[:, 6].sum(0) / rows
+    every, H = np.concatenate(scores), H[np.ix_(unknown, unknown)]
+    inverse, null = _inverse(H)
+    step = np.zeros(OWN * count + 6)
+    step[unknown] = inverse @ every.sum(0)
+    team = followed(data, fit.team.moved(step, np.zeros((rows, 7))), fit.noise, 1)
+    team, spread = _centred(team, unknown, answer)
+    inflated = _inflation(every, H) * inverse
+    lost = max(null - FREE - int(speed is not None), 0)
+    return HingedFit(team, spread @ inflated @ spread.T, residuals(data, team), fit.noise, fit.path, lost)
+
+
+def _unknown(count: int, reference: int, timed: bool) -> Integers:
+    """Return which of the 13 N + 6 parameters are unknown: the reference's grasp and home, and clocks, may be known."""
+    known = np.concatenate([OWN * reference + np.arange(12), np.arange(0 if timed else count) * OWN + 12])
+    return np.setdiff1d(np.arange(OWN * count + 6), known)
 
 
 def _inverse(H: Array) -> tuple[Array, int]:
@@ -268,18 +304,19 @@ def _inflation(scores: Array, H: Array) -> float:
     return max(1.0, float((((batches - batches.mean(0)) ** 2).sum(0) * scale).mean()))
 
 
-def _centred(team: Hinged, kept: Array, carried: Array) -> tuple[Hinged, Array]:
-    """Return the team with angles that are zero on average, and how that moves the second body's grasps per parameter.
+def _centred(team: Hinged, unknown: Integers, carried: Array) -> tuple[Hinged, Array]:
+    """Return the team with angles that are zero on average, and how the parameters (13 N + 6, P) go with the unknown.
 
-    kept  (13 N + 6, P) which parameters were unknown     carried  (T, 7, P) minus the motion's answer to them
+    carried  (13 N + 6,) minus the mean angle's answer to the parameters: it moves the second body's grasps
     """
-    middle, shift = float(team.angle.mean()), np.zeros_like(kept)
+    spread = np.zeros((len(carried), len(unknown)))
+    spread[unknown] = np.eye(len(unknown))
+    middle = float(team.angle.mean())
     turn = Rotation.exp(middle * team.axis)
     back = Pose(turn, team.point - turn.apply(team.point))
     grasps = np.array(team.grasps.matrix())
     grasps[team.second] = back.matrix() @ grasps[team.second]
     team = replace(team, grasps=Pose.from_matrix(grasps), angle=team.angle - middle)
-    answer = -carried[:, 6].mean(0)
     for i in np.flatnonzero(team.second):
-        shift[OWN * i : OWN * i + 6] = np.outer(adjoint_inverse(team.grasps[i]) @ team.screw, answer)
-    return team, shift
+        spread[OWN * i : OWN * i + 6] -= np.outer(adjoint_inverse(team.grasps[i]) @ team.screw, carried[unknown])
+    return team, spread

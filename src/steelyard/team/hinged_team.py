@@ -23,7 +23,7 @@ from steelyard.team.estimate import GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.hinge import Split
 from steelyard.team.hinged_bodies import FROM_TEN, both_bodies, second_body, seen_from, seven_rows
 from steelyard.team.hinged_payload import HingedPayload, Kind, fit_hinged_payload
-from steelyard.team.hinged_poses import GUESS, Hinged, HingedFit, fit_hinged, followed, rates, residuals
+from steelyard.team.hinged_poses import GUESS, Hinged, HingedFit, finished, fit_hinged, followed, rates
 from steelyard.team.hinged_rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame
 from steelyard.team.hinged_start import first_hinged
 from steelyard.team.motion_noise import shares_of
@@ -56,11 +56,7 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
     fit = fit_hinged(data.rows(few), team.rows(few), reference, GUESS, None)
     for _ in range(CLOCK_ROUNDS if clocks else 1):
         team = followed(data, replace(fit.team, motion=team.motion, angle=team.angle), fit.noise, FOLLOWED)
-        speed = None
-        if clocks:
-            ends = np.cumsum([0, *(len(part) for part in parts)])
-            each = zip(parts, ends[:-1], ends[1:], strict=True)
-            speed = np.concatenate([rates(team.rows(slice(a, b)), part.rate) for part, a, b in each])[some]
+        speed = _speeds(parts, team)[some] if clocks else None
         fit = fit_hinged(data.rows(some), team.rows(some), reference, fit.noise, speed)
         step = fit.team.delays
         late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
@@ -72,7 +68,16 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
     if fit.lost:
         raise CannotAnswer("the motion does not show where the hinge is and where the robots hold.")
     team = followed(data, replace(fit.team, motion=team.motion, angle=team.angle), fit.noise, FOLLOWED)
-    return parts, replace(fit, team=team, residual=residuals(data, team)), late
+    last = finished(data, replace(fit, team=team), reference, _speeds(parts, team) if clocks else None)
+    step = last.team.delays - fit.team.delays
+    return parts, last, {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
+
+
+def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
+    """Return how motion and angle change (T, 7), recording by recording."""
+    ends = np.cumsum([0, *(len(part) for part in parts)])
+    each = zip(parts, ends[:-1], ends[1:], strict=True)
+    return np.concatenate([rates(team.rows(slice(a, b)), part.rate) for part, a, b in each])
 
 
 def _places(before: tuple[Stretch, ...], after: tuple[Stretch, ...]) -> Integers:

@@ -6,13 +6,14 @@ per recording
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
@@ -21,6 +22,7 @@ from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge import Split, find_split, rigidity_findings
 from steelyard.team.hinged_bodies import hinge_findings
+from steelyard.team.hinged_rows import COUNT
 from steelyard.team.hinged_team import identify_two_bodies
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
@@ -63,7 +65,7 @@ class JointTeam:
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
             late, order = _against(standing.late, log.reference), 2
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
-            jointed = None if split is None else self._jointed(log, split)
+            jointed = None if split is None else self._jointed(log, split, standing.findings)
             if jointed is not None:
                 return jointed
             found = [*standing.findings, *rigidity_findings(split, log.names)]
@@ -86,18 +88,24 @@ class JointTeam:
         ]
         return replace(team, findings=tuple(found))
 
-    def _jointed(self, log: TeamLog, split: Split) -> TeamEstimate | None:
-        """Return the estimate of two bodies with a hinge, None where there is no hinge or too little is shown of it."""
+    def _jointed(self, log: TeamLog, split: Split, standing: Sequence[Finding]) -> TeamEstimate | None:
+        """Return the estimate of two bodies with a hinge, None where there is no hinge or too little is shown of it.
+
+        Numbers that degenerate on the way count as too little. Of the rigid fit's findings (`standing`), only who let
+        go or took hold is said again: that shows in the wrenches. The hinge itself may pass for a slip.
+        """
         if split.hinge is None:
             return None
         try:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
-        except CannotAnswer:
+        except (CannotAnswer, BadValue, np.linalg.LinAlgError):
             return None
         found = [
             *hinge_findings(team),
+            *(finding for finding in standing if finding.code in ("robot-left", "robot-joined")),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *gains(payload.gain),
+            *open_parameters(team.identified, team.evidence.rank, COUNT),
         ]
         return replace(team, findings=tuple(found))
 

@@ -109,13 +109,13 @@ def gains(gain: float) -> Iterator[Finding]:
         )
 
 
-def open_parameters(identified: Mask, rank: int) -> Iterator[Finding]:
-    """Yield inertia-not-identified where some of the inertia is left open."""
+def open_parameters(identified: Mask, rank: int, count: int = 10) -> Iterator[Finding]:
+    """Yield inertia-not-identified where some of the inertia is left open; `count` parameters are asked for."""
     if not identified[4:].all():
         yield Finding.of(
             "inertia-not-identified",
-            f"The rows fix {rank} of the ten parameters; the inertia is not given. Turn the payload about all three "
-            "axes, faster and slower.",
+            f"The rows fix {rank} of the {'ten' if count == 10 else count} parameters; the inertia is not given. Turn "
+            "the payload about all three axes, faster and slower.",
         )
 
 
