@@ -67,12 +67,14 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         folder = keep or Path(scratch)
         log = write_recording(seen.recording, folder)
         write_cloud(shape.solid.cloud, folder / "hammer.ply")
-        api.save_parts(shape, folder / "parts.npz")
         recording = read_recording(log)
         rows = align(recording).log
         answers = _answers(log, shape, rows, seen.X_SW)
         best = next(iter(answers.values()))
         write_result(best, folder / "result.json")
+        names = [name for name, _ in _names(best, shape, seen).values()]
+        chosen = shape.segmentation.cut(len(best.parts)).named(names)
+        api.save_parts(replace(shape, segmentation=chosen), folder / "parts.npz")
     write_report(_page(answers, shape, rows, seen, seed), output)
     if as_json:
         keys = ("without_scan", "ols", "geo")

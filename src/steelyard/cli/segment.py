@@ -71,7 +71,7 @@ def _table(shape: Shape, scan: Path, output: Path | None) -> str:
     made, parts, volume = shape.segmentation, shape.parts, shape.solid.mesh.volume
     count = f"{len(made)} part{'s' * (len(made) != 1)}"
     lines = [
-        f"{scan}: {1e6 * volume:.4g} +- {1e6 * shape.solid.volume_std * volume:.2g} cm^3 in {count}",
+        f"{scan}: {1e6 * volume:.4g} ± {1e6 * shape.solid.volume_std * volume:.2g} cm^3 in {count}",
         "",
         "  part   volume cm^3   share   centroid mm                 colour",
     ]

@@ -115,6 +115,7 @@ def _evidence_lines(estimate: Estimate) -> list[str]:
     torque, force = np.split(estimate.wrench_bias, 2)
     explained = (
         "; leave-one-out: how much the answer moves when poses are left out"
+        + (", the shape staying as it is" if estimate.parts else "")
         if seen.jackknife_people is not None
         else ""
     )

@@ -137,16 +137,18 @@ class PartMasses:
             found = uneven(seen, self.parts)
             if found is not None:
                 others = (f for f in findings if f.code != "part-not-homogeneous")
-                said = Finding.of(
-                    "part-not-homogeneous", " ".join(filter(None, (misplaced(seen, self.parts), found.message)))
-                )
-                return self._with_freed(problem, data, found).with_findings(*others, said)
-        if self._doubtful and self._off(data, self.parts.whole(masses.mean)):
+                text = " ".join(filter(None, (misplaced(seen, self.parts), found.message)))
+                uneven_part = Finding.of("part-not-homogeneous", text)
+                return self._with_freed(problem, data, found).with_findings(*others, uneven_part)
+        contradicted = any(f.code == "part-not-homogeneous" for f in findings)
+        if self._doubtful and not contradicted and self._off(data, self.parts.whole(masses.mean)):
             words = misplaced(seen, self.parts, 3 * DRAWN)
             findings += [Finding.of("part-not-homogeneous", words)] if words else []
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
-        return self._loosened(problem, data).with_findings(*findings)
+        # Masses of parts that cannot be right say nothing of which is zero.
+        said = [f for f in findings if f.code != "part-zero-mass"]
+        return self._loosened(problem, data).with_findings(*said)
 
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
@@ -167,17 +169,16 @@ class PartMasses:
                 break
         gain = error @ seen.information
         rest = np.eye(10) - gain
-        estimate = self._estimate(problem, data, masses)
         B = self.parts.per_mass
-        covariance = rest @ B @ masses.covariance @ B.T @ rest.T + error - gain @ error
+        spread = B @ masses.covariance @ B.T
         moved = body.vector + error @ seen.pull - gain @ body.vector
+        if self._doubtful:
+            masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
+        covariance = rest @ spread @ rest.T + error - gain @ error
+        follows = _follows(data, error, spread, error)
+        made = self._built(problem, data, masses, _nearest_body(body.vector, moved), covariance, follows)
         note = f"the shape was trusted {2**doubling} times less than given, so that the wrench fits"
-        return replace(
-            estimate,
-            parameters=_nearest_body(body.vector, moved),
-            covariance=0.5 * (covariance + covariance.T),
-            notes=(*estimate.notes, note),
-        )
+        return replace(made, notes=(*made.notes, note))
 
     def _sane(self, body: InertialParameters) -> InertialParameters:
         """Return the body if it is one, else one density of the same mass: the size of a shape error needs a body."""
@@ -255,10 +256,7 @@ class PartMasses:
         step = centre @ (seen.pull - seen.information @ body.vector)
         com = body.com + step[1:4] / float(body.mass)
         found = InertialParameters.from_com(float(body.mass), com, body.inertia_com)
-        blur = np.linalg.inv(np.eye(10) + data.information @ error)  # (F^-1 + G)^-1 F^-1
-        masses = spread @ blur
-        follows = masses + centre @ (blur - seen.information @ masses)
-        return found, error - centre @ seen.information @ centre, follows
+        return found, error - centre @ seen.information @ centre, _follows(data, error, spread, centre)
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
@@ -298,6 +296,17 @@ class PartMasses:
             return parts.whole(self._masses(data, body, parts).mean).vector
 
         return np.stack([(found(X) - found(X.inverse())) / 2 for X in steps])
+
+
+def _follows(data: Effective, error: Array, spread: Array, moving: Array) -> Array:
+    """Return how phi follows F phi_hat (10, 10) where masses are found by the log blurred by the error of the shape.
+
+    spread  (10, 10) covariance of phi that the masses leave
+    moving  (10, 10) the part of `error` that moves with the log
+    """
+    blur = np.linalg.inv(np.eye(10) + data.information @ error)  # (F^-1 + G)^-1 F^-1
+    masses = spread @ blur
+    return np.asarray(masses + moving @ (blur - data.blurred(error).information @ masses))
 
 
 def _start(problem: Problem) -> Array:
