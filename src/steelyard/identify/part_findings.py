@@ -67,8 +67,8 @@ def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:
         return []
     names = " and ".join(map(str, parts.label[zero]))
     text = (
-        f"Part {names} {'weighs' if zero.sum() == 1 else 'weigh'} {1e3 * mass[zero].sum():.2g} g: less than a hundredth "
-        f"of what {100 * share[zero].sum():.2g} % of the volume would at the mean density."
+        f"Part {names} {'weighs' if zero.sum() == 1 else 'weigh'} {1e3 * mass[zero].sum():.2g} g: less than a "
+        f"hundredth of what {100 * share[zero].sum():.2g} % of the volume would at the mean density."
     )
     return [Finding.of("part-zero-mass", text)]
 
