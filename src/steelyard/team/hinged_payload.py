@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.team.hinged_rows import BIAS, COUNT, Bands, Sums, noisy
 from steelyard.team.payload_fit import BIAS as BIAS_LADDER
-from steelyard.team.payload_fit import GAIN, NO_GAIN_ERROR, Models, shown_of
+from steelyard.team.payload_fit import GAIN, Models, ladder_shares, shown_of
 from steelyard.team.payload_model import ROUNDING, Normal
 
 ROUNDS = 12
@@ -99,9 +99,7 @@ def fit_hinged_payload(
         weights = tuple(_weights(kind, V, phi, started=number > 0) for kind in kinds)
         normals = [_normal(p, k, W, sums, number > 0) for k, W in zip(kinds, weights, strict=True) for p in k.parts]
         models = Models.of(normals, C, ladder, scale)
-        chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(NO_GAIN_ERROR), 0.0)
-        weight = np.exp(chance - chance.max())
-        weight /= weight.sum()
+        weight = ladder_shares(models, ladder)
         phi, best = weight @ models.phi, int(np.argmax(weight))
         if number == 0:
             scale = _units(max(abs(float(phi[0])), 1e-3), size)

@@ -75,9 +75,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             for part in group.parts
         ]
         models = Models.of(normals, C, ladder, scale)
-        chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(NO_GAIN_ERROR), 0.0)
-        weight = np.exp(chance - chance.max())
-        weight /= weight.sum()
+        weight = ladder_shares(models, ladder)
         phi, best = weight @ models.phi, int(np.argmax(weight))
         renewed = tuple(_judged(g, D, models, best, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
         change = max(
@@ -105,6 +103,13 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
         phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, float(bias), float(gain),
         groups, weights, blind, _residual(groups), float(models.chi2[best]) / max(6 * rows - 10, 1.0),
     )  # fmt: skip
+
+
+def ladder_shares(models: Models, ladder: Array) -> Array:
+    """Return the share (L,) of every spread of bias and gain (L, 2) by evidence; none in the gain is the likeliest."""
+    chance = models.evidence + np.where(ladder[:, 1] == 0, np.log(NO_GAIN_ERROR), 0.0)
+    weight = np.exp(chance - chance.max())
+    return np.asarray(weight / weight.sum())
 
 
 def _units(phi: Array, size: float) -> Array:
