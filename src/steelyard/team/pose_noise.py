@@ -12,7 +12,7 @@ ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
 LEAST = np.array([1e-7, 1e-7])
 # Scoring ends where noise changes by less than this share: the step after would change it by about its square.
-SETTLED = 1e-4
+SETTLED = 1e-6
 # That robots of a team err alike counts as much as so many rows.
 ALIKE = 1.0
 
