@@ -47,6 +47,8 @@ class Close:
     renewed: float
 
 
+# NEARLY is for clocks: rows are read anew between noisy stamps, so that clocks which depend on the reference by more
+# than 1e-4 standard deviations would make the answer do so too.
 EXACT, NEARLY, ROUGHLY = Close(1e-13, 1e-7, 0.02), Close(1e-8, 1e-5, 0.05), Close(1e-2, 1e-2, 0.2)
 
 
@@ -213,7 +215,8 @@ def fit_poses(
     timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
     team, path = start, None
     noise = np.full((count, 2), GUESS) if noise is None else noise
-    for step_number in range(STEPS):
+    step_number = 0
+    while True:
         here = Rows.settled(data, team, noise, 1, path)
         # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
         new = here.noise(noise) if step_number >= near else noise
@@ -223,11 +226,11 @@ def fit_poses(
             known = Known.of(data, team.grasps, noise, unknown)
         pull = here.pull(noise)[unknown] - known.common * timed * team.delays.sum()
         step = known.solver.step(pull)
-        if quiet and float(step @ pull) < close.chi2:
-            break
+        step_number += 1
+        if step_number == STEPS or (quiet and float(step @ pull) < close.chi2):
+            return PoseFit(reference, here, known, noise, unknown)
         full = np.zeros(OWN * count)
         full[unknown] = step
         each, path = full.reshape(-1, OWN), (here.turns, here.places)
         moved = exp(each[:, :12].reshape(-1, 2, 6))
         team = Team(team.grasps @ moved[:, 0], team.homes @ moved[:, 1], team.motion, team.delays + each[:, 12])
-    return PoseFit(reference, here, known, noise, unknown)
