@@ -18,7 +18,7 @@ from steelyard.bench.team_coverage import errors
 from steelyard.check import Array
 from steelyard.identify.people import people_jacobian
 from steelyard.identify.regressor import basis, motion_map
-from steelyard.inertia import InertialParameters
+from steelyard.inertia.parameters import frame_change
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse
@@ -73,7 +73,7 @@ def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:
             V = shaken + noise.force_white_N**2 * forces @ forces.T
             slope = np.einsum("pix,tx->tip", basis(), x[kept])
             F += np.einsum("tip,tij,tjq->pq", slope, np.linalg.inv(V), slope, optimize=True)
-    change = np.stack([InertialParameters(row).in_frame(frame).vector for row in np.eye(10)], axis=1)
+    change = frame_change(frame)
     jacobian = people_jacobian(exact.truth.body.vector) @ change
     return np.sqrt(np.diag(jacobian @ np.linalg.inv(F) @ jacobian.T))
 

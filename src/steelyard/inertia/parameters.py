@@ -162,3 +162,8 @@ def _symmetric(name: str, matrix: ArrayLike, size: int = 3) -> Array:
     if asymmetry > 1e-9 * np.abs(array).max(initial=0.0):
         raise BadValue(f"{name} must be symmetric; it differs from its transpose by {asymmetry:.3g}.")
     return array
+
+
+def frame_change(X_AB: Pose) -> Array:
+    """Return the map (10, 10) from the ten parameters of a body seen from B to those seen from A."""
+    return np.asarray(InertialParameters(np.eye(10)).in_frame(X_AB).vector.T)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any
 
 import numpy as np
@@ -66,13 +67,20 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
     Source: "Cooperative Payload Estimation", IV-B (fourth-order Butterworth; run forwards and backwards
     here).
     """
-    from scipy.signal import butter, sosfiltfilt
+    from scipy.signal import sosfiltfilt
 
     if not 0 < cutoff_hz < rate_hz / 2:
         raise BadValue(f"cut-off must be between 0 and half the rate ({rate_hz / 2:.6g} Hz); got {cutoff_hz:.6g} Hz.")
-    sections = butter(order, cutoff_hz, fs=rate_hz, output="sos")
     pad = min(len(values) - 1, int(3 * rate_hz / cutoff_hz))
-    return np.asarray(sosfiltfilt(sections, values, axis=0, padlen=pad))
+    return np.asarray(sosfiltfilt(_butterworth(order, cutoff_hz / rate_hz), values, axis=0, padlen=pad))
+
+
+@lru_cache(maxsize=64)
+def _butterworth(order: int, cutoff: float) -> Array:
+    """Return the second-order sections of a low-pass at a cut-off given as a share of the rate."""
+    from scipy.signal import butter
+
+    return np.asarray(butter(order, 2 * cutoff, output="sos"))
 
 
 def central_difference(time: Array, values: Array) -> Array:

@@ -109,7 +109,7 @@ class Track:
     def pose(self) -> Pose:
         """Poses X_HG (T,); identity in rows where `mask("rotation", "position")` is False."""
         # They were judged when the track was made.
-        return Pose(Rotation._trusted(self.channels["rotation"]), self.channels["position"])
+        return Pose._trusted(Rotation._trusted(self.channels["rotation"]), self.channels["position"])
 
     def wrench(self) -> Array:
         """Return wrenches (T, 6) [N m, N], moment zero for a passive gimbal; zero where `mask("force")` is False."""

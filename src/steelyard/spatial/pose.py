@@ -35,6 +35,15 @@ class Pose:
         object.__setattr__(self, "position", position)
 
     @classmethod
+    def _trusted(cls, rotation: Rotation, position: Array) -> Pose:
+        """Wrap what poses make of each other, finite and of one batch shape by construction."""
+        pose = object.__new__(cls)
+        position.flags.writeable = False
+        object.__setattr__(pose, "rotation", rotation)
+        object.__setattr__(pose, "position", position)
+        return pose
+
+    @classmethod
     def identity(cls, *batch: int) -> Pose:
         """Return the identity, repeated over the batch shape."""
         return cls(Rotation.identity(*batch), np.zeros((*batch, 3)))
@@ -59,7 +68,7 @@ class Pose:
     def inverse(self) -> Pose:
         """Return X_BA."""
         back = self.rotation.inverse()
-        return Pose(back, -back.apply(self.position))
+        return Pose._trusted(back, -back._turned(self.position))
 
     def apply(self, point: ArrayLike) -> Array:
         """Return points (..., 3) given in B expressed in A [m]; the batch shapes broadcast."""
@@ -73,7 +82,7 @@ class Pose:
     def __matmul__(self, other: Twist) -> Twist: ...
     def __matmul__(self, other: Pose | Wrench | Twist) -> Pose | Wrench | Twist:
         if isinstance(other, Pose):
-            return Pose(self.rotation @ other.rotation, self.apply(other.position))
+            return Pose._trusted(self.rotation @ other.rotation, self.rotation._turned(other.position) + self.position)
         if isinstance(other, Wrench):
             return self._move_wrench(other)
         if isinstance(other, Twist):

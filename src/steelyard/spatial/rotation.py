@@ -132,7 +132,11 @@ class Rotation:
 
     def apply(self, vector: ArrayLike) -> Array:
         """Return vectors (..., 3) given in B expressed in A; the batch shapes broadcast."""
-        return np.asarray(np.einsum("...ij,...j->...i", self.matrix, check.vectors("vector", vector)))
+        return self._turned(check.vectors("vector", vector))
+
+    def _turned(self, vector: Array) -> Array:
+        """Return vectors (..., 3) that are known to be finite, expressed in A."""
+        return np.asarray(np.einsum("...ij,...j->...i", self.matrix, vector))
 
     def angle(self) -> Array:
         """Return the rotation angle (...) [rad], 0 to pi."""

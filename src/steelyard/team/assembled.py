@@ -10,6 +10,7 @@ from steelyard.check import Array
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import com_jacobian
+from steelyard.inertia.parameters import frame_change
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
@@ -38,7 +39,7 @@ def assembled(
     moved = moved_by_grasps(payload, balance.inverse() @ grasps)
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
     body = InertialParameters(consistent(payload.parameters, payload.covariance, payload.scale)).in_frame(balance)
-    change = np.stack([InertialParameters(row).in_frame(balance).vector for row in np.eye(10)], axis=1)
+    change = frame_change(balance)
     estimates = {name: GraspEstimate(grasps[i], spread.of(i), spread.lost(i)) for i, name in enumerate(log.names)}
     shown = not payload.lost.shape[1] and not spread.blind.size
     samples = {g.parts[0].still: sum(p.samples for p in g.parts) for g in payload.groups}

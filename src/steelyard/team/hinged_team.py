@@ -12,6 +12,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Evidence
 from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters
+from steelyard.inertia.parameters import frame_change
 from steelyard.logs.log import Integers, Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, cross_matrix
@@ -106,7 +107,7 @@ def identify_two_bodies(
     units, whole = payload.scale[:WHOLE], slice(0, WHOLE)
     vector = consistent(seventeen[whole], payload.covariance[whole, whole], units)
     body = InertialParameters(vector).in_frame(frame)
-    change = np.stack([InertialParameters(row).in_frame(frame).vector for row in np.eye(10)], axis=1)
+    change = frame_change(frame)
     outer = change @ doubt.covariance(np.eye(COUNT)[whole], payload.covariance) @ change.T
     grasps = {name: GraspEstimate(team.grasps[i], _grasp_covariance(fit, i)) for i, name in enumerate(log.names)}
     moment, push = payload.residual

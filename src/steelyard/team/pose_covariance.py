@@ -71,7 +71,7 @@ def grasp_covariance(fit: PoseFit) -> Spread:
     """Return the covariance of grasps and delays."""
     count, unknown = len(fit.team.delays), fit.unknown
     central = _central(fit)
-    H = _turned(_turned(fit.information, central).T, central)
+    H = _turned(_turned(fit.known.information, central).T, central)
     factor = np.sqrt(_inflation(fit, np.diag(H), central))[KIND[unknown % OWN]]
     V = H[np.ix_(unknown, unknown)] * np.outer(factor, factor)
     # Grasps and delays are the same whatever homes turn about.

@@ -47,7 +47,9 @@ class Close:
     renewed: float
 
 
-EXACT, ROUGHLY = Close(1e-13, 1e-7, 0.02), Close(1e-2, 1e-2, 0.2)
+# NEARLY is for clocks: rows are read anew between noisy stamps, so that clocks which depend on the reference by more
+# than 1e-4 standard deviations would make the answer do so too.
+EXACT, NEARLY, ROUGHLY = Close(1e-13, 1e-7, 0.02), Close(1e-8, 1e-5, 0.05), Close(1e-2, 1e-2, 0.2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -138,25 +140,45 @@ def _gauged(information: Array, common: float, unknown: Integers) -> Array:
 
 
 @dataclass(frozen=True, eq=False)
+class Known:
+    """Information (13 N, 13 N) at some noise (N, 2), what holds the sum of delays at zero [s^-2], and their solver."""
+
+    noise: Array
+    information: Array
+    common: float
+    solver: Solver
+
+    @classmethod
+    def of(cls, data: TeamMotion, grasps: Pose, noise: Array, unknown: Integers) -> Known:
+        """Return what the rows say of the unknown parameters near these grasps."""
+        H = information(data, grasps, noise)
+        common = float(np.diag(H)[OWN - 1 :: OWN].mean())
+        return cls(noise, H, common, Solver.of(_gauged(H, common, unknown), unknown, noise, len(data.valid)))
+
+    def holds(self, noise: Array, close: Close) -> bool:
+        """Return whether the noise is still so near that steps from here lead to the optimum."""
+        return bool(np.abs(np.log(noise / self.noise)).max() <= close.renewed)
+
+
+@dataclass(frozen=True, eq=False)
 class PoseFit:
-    """The optimum: its rows, information (13 N, 13 N), noise (N, 2) [rad, m], which parameters were unknown."""
+    """The optimum: its rows, what they say, noise (N, 2) [rad, m], which parameters were unknown."""
 
     reference: int
     rows: Rows
-    information: Array
+    known: Known
     noise: Array
     unknown: Integers
-    solver: Solver
 
     @cached_property
     def solved(self) -> Shown:
         """Covariance of the unknown parameters for white noise, and what is lost."""
-        return self.solver.all_shown()
+        return self.known.solver.all_shown()
 
     @property
     def doubt(self) -> Array:
         """Standard deviations (N,) of the delays for white noise [s]; empty where they were not estimated."""
-        return np.sqrt(self.solver.variance(self.unknown % OWN == OWN - 1))
+        return np.sqrt(self.known.solver.variance(self.unknown % OWN == OWN - 1))
 
     @property
     def team(self) -> Team:
@@ -174,41 +196,41 @@ class PoseFit:
         return np.repeat(self.noise**-2.0, 3, axis=1)
 
 
-def _informed(data: TeamMotion, grasps: Pose, noise: Array, unknown: Integers) -> tuple[Array, float, Solver]:
-    """Return the information, what holds the sum of delays at zero, and the solver of both."""
-    H = information(data, grasps, noise)
-    common = float(np.diag(H)[OWN - 1 :: OWN].mean())
-    return H, common, Solver.of(_gauged(H, common, unknown), unknown, noise, len(data.valid))
-
-
 def fit_poses(
-    data: TeamMotion, start: Team, reference: int, noise: Array | None = None, close: Close = EXACT
+    data: TeamMotion,
+    start: Team,
+    reference: int,
+    noise: Array | None = None,
+    close: Close = EXACT,
+    known: Known | None = None,
 ) -> PoseFit:
     """Return the optimum near `start`; the noise of every robot is estimated along the way.
 
-    Delays, which sum to zero, are estimated where the data have twists.
+    Delays, which sum to zero, are estimated where the data have twists. `known` is the information of a fit to nearly
+    the same rows, if there is one: it decides the way to the optimum, not where that is.
     """
     count = data.count
     own = np.arange(OWN if data.twist is not None else OWN - 1)
     unknown = np.concatenate([OWN * i + (own if i != reference else own[OWN - 1 :]) for i in range(count)])
     timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
     team, path = start, None
-    noise = known = np.full((count, 2), GUESS) if noise is None else noise
-    for step_number in range(STEPS):
+    noise = np.full((count, 2), GUESS) if noise is None else noise
+    step_number = 0
+    while True:
         here = Rows.settled(data, team, noise, 1, path)
         # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
         new = here.noise(noise) if step_number >= near else noise
         quiet = step_number >= near and bool(np.abs(np.log(new / noise)).max() < close.noise)
         noise = new
-        if step_number <= near or np.abs(np.log(noise / known)).max() > close.renewed:
-            known, (H, common, solver) = noise, _informed(data, team.grasps, noise, unknown)
-        pull = here.pull(noise)[unknown] - common * timed * team.delays.sum()
-        step = solver.step(pull)
-        if quiet and float(step @ pull) < close.chi2:
-            break
+        if known is None or not known.holds(noise, close) or step_number == near > 0:
+            known = Known.of(data, team.grasps, noise, unknown)
+        pull = here.pull(noise)[unknown] - known.common * timed * team.delays.sum()
+        step = known.solver.step(pull)
+        step_number += 1
+        if step_number == STEPS or (quiet and float(step @ pull) < close.chi2):
+            return PoseFit(reference, here, known, noise, unknown)
         full = np.zeros(OWN * count)
         full[unknown] = step
         each, path = full.reshape(-1, OWN), (here.turns, here.places)
         moved = exp(each[:, :12].reshape(-1, 2, 6))
         team = Team(team.grasps @ moved[:, 0], team.homes @ moved[:, 1], team.motion, team.delays + each[:, 12])
-    return PoseFit(reference, here, H, noise, unknown, solver)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from functools import lru_cache
+
 import numba
 import numpy as np
 
@@ -44,7 +46,7 @@ def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Arr
         return noise
     stack = J.reshape(6 * count, 6)
     variance, least = noise.ravel() ** 2, np.tile(LEAST**2, count)
-    likeness = ALIKE * np.kron(np.eye(count) - 1 / count, np.eye(2))
+    likeness = _likeness(count)
     seen, size, squares = np.empty(2 * count), np.empty(2 * count), np.empty((2 * count, 2 * count))
     for _ in range(ROUNDS):
         pulled = stack * np.repeat(1 / variance, 3)[:, None]
@@ -59,6 +61,14 @@ def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Arr
         if moved < SETTLED:
             break
     return np.asarray(np.sqrt(variance).reshape(count, 2))
+
+
+@lru_cache(maxsize=8)
+def _likeness(count: int) -> Array:
+    """Return the information (2 N, 2 N) that robots err alike, about logarithms of their variances."""
+    out = np.asarray(ALIKE * np.kron(np.eye(count) - 1 / count, np.eye(2)))
+    out.flags.writeable = False
+    return out
 
 
 @numba.njit(cache=True, error_model="numpy")

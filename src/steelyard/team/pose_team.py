@@ -16,7 +16,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
-from steelyard.team.pose_fit import ROUGHLY, PoseFit, Rows, fit_poses
+from steelyard.team.pose_fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_start import ENOUGH, first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
@@ -29,6 +29,8 @@ PUNCTUAL = 2e-4
 # A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
 DOUBTED = 4.0
 CLOCK_ROUNDS = 6
+# Clocks that move by less [s] leave what the rows say as it is: nobody turns a payload far in that time.
+ALIKE = 0.02
 # Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
 # that so many poses of all robots together are enough.
 FEW_ROWS, FEW_POSES = 1500, 4500
@@ -93,17 +95,20 @@ class PoseTeam:
         fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
         if not clocks:
             return cls(parts, fit_poses(data, _followed(data, fit), reference, fit.noise), late)
-        for _ in range(CLOCK_ROUNDS):
+        known = None
+        for left in reversed(range(CLOCK_ROUNDS)):
             team = _followed(data, fit)
             timed = replace(data, twist=_twists(parts, team))
-            fit = fit_poses(timed, replace(team, delays=np.zeros(len(log.names))), reference, fit.noise)
-            step = fit.team.delays
-            late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
-            if (np.abs(step) < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
+            fit = fit_poses(timed, replace(team, delays=np.zeros(data.count)), reference, fit.noise, NEARLY, known)
+            step = np.abs(fit.team.delays)
+            if not left or (step < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
                 break
+            known = fit.known if step.max() < ALIKE else None
+            late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
-        return cls(parts, fit, late)
+        fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
+        return cls(parts, fit, _later(late, fit))
 
     def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
         """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were."""
@@ -186,6 +191,11 @@ class PoseTeam:
             body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
             out.append((body, residual[rows]))
         return out, noise
+
+
+def _later(late: Mapping[str, float], fit: PoseFit) -> dict[str, float]:
+    """Return how late each clock is [s] with what a fit found."""
+    return {name: before + float(more) for (name, before), more in zip(late.items(), fit.team.delays, strict=True)}
 
 
 def _followed(data: TeamMotion, fit: PoseFit) -> Team:
