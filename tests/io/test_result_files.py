@@ -110,7 +110,11 @@ GOOD = {
 @pytest.mark.parametrize(
     ("text", "reason"),
     [
-        ("{", "not valid JSON: Expecting property name enclosed in double quotes: line 1 column 2 (char 1)."),
+        (
+            "{",
+            "not a Steelyard result: not valid JSON (Expecting property name enclosed in double quotes: line 1 column 2 "
+            "(char 1)). Write one with: steelyard identify LOG -o FILE.",
+        ),
         ("[]", "not a Steelyard result: expected one JSON object. Write one with: steelyard identify LOG -o FILE."),
         ("{}", 'not a Steelyard result: "mass_kg" is missing. Write one with: steelyard identify LOG -o FILE.'),
         (json.dumps(GOOD | {"mass_kg": "1 kg"}), '"mass_kg" must be one finite number; found something else.'),

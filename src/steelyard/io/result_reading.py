@@ -98,9 +98,9 @@ def _load_json(path: Path) -> dict[str, Any]:
     except OSError as error:
         raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
     except UnicodeDecodeError:
-        raise BadFile(f"{path}: expected a JSON result; found a binary file.") from None
+        raise BadFile(f"{path}: not a Steelyard result: a binary file, where JSON was expected. {_WRITE_ONE}") from None
     except (json.JSONDecodeError, RecursionError) as error:
-        raise BadFile(f"{path}: not valid JSON: {error}.") from None
+        raise BadFile(f"{path}: not a Steelyard result: not valid JSON ({error}). {_WRITE_ONE}") from None
     if not isinstance(values, dict):
         raise BadFile(f"{path}: not a Steelyard result: expected one JSON object. {_WRITE_ONE}")
     return values
