@@ -23,7 +23,7 @@ Edge = tuple[int, int]
 class PlainClustering:
     """Clusters of a solid, their edges with bounds or values of their hulls, and the time spent in Qhull.
 
-    With `lazy` a hull is made when its bound, the largest of earlier hulls, is the least cost; else at once, as published.
+    With `lazy` a hull is made when its bound, the largest of earlier hulls, costs least; else at once, as published.
     """
 
     mesh: TetMesh
