@@ -84,8 +84,9 @@ def reach(
             faces += 1
     grown = 0.0
     for p in range(length, count):
+        px, py, pz = x[p], y[p], z[p]
         for f in range(faces):
-            height[f] = nx[f] * x[p] + ny[f] * y[p] + nz[f] * z[p] - of[f]
+            height[f] = nx[f] * px + ny[f] * py + nz[f] * pz - of[f]
         above, gain = _above(height, seen, faces, noise)
         if above > 0:
             grown += gain
