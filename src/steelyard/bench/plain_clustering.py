@@ -9,8 +9,9 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.parts.clustering import GRAIN, Hollow, Published
+from steelyard.parts.clustering import Hollow, Published
 from steelyard.parts.hierarchy import Hierarchy
+from steelyard.parts.merging import GRAIN
 from steelyard.shape.hull import qhull
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
@@ -22,7 +23,7 @@ Edge = tuple[int, int]
 class PlainClustering:
     """Clusters of a solid, their edges with bounds or values of their hulls, and the time spent in Qhull.
 
-    With `lazy` a hull is made when its lower bound is the least cost, as in `cluster`; else at once, as published.
+    With `lazy` a hull is made when its bound, the largest of earlier hulls, costs least; else at once, as published.
     """
 
     mesh: TetMesh

@@ -18,8 +18,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.parts.clustering import vertices_of_both
 from steelyard.parts.hierarchy import Hierarchy
+from steelyard.parts.hulls import vertices_of_both
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import hull_volume, hull_work
 from steelyard.shape.mesh import Integers

@@ -54,7 +54,8 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
     points     (N, 3)
     rows       numbers of points, the first `count` (at least one) are used; repeated and equal points do no harm
     tolerance  length; a point nearer to the hull of others is taken to be on it
-    work       room for `count` points; `work.point[:vertices, 2]` receives the rows of the vertices
+    work       room for `count` points; `work.point[:vertices, 2]` receives the rows of the vertices, and, if
+               the volume is not 0, `work.stack[: 2 * vertices - 4, :3]` the corners of the faces, numbers among those
 
     Points flatter than the tolerance have volume 0, and all of them are kept. Numbers that are not finite, or whose
     product is not, are a fault.
@@ -98,7 +99,7 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
                 face[:, QUEUED] = 0
                 return np.nan, -1
             waiting = share_out(xyz, point, plane, face, stack, loose, edges, waiting, used, noise)
-    return total(point, plane, face, rows, used)
+    return total(point, plane, face, stack, rows, used)
 
 
 def convex_hull(points: ArrayLike) -> tuple[float, Integers]:

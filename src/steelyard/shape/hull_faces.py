@@ -30,7 +30,7 @@ class HullWork(NamedTuple):
     face   (m, 10) its corners; the faces across the edge from each corner to the next; the first point above it, the
            farthest one; its state; whether it is queued
     stack  (m, 4) lists of faces: queued with points above them; slots without a face; seen from the point being added;
-           made by it
+           made by it; and, in the end, the corners of each face of the hull, numbers among the vertices
     rim    (3 m, 3) edges of its horizon: from, to, the face behind
     """
 
@@ -277,17 +277,19 @@ def cone(
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def total(point: Any, plane: Array, face: Any, rows: Any, used: int) -> tuple[float, int]:
+def total(point: Any, plane: Array, face: Any, stack: Any, rows: Any, used: int) -> tuple[float, int]:
     """Return the volume inside the faces and the number of vertices; -1 where the faces are no sphere."""
     volume, faces, vertices = 0.0, 0, 0
     for f in range(used):
         if face[f, _STATE] == _HULL:
-            faces += 1
             volume += plane[f, _OFFSET]
             for k in range(3):
                 p = face[f, k]
                 if point[p, _FAN] == -1:
                     point[p, _FAN] = -2
+                    point[p, _LINK] = vertices
                     point[vertices, KEPT] = rows[p]
                     vertices += 1
+                stack[faces, k] = point[p, _LINK]
+            faces += 1
     return volume / 6, (vertices if faces == 2 * vertices - 4 else -1)

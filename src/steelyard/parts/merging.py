@@ -1,0 +1,314 @@
+"""The merges of tetrahedra clustering, compiled.
+
+Hulls only grow, so an earlier hull is a lower bound of a later one. When an edge with such a bound reaches the top of
+the heap, its bound is raised by a hull that is grown point by point; should it come to the top again, its hull is made.
+Most edges vanish before the first, most others before the second. The order of merges is that of the eager algorithm,
+since no bound exceeds the hull, and every hull that a merge rests on is made by the hull kernel.
+"""
+
+from __future__ import annotations
+
+import heapq
+from typing import Any, NamedTuple
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
+from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place
+from steelyard.parts.reach import MOST, Room, reach, room
+from steelyard.shape.borrowed import borrowed, integer
+from steelyard.shape.hull import HullWork, hull_volume, hull_work
+
+# Hollow is counted in grains of this share of the whole volume. Unions that leave out the same tets are equally hollow,
+# and rounding is not to choose between them (the smaller one goes first), nor to make a convex union hollow.
+GRAIN = 2.0**-30
+# Stages of an edge.
+_HELD, _GROWN, _EXACT, _GONE = 0, 1, 2, 3
+
+
+class Clusters(NamedTuple):
+    """Clusters (N,): volume, that of the hull, number of tets, group (-1 for more than one), whether it is joined, and
+    the first of its edges' ends; `latest` (N, 2): the edge to it that was met last, and the merge that met it.
+    """
+
+    volume: Any
+    hull: Any
+    tets: Any
+    group: Any
+    gone: Any
+    head: Any
+    latest: Any
+
+
+class Edges(NamedTuple):
+    """Edges (E,).
+
+    end    (E, 4) the two clusters; of each end, the next of the same cluster, 2 e or 2 e + 1, or -1
+    known  the largest volume known to lie in the hull of the union
+    stage  how it is known: of hulls that the union holds, of one grown, that of the union itself; or the edge is gone
+    """
+
+    end: Any
+    known: Any
+    stage: Any
+
+
+@numba.njit(cache=True, nogil=True)
+def _five_points(xyz: Array, rows: Any) -> float:
+    """Return the volume of the hull of five points: the positive of the tets that leave one out fill it, and so do the
+    negative, half the sum of all.
+    """
+    total, last = 0.0, 0.0
+    ax, ay, az = xyz[rows[4], 0], xyz[rows[4], 1], xyz[rows[4], 2]
+    for k in range(4):
+        i, j, h = rows[0 if k != 0 else 3], rows[1 if k != 1 else 3], rows[2 if k != 2 else 3]
+        ux, uy, uz = xyz[i, 0] - ax, xyz[i, 1] - ay, xyz[i, 2] - az
+        vx, vy, vz = xyz[j, 0] - ax, xyz[j, 1] - ay, xyz[j, 2] - az
+        wx, wy, wz = xyz[h, 0] - ax, xyz[h, 1] - ay, xyz[h, 2] - az
+        d = ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx)
+        total += abs(d)
+        last += d if k == 3 else -d
+    return (total + abs(last)) / 12
+
+
+@numba.njit(cache=True, nogil=True)
+def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, whole: float, size: float) -> float:
+    """Return what orders merges, the cost or a number that rises with it; from a bound of the hull, a bound of it."""
+    grains = (hull - va - vb) / (GRAIN * whole)
+    hollow: float = GRAIN * max(0.0, np.rint(grains if exact else grains - 1e-3))
+    if size >= 0:
+        return float(hollow + size * (va + vb) / whole)
+    if hollow > 0:
+        return hollow
+    return -1.0 / (float(na) * na + float(nb) * nb)
+
+
+def merge_all(
+    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
+    tolerance: float, size: float,
+) -> tuple[Any, Array, Array, Array, int, int, int]:  # fmt: skip
+    """Return merges, cost, volume and hull of every node, faults, and the number of hulls and of their points."""
+    n = len(leaf_volume)
+    merges, cost, tally, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), np.zeros(3, np.int64), (0, n - 1)
+    volume, tets = np.pad(leaf_volume, more), np.pad(leaf_tets, more)
+    group, gone, head = np.pad(leaf_group, more), np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
+    latest = np.full((2 * n - 1, 2), -1, np.int32)
+    clusters = Clusters(volume, np.zeros(2 * n - 1), tets, group, gone, head, latest)
+    hulls, work = hulls_of(start, member, 2 * n - 1, len(xyz)), hull_work(len(xyz))
+    edges = Edges(np.empty((len(ends), 4), np.int32), np.empty(len(ends)), np.zeros(len(ends), np.int8))
+    _begin(xyz, n, tolerance, clusters, hulls, ends, edges, work, tally)
+    heap = empty_heap(len(ends))
+    made = _join_neighbours(xyz, n, tolerance, size, clusters, hulls, edges, heap, work, room(), merges, cost, tally)
+    if made < n - 1:
+        _join_bodies(xyz, n, made, tolerance, clusters, hulls, work, merges, cost, tally)
+    return merges, cost, volume, clusters.hull, int(tally[0]), int(tally[1]), int(tally[2])
+
+
+@numba.njit(cache=True, nogil=True)
+def _begin(
+    xyz: Array, n: int, tolerance: float, clusters: Clusters, hulls: Hulls, ends: Any, edges: Edges, work: HullWork,
+    tally: Any,
+) -> None:  # fmt: skip
+    """Find the hulls of the first clusters and hang their edges on them."""
+    volume, hull, head, end = clusters.volume, clusters.hull, clusters.head, edges.end
+    for k in range(n):
+        if hulls.length[k] == 4:
+            hull[k] = volume[k]
+            four_faces(xyz, hulls, k)
+        else:
+            hull[k], kept = _hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, tally)
+            if kept > 0:
+                keep_in_place(hulls, k, work.point, work.stack, kept, hull[k] > 0)
+    for e in range(len(ends)):
+        a, b = ends[e, 0], ends[e, 1]
+        edges.known[e] = max(hull[a], hull[b])
+        end[e, 0], end[e, 1], end[e, 2], end[e, 3] = a, b, head[a], head[b]
+        head[a], head[b] = 2 * e, 2 * e + 1
+
+
+@numba.njit(cache=True, nogil=True)
+def _hull(xyz: Array, rows: Any, count: int, tolerance: float, work: HullWork, tally: Any) -> tuple[float, int]:
+    """Return the volume of a hull and its number of vertices; 0 vertices is a fault, and counted."""
+    volume, kept = hull_volume(xyz, rows, count, tolerance, work)
+    tally[0] += kept < 0
+    tally[1] += 1
+    tally[2] += count
+    return volume, max(integer(0), kept)
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _priced(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, whole: float, size: float) -> int:
+    """Put an edge where its key belongs in the heap; return how many there are."""
+    a, b = edges.end[e, 0], edges.end[e, 1]
+    volume, tets = clusters.volume, clusters.tets
+    key = _key(edges.known[e], edges.stage[e] == _EXACT, volume[a], volume[b], tets[a], tets[b], whole, size)
+    return int(settle(heap.edge, heap.order, heap.place, heaped, e, key, volume[a] + volume[b]))
+
+
+@numba.njit(cache=True, nogil=True)
+def _join_neighbours(
+    xyz: Array, n: int, tolerance: float, size: float, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges,
+    full_heap: Heap, work: HullWork, space: Room, merges: Any, cost: Array, tally: Any,
+) -> int:  # fmt: skip
+    """Join clusters that touch, always the two of least cost; return how often."""
+    c, h, d, p = all_clusters, all_hulls, all_edges, full_heap
+    clusters = Clusters(
+        borrowed(c.volume), borrowed(c.hull), borrowed(c.tets), borrowed(c.group), borrowed(c.gone), borrowed(c.head),
+        borrowed(c.latest),
+    )  # fmt: skip
+    hulls = Hulls(
+        borrowed(h.vertex), borrowed(h.face), borrowed(h.offset), borrowed(h.length), borrowed(h.mark),
+        borrowed(h.rows), borrowed(h.state),
+    )  # fmt: skip
+    edges = Edges(borrowed(d.end), borrowed(d.known), borrowed(d.stage))
+    heap = Heap(borrowed(p.edge), borrowed(p.order), borrowed(p.place))
+    end, stage, group = edges.end, edges.stage, clusters.group
+    whole, in_all = clusters.volume[:n].sum(), float(clusters.tets[:n].sum())
+    across, made, heaped, stamp = False, integer(0), integer(0), integer(1)
+    last, kept = integer(-1), integer(0)  # the edge whose hull was made last, and its number of vertices
+    for e in range(len(end)):
+        if group[end[e, 0]] == group[end[e, 1]]:
+            heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+    while made < n - 1:
+        if heaped == 0:
+            if across:
+                break
+            across = True
+            for e in range(len(end)):
+                if stage[e] != _GONE:
+                    heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+            continue
+        e = integer(heap.edge[0])
+        if stage[e] == _HELD:
+            stamp = _grow(xyz, clusters, hulls, edges, e, space, stamp)
+            heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+        elif stage[e] == _GROWN:
+            count = both(hulls, end[e, 0], end[e, 1])
+            edges.known[e], kept = _hull(xyz, hulls.rows, count, tolerance, work, tally)
+            stage[e], last = _EXACT, e
+            heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+        else:
+            _note(clusters, edges, e, heap.order[0, 0], n, made, in_all, size, merges, cost)
+            if last != e:
+                kept = _hull_again(xyz, hulls, end[e, 0], end[e, 1], tolerance, work, tally)
+            last = integer(-1)
+            keep(hulls, n + made, clusters.gone, work.point, work.stack, kept, clusters.hull[n + made] > 0)
+            heaped = _hand_over(clusters, edges, heap, heaped, e, n, made, across, whole, size)
+            made += 1
+    return int(made)
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _grow(xyz: Array, clusters: Clusters, hulls: Hulls, edges: Edges, e: int, space: Room, stamp: int) -> int:
+    """Raise the bound of an edge's hull; of five points the hull is made. Return the next number for `reach`."""
+    a, b = integer(edges.end[e, 0]), integer(edges.end[e, 1])
+    big, small = (a, b) if hulls.length[a] >= hulls.length[b] else (b, a)
+    count = both(hulls, big, small)
+    if count == 5:
+        both(hulls, a, b)
+        edges.known[e], edges.stage[e] = _five_points(xyz, hulls.rows), _EXACT
+        return stamp
+    edges.stage[e] = _GROWN
+    if count <= MOST:
+        at, length, volume = 6 * hulls.offset[big], hulls.length[big], clusters.hull[big]
+        grown = reach(xyz, hulls.rows, length, count, hulls.face, at, volume, stamp, space)
+        edges.known[e] = max(edges.known[e], grown)
+    return stamp + count
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _note(
+    clusters: Clusters,
+    edges: Edges,
+    e: int,
+    key: float,
+    n: int,
+    made: int,
+    in_all: float,
+    size: float,
+    merges: Any,
+    cost: Array,
+) -> None:
+    """Make a cluster of the ends of an edge."""
+    a, b, c = edges.end[e, 0], edges.end[e, 1], n + made
+    volume, tets, group = clusters.volume, clusters.tets, clusters.group
+    merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
+    volume[c], tets[c], clusters.hull[c] = volume[a] + volume[b], tets[a] + tets[b], edges.known[e]
+    group[c] = group[a] if group[a] == group[b] else -1
+    clusters.gone[a] = clusters.gone[b] = True
+    if size >= 0:
+        cost[made] = key
+    else:
+        cost[made] = 1 + edges.known[e] - volume[a] - volume[b] if key > 0 else -1.0 / (key * in_all * in_all)
+
+
+@numba.njit(cache=True, nogil=True)
+def _hull_again(xyz: Array, hulls: Hulls, a: int, b: int, tolerance: float, work: HullWork, tally: Any) -> int:
+    """Make the hull of two clusters, which was made before, or is that of five points; return its vertices."""
+    count = both(hulls, a, b)
+    if count == 5:
+        five_faces(xyz, hulls.rows, work.point, work.stack)
+        return 5
+    return int(_hull(xyz, hulls.rows, count, tolerance, work, tally)[1])
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _hand_over(
+    clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, n: int, made: int, across: bool, whole: float,
+    size: float,
+) -> int:  # fmt: skip
+    """Give the edges of two clusters to the one made of them, two to one cluster as one; return the heap's size."""
+    end, known, stage = edges.end, edges.known, edges.stage
+    head, latest, group, c = clusters.head, clusters.latest, clusters.group, n + made
+    stage[e] = _GONE
+    heaped = remove(heap.edge, heap.order, heap.place, heaped, e)
+    for node in (integer(end[e, 0]), integer(end[e, 1])):
+        half = integer(head[node])
+        while half >= 0:
+            f, side = half >> 1, half & 1
+            after = integer(end[f, 2 + side])
+            if stage[f] != _GONE:
+                other = end[f, 1 - side]
+                if latest[other, 1] == made:
+                    g = integer(latest[other, 0])
+                    known[g] = max(known[g], known[f])
+                    stage[f] = _GONE
+                    heaped = remove(heap.edge, heap.order, heap.place, heaped, f)
+                else:
+                    latest[other, 0], latest[other, 1] = f, made
+                    end[f, side] = c
+                    end[f, 2 + side], head[c] = head[c], half
+            half = after
+    half = integer(head[c])
+    while half >= 0:
+        f, side = half >> 1, half & 1
+        known[f] = max(known[f], clusters.hull[c])
+        stage[f] = _HELD
+        if across or group[c] == group[end[f, 1 - side]]:
+            heaped = _priced(clusters, edges, heap, heaped, f, whole, size)
+        half = integer(end[f, 2 + side])
+    return heaped
+
+
+@numba.njit(cache=True, nogil=True)
+def _join_bodies(
+    xyz: Array, n: int, made: int, tolerance: float, clusters: Clusters, hulls: Hulls, work: HullWork,
+    merges: Any, cost: Array, tally: Any,
+) -> None:  # fmt: skip
+    """Join separate bodies: always the two of least volume, until one is left."""
+    volume, gone = clusters.volume, clusters.gone
+    bodies = [(volume[k], k) for k in range(n + made) if not gone[k]]
+    heapq.heapify(bodies)
+    while made < n - 1:
+        (va, a), (vb, b) = heapq.heappop(bodies), heapq.heappop(bodies)
+        c = n + made
+        count = both(hulls, a, b)
+        clusters.hull[c], kept = _hull(xyz, hulls.rows, count, tolerance, work, tally)
+        merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
+        cost[made], volume[c] = np.inf, va + vb
+        gone[a] = gone[b] = True
+        keep(hulls, c, gone, work.point, work.stack, kept, clusters.hull[c] > 0)
+        heapq.heappush(bodies, (va + vb, c))
+        made += 1
