@@ -26,6 +26,7 @@ _JUMP = 0.01  # of a spacing: height over which the jump through a disc is sprea
 # Doubt (see `_doubt` and `_contradictions`) above which walls could not be told from gaps. Found on made sheets: nearly
 # all whose volume comes out wrong lie above it, and few of the others.
 _BLURRED = 0.41
+_SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
 _OPEN = 0.07  # length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface
@@ -89,7 +90,7 @@ def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> tuple[Solid, TetMes
         raise BadValue(
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
-    inside = without_islands(mesh, score > 0)
+    inside = without_islands(mesh, score > 0, _SPAN * surface.spacing * used.diagonal)
     solid = mesh.chosen(inside)
     against = _against(surface, solid)
     if used.normals is not None and against > _TURNED:
