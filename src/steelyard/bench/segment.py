@@ -186,14 +186,14 @@ def _turned(true: Integers, cloud: Cloud) -> dict[str, float]:
 
 def _published(known: KnownObject, mesh: TetMesh, warm: bool) -> dict[str, Any]:
     """Return the row of the paper's clustering on our solid: four parts, from supervoxels or from single tets."""
-    start = time.thread_time()
-    piece = None
-    if warm:
-        cloud = Cloud(known.cloud.xyz, known.cloud.rgb)
-        piece = pieces_of_points(mesh, cloud, supervoxels(cloud))
-    tree = cluster(mesh, piece)
-    labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
-    spent = time.thread_time() - start
+    for _ in range(2):  # the first time compiles
+        start, piece = time.thread_time(), None
+        if warm:
+            cloud = Cloud(known.cloud.xyz, known.cloud.rgb)
+            piece = pieces_of_points(mesh, cloud, supervoxels(cloud))
+        tree = cluster(mesh, piece)
+        labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
+        spent = time.thread_time() - start
     scores = score_segments(known.cloud.labels, labels[nearest_cell(known.cloud.xyz, mesh.centroids)])
     return {
         "impurity": scores.impurity,
