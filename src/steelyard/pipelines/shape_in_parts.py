@@ -54,8 +54,11 @@ class Shape:
 
     @property
     def error(self) -> ShapeError:
-        """How wrong the shape may be: no less than a measured mesh, more as far as the solid is unsure of itself."""
-        return MEASURED.at_least(self.solid.surface_m, self.solid.volume_std)
+        """How wrong the shape may be: no less than a measured mesh, more as far as the solid is unsure of itself.
+
+        A volume that errs does so along one direction, say, where second moments err by twice the share.
+        """
+        return MEASURED.at_least(self.solid.surface_m, 2 * self.solid.volume_std)
 
     def cuts(self) -> Cuts:
         """Return the cuts that a log may choose from: about the number shape and colour chose, and half of it.
