@@ -119,7 +119,7 @@ def save_parts(shape: Shape, path: str | Path) -> None:
     from steelyard.io.parts_files import SavedParts, write_parts
 
     made, error = shape.segmentation, shape.error
-    saved = SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, error.com_m, error.inertia_share)
+    saved = SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, error.com_m, error.stretch)
     write_parts(saved, path)
 
 

@@ -6,12 +6,17 @@ import numpy as np
 import pytest
 
 from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.people import people_jacobian
 from steelyard.identify.shape_error import MEASURED, ShapeError
-from steelyard.inertia import solids
+from steelyard.inertia import InertialParameters, solids
+from steelyard.inertia.parameters import frame_change
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation
 
+BODY = InertialParameters.from_com(
+    2.0, [0.1, -0.2, 0.05], [[0.3, 0.02, -0.01], [0.02, 0.28, 0.04], [-0.01, 0.04, 0.07]]
+)
 OFF = np.array([6e-4, -4e-4, 5e-4])
 
 
@@ -42,3 +47,37 @@ def test_without_an_error_the_doubt_costs_little(parts: Parts) -> None:
     doubted = PartMasses(parts, bias="none", shape_error=ShapeError(com_m=5e-4, inertia_share=0.02)).identify(log)
     assert np.abs(doubted.com - truth.com).max() < 1e-4
     assert doubted.parameters.validity().consistent
+
+
+def test_a_stretch_errs_alike_in_every_frame() -> None:
+    X = Pose(Rotation.exp(np.array([0.4, -1.1, 0.7])), np.array([0.3, 0.0, -0.2]))
+    error, change = ShapeError(stretch=0.1), frame_change(X)
+    expected = change @ error.covariance(BODY) @ change.T
+    np.testing.assert_allclose(error.covariance(BODY.in_frame(X)), expected, rtol=1e-9, atol=1e-15)
+
+
+def test_a_stretch_is_a_share_of_each_second_moment() -> None:
+    rod = solids.box(0.01, 1.0, 0.02, 3000.0)
+    std = np.sqrt(np.diag(ShapeError(stretch=0.1).covariance(rod)))[4:]
+    x, y, z = 0.5 * np.trace(rod.inertia_com) - np.diag(rod.inertia_com)
+    # Ixx = y + z, Iyy = x + z, Izz = x + y; products come from both of their axes.
+    expected = [
+        np.hypot(y, z),
+        np.sqrt(x * y / 2),
+        np.sqrt(x * z / 2),
+        np.hypot(x, z),
+        np.sqrt(y * z / 2),
+        np.hypot(x, y),
+    ]
+    np.testing.assert_allclose(std, 0.1 * np.array(expected), rtol=1e-9)
+
+
+def test_a_stretch_is_what_random_strains_do() -> None:
+    """Against draws: lengths that change by a small share e in the body's own axes change second moments by 2 e."""
+    inertia, jacobian = BODY.inertia_com, people_jacobian(BODY.vector)
+    moments = np.linalg.eigvalsh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    strain = np.random.default_rng(0).normal(0, 0.005, (20_000, 3))
+    size = (moments * (1 + strain) ** 2).sum(1)  # the trace of the second moments, half that of the inertia
+    half = np.array([0, 0, 0, 0, 0.5, 0, 0, 0.5, 0, 0.5])
+    covariance = jacobian @ ShapeError(stretch=0.01).covariance(BODY) @ jacobian.T
+    assert half @ covariance @ half == pytest.approx(np.var(size), rel=0.03)

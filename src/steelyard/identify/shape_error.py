@@ -18,28 +18,30 @@ class ShapeError:
     """Standard deviations of what is taken as known.
 
     com_m           of the centre of mass that the shape gives, per axis [m]
-    inertia_share   of the inertia, as a share of half its trace
+    inertia_share   of every entry of the inertia alike, as a share of half its trace
+    stretch         of lengths along which the mass lies: of each entry, as a share of what it comes from
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     """
 
     com_m: float = 0.0
     inertia_share: float = 0.0
+    stretch: float = 0.0
     grasp_m: float = 0.0
     grasp_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        values = (self.com_m, self.inertia_share, self.grasp_m, self.grasp_rad)
+        values = (self.com_m, self.inertia_share, self.stretch, self.grasp_m, self.grasp_rad)
         if not all(np.isfinite(v) and v >= 0 for v in values):
             raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
 
-    def at_least(self, com_m: float, inertia_share: float) -> ShapeError:
+    def at_least(self, com_m: float, stretch: float) -> ShapeError:
         """Return the error with its shape part no less than this."""
-        return replace(self, com_m=max(self.com_m, com_m), inertia_share=max(self.inertia_share, inertia_share))
+        return replace(self, com_m=max(self.com_m, com_m), stretch=max(self.stretch, stretch))
 
     def scaled(self, factor: float) -> ShapeError:
         """Return the error with its shape part `factor` times as large, not below that of a measured shape."""
-        com = factor * max(self.com_m, MEASURED.com_m)
-        return replace(self, com_m=com, inertia_share=factor * max(self.inertia_share, MEASURED.inertia_share))
+        com, share = max(self.com_m, MEASURED.com_m), max(self.inertia_share, MEASURED.inertia_share)
+        return replace(self, com_m=factor * com, inertia_share=factor * share, stretch=factor * self.stretch)
 
     def grasp_steps(self) -> list[Pose]:
         """Return displacements of one standard deviation along and about each axis that has one."""
@@ -50,10 +52,14 @@ class ShapeError:
 
     def covariance(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
-        phi, variance = body.vector.copy(), np.zeros(10)
-        variance[1:4], variance[4:] = self.com_m**2, (self.inertia_share * half_trace_com(phi)) ** 2
+        phi, inner = body.vector.copy(), np.zeros((10, 10))
+        inner[range(1, 4), range(1, 4)] = self.com_m**2
+        inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
+        if self.stretch:
+            slope = _stretched(body.inertia_com)
+            inner[4:, 4:] += self.stretch**2 * slope @ slope.T
         back = parameter_jacobian(phi)
-        return np.asarray((back * variance) @ back.T)
+        return np.asarray(back @ inner @ back.T)
 
     def with_grasp(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape and a wrong grasp give the parameters of a body."""
@@ -62,6 +68,24 @@ class ShapeError:
             off = (body.in_frame(X).vector - body.in_frame(X.inverse()).vector) / 2
             out += np.outer(off, off)
         return out
+
+
+def _stretched(inertia: Array) -> Array:
+    """Return what six independent unit strains do to the inertia about the centre of mass (6, 6).
+
+    The second moments S = 1/2 tr(I) 1 - I become S + S^1/2 E S^1/2. Of the symmetric E the entries on the diagonal have
+    variance 1 and those beside it 1/2, so that no axes are preferred; each entry errs by a share of what it comes from.
+    """
+    moments, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    root = (axes * np.sqrt(np.maximum(moments, 0))) @ axes.T
+    rows, columns = np.triu_indices(3)
+    out = np.empty((6, 6))
+    for k, (i, j) in enumerate(zip(rows, columns, strict=True)):
+        E = np.zeros((3, 3))
+        E[i, j] = E[j, i] = 1.0 if i == j else np.sqrt(0.5)
+        change = root @ E @ root
+        out[:, k] = (np.trace(change) * np.eye(3) - change)[rows, columns]
+    return out
 
 
 EXACT = ShapeError()

@@ -45,7 +45,7 @@ class SavedParts:
     rgb     (P, 3) mean colours 0..255, None where they are not known
     tree    the tree that the parts were cut from, None where there is none
     names   (P,) what each part is called, empty where nothing says
-    com_std, inertia_share   how wrong the shape may be, as in `Parts`; 0 where nothing says
+    com_std, stretch   how wrong the shape may be, as in `Parts`; 0 where nothing says
     """
 
     solid: TetMesh
@@ -54,7 +54,7 @@ class SavedParts:
     tree: Hierarchy | None = None
     names: tuple[str, ...] = ()
     com_std: float = 0.0
-    inertia_share: float = 0.0
+    stretch: float = 0.0
 
     def __post_init__(self) -> None:
         labels = np.array(self.labels, np.int64)
@@ -83,7 +83,7 @@ class SavedParts:
     def parts(self) -> Parts:
         """The parts with their exact moments; raises BadValue where one has no volume."""
         moments = self.solid.moments(self.labels, self.count)
-        return Parts(np.arange(self.count), moments, self.rgb, com_std=self.com_std, inertia_share=self.inertia_share)
+        return Parts(np.arange(self.count), moments, self.rgb, com_std=self.com_std, stretch=self.stretch)
 
     def recut(self, volumes: Sequence[float]) -> SavedParts:
         """Return the solid in the parts of these volumes (K,) [m^3]: part k is the node of the tree with volume k.
@@ -141,7 +141,7 @@ def write_parts(saved: SavedParts, path: Path | str) -> None:
         "volume_m3": parts.volume,
         "centroid_m": parts.centroid,
         "com_std_m": np.float64(saved.com_std),
-        "inertia_share": np.float64(saved.inertia_share),
+        "stretch": np.float64(saved.stretch),
     }
     if saved.rgb is not None:
         arrays["rgb"] = saved.rgb
@@ -178,7 +178,7 @@ def read_parts(path: Path | str) -> SavedParts:
         if all(name in arrays for name in _TREE):
             tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
         names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"]) if "names" in arrays else ()
-        unsure = (_number(path, arrays, name) for name in ("com_std_m", "inertia_share"))
+        unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch"))
         saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)
     except BadValue as error:

@@ -180,7 +180,7 @@ def _shape(parts: Parts | Shape, recording: Recording) -> Placed:
     grasp = {"grasp_m": grasp_m, "grasp_rad": grasp_rad}
     if isinstance(parts, Parts):
         _require_metres(parts)
-        error = MEASURED.at_least(parts.com_std, parts.inertia_share)
+        error = MEASURED.at_least(parts.com_std, parts.stretch)
         return (parts.in_frame(recording.object_pose),), None, replace(error, **grasp)
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts.parts)
