@@ -12,7 +12,7 @@ REMEDIES: dict[str, str] = {
     "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
     "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
     "force-unit": "Check the force and torque units of the wrench stream.",
-    "length-in-mm": 'Set unit = "mm" for positions, or unit = "N*mm" for torques.',
+    "length-in-mm": 'Set the unit that the numbers have: "mm" (or "m") for positions, "N*mm" (or "N*m") for torques.',
     "quaternion-order": "Swap form between quaternion-wxyz and quaternion-xyzw.",
     "base-tilted": "Level the base, or correct [log] gravity to the direction found.",
     "stream-delayed": "Give delay = { value = .., unit = 'ms' } for this stream so that it is not estimated anew.",

@@ -56,7 +56,9 @@ def fitted_gravity(log: MotionLog, rotation: Array, gravity: Array, acceleration
         if np.linalg.norm(turn) < 1e-4:
             break
     angle = float(np.arccos(np.clip(found @ gravity / (gravity @ gravity), -1, 1)))
-    return FittedGravity(found, angle, float(np.linalg.norm(spread)), left / level.left)
+    # What leaves nothing, as a log without noise may, cannot be bettered.
+    share = left / level.left if level.left else 1.0
+    return FittedGravity(found, angle, float(np.linalg.norm(spread)), share)
 
 
 def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> MotionLog:

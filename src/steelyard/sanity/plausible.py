@@ -41,6 +41,6 @@ def implausible(estimate: Estimate, gravity: float) -> tuple[Finding, ...]:
         return ()
     text = (
         f"The body is denser than any metal: {mass:.3g} kg within {1e3 * np.sqrt(max(half_trace, 0) / mass):.2g} mm. "
-        "The torques are too small for the forces."
+        "The torques are too small for the forces, as those in N m are that were declared as N*mm."
     )
     return (Finding.of("length-in-mm", text),)
