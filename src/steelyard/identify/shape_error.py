@@ -19,7 +19,7 @@ class ShapeError:
 
     com_m           of the centre of mass that the shape gives, per axis [m]
     inertia_share   of every entry of the inertia alike, as a share of half its trace
-    stretch         of lengths along which the mass lies: of each entry, as a share of what it comes from
+    stretch         of the second moments, each as a share of itself
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     """
 

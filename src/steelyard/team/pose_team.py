@@ -30,7 +30,7 @@ PUNCTUAL = 2e-4
 DOUBTED = 4.0
 CLOCK_ROUNDS = 6
 # Clocks that move by less [s] leave what the rows say as it is: nobody turns a payload far in that time.
-ALIKE = 0.02
+UNCHANGED = 0.02
 # Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
 # that so many poses of all robots together are enough.
 FEW_ROWS, FEW_POSES = 1500, 4500
@@ -103,7 +103,7 @@ class PoseTeam:
             step = np.abs(fit.team.delays)
             if not left or (step < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
                 break
-            known = fit.known if step.max() < ALIKE else None
+            known = fit.known if step.max() < UNCHANGED else None
             late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
