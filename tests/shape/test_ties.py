@@ -5,10 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from steelyard.shape.complex import Complex
 from steelyard.shape.orient import SLOPE
 from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours
-from steelyard.shape.ties import Complex, Ties
+from steelyard.shape.ties import Ties
+from steelyard.shape.winding import Tree
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import sheet_of
 from steelyard.workshop.solids import ring
@@ -21,7 +23,7 @@ def tube() -> Surface:
     mesh = sheet_of("tube", ring(15, 13.5, 0, 120), np.random.default_rng(0), 10).mesh
     xyz, normals, _ = spread_evenly(mesh, np.random.default_rng(0), 2000)
     xyz = xyz / np.linalg.norm(np.ptp(xyz, axis=0))
-    return xyz, normals, Neighbours.of(xyz), Complex.of(xyz)
+    return xyz, normals, Neighbours.of(xyz), Complex.of(xyz, Tree.of(xyz).order)
 
 
 def ties(tube: Surface, normals: np.ndarray) -> Ties:

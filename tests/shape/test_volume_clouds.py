@@ -11,11 +11,12 @@ from steelyard.errors import BadValue
 from steelyard.evaluate.solids import SAMPLES, score, true_solid, winding_of
 from steelyard.io.object_folders import read_object
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.complex import Complex
 from steelyard.shape.islands import without_islands
 from steelyard.shape.nesting import winding_number
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.ties import Complex
 from steelyard.shape.volume import Solid, enclose
+from steelyard.shape.winding import Tree
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
@@ -82,10 +83,11 @@ def test_sheet_metal_of_which_both_faces_are_seen_stays_thin(body: object, least
 
 
 def test_small_free_groups_of_cells_go_unless_a_point_needs_them(brick: Sheet) -> None:
-    mesh = Complex.of(brick.cloud.xyz / 0.078)
+    xyz = brick.cloud.xyz / 0.078
+    mesh = Complex.of(xyz, Tree.of(xyz).order)
     a = brick.cloud.xyz[mesh.simplices]
     volumes = np.abs(np.linalg.det(a[:, 1:] - a[:, :1])) / 6
-    whole = TetMesh.known(brick.cloud.xyz, mesh.simplices.astype(np.int64), volumes, mesh.beside.astype(np.int64))
+    whole = TetMesh.known(brick.cloud.xyz, mesh.simplices, volumes, mesh.beside)
     middle = whole.centroids[:, 0]
     body, cells = middle < 0.02, np.flatnonzero((middle > 0.05) & (volumes > 1e-12))
     body[cells[0]] = True

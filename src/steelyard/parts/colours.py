@@ -29,6 +29,7 @@ _LAMP_SEEN = 0.1  # weaker shading is below the difference of two colours
 _LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
 _SHADE = 0.08  # of the brightness: what is left of the light once the lamp is taken out
 _PLACES, _APART = 600, (16, 80)  # places whose pairs tell of the lamp, and how many flat places lie between the two
+_SETTLED = 1e-6  # step of the weights below which a brightness changes by less than any camera shows
 _EVEN = 0.05  # cost of a pair below which nothing is lit
 _ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
 
@@ -138,12 +139,16 @@ def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, Array]:
     for _ in range(12):
         first, second = 1 + one @ lamp, 1 + two @ lamp
         rows = one / first[:, None] - two / second[:, None]
-        off = side - np.log(first) + np.log(second)
-        weighted = rows / (_ROUGH**2 + off**2)[:, None]
-        ridge = 1e-3 * np.trace(weighted.T @ rows) / len(lamp) * np.eye(len(lamp))
-        lamp = lamp + np.linalg.solve(weighted.T @ rows + ridge, weighted.T @ off - ridge @ lamp)
+        off = side + np.log(second / first)
+        weighted = rows.T / (_ROUGH**2 + off**2)
+        normal = weighted @ rows
+        ridge = 1e-3 * np.trace(normal) / len(lamp)
+        step = np.linalg.solve(normal + ridge * np.eye(len(lamp)), weighted @ off - ridge * lamp)
+        lamp = lamp + step
         dip = -min(float((one @ lamp).min()), float((two @ lamp).min()))
         lamp *= min(1.0, _LAMP_MOST / max(dip, 1e-12))
+        if np.abs(step).max() < _SETTLED:
+            break
     return lamp, off
 
 

@@ -151,10 +151,10 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     """Return the small pieces that parts are put together from: the first half of `segment`."""
     mesh: TetMesh = solid if isinstance(solid, TetMesh) else solid.mesh
     nearest = nearest_cell(cloud.xyz, mesh.centroids)
-    skin = skin_of(mesh)
+    same = _same(cloud, mesh)
+    skin = skin_of(mesh, cloud.near if same else None)
     colour = np.zeros(len(mesh.vertices), dtype=np.int64)
     if cloud.rgb is not None:
-        same = _same(cloud, mesh)
         told = (cloud.normals, cloud.seen) if same else (None, None)  # what is known of points is known of vertices
         colours = colour_modes(_vertex_colours(cloud, mesh), skin, *told)
         colour = without_prints(colours.label, skin)

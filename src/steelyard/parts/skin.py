@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
+from steelyard.shape.spacing import Neighbours
 from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross
 
@@ -26,6 +27,7 @@ class Skin:
     edges      (E, 2) vertices at the ends of each edge
     beside     (E, 2) the two triangles that meet there
     apex       (E, 2) the corner of each of them that is off the edge
+    known      neighbours of the vertices, where they were looked for before
     """
 
     vertices: Array
@@ -34,6 +36,7 @@ class Skin:
     edges: Integers
     beside: Integers
     apex: Integers
+    known: Neighbours | None = None
 
     @cached_property
     def area_vectors(self) -> Array:
@@ -54,10 +57,8 @@ class Skin:
     @cached_property
     def near(self) -> Integers:
         """The nearest other vertices (V, up to 16) of each, nearest first."""
-        from scipy.spatial import cKDTree
-
-        count = min(NEAR + 1, len(self.vertices))
-        return np.asarray(cKDTree(self.vertices).query(self.vertices, count)[1][:, 1:], dtype=np.int64)
+        known = self.known or Neighbours.of(self.vertices, NEAR)
+        return np.asarray(known.index[:, :NEAR], dtype=np.int64)
 
     @cached_property
     def _vertex_sums(self) -> tuple[Array, Array]:
@@ -110,8 +111,11 @@ class Skin:
         return np.asarray(-(change * self.across).sum(1))
 
 
-def skin_of(mesh: TetMesh) -> Skin:
-    """Return the boundary of a solid. Where four triangles share an edge they are taken two by two, in order."""
+def skin_of(mesh: TetMesh, known: Neighbours | None = None) -> Skin:
+    """Return the boundary of a solid. Where four triangles share an edge they are taken two by two, in order.
+
+    known  neighbours of its vertices, where they were looked for before
+    """
     outer = mesh.neighbours.ravel() < 0
     triangles = mesh.tets[:, FACES].reshape(-1, 3)[outer]
     cell = np.repeat(np.arange(len(mesh)), 4)[outer]
@@ -133,4 +137,5 @@ def skin_of(mesh: TetMesh) -> Skin:
         np.stack([low[one], high[one]], axis=1),
         np.stack([owner[one], owner[two]], axis=1),
         np.stack([apex[one], apex[two]], axis=1),
+        known,
     )

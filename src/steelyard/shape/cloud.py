@@ -70,6 +70,10 @@ class Cloud:
         """The nearest other points of each point [m]."""
         return Neighbours.of(self.xyz)
 
+    def reordered(self, order: Integers) -> Cloud:
+        """Return the same points in an order (N,) of all."""
+        return _knowing(self.chosen(order), self.near.reordered(order))
+
     def chosen(self, rows: Any) -> Cloud:
         """Return the points of `rows`, numbers or a mask."""
         columns = (self.rgb, self.label, self.normals, self.seen)
@@ -78,7 +82,14 @@ class Cloud:
     def in_frame(self, X_AB: Pose) -> Cloud:
         """Return the same points, given in B, seen from frame A."""
         normals = None if self.normals is None else X_AB.rotation.apply(self.normals)
-        return replace(self, xyz=X_AB.apply(self.xyz), normals=normals)
+        moved = replace(self, xyz=X_AB.apply(self.xyz), normals=normals)
+        return _knowing(moved, self.near) if "near" in vars(self) else moved
+
+
+def _knowing(cloud: Cloud, near: Neighbours) -> Cloud:
+    """Return a cloud that need not look for its neighbours any more."""
+    vars(cloud)["near"] = near  # where the cached property keeps it
+    return cloud
 
 
 def _column(name: str, values: Any, shape: tuple[int, ...], dtype: type) -> Any:

@@ -9,10 +9,11 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.complex import Complex
 from steelyard.shape.discs import Discs
 from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours, areas
-from steelyard.shape.ties import Complex, Ties
+from steelyard.shape.ties import Ties
 from steelyard.shape.winding import Sight, Tree
 
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
@@ -40,7 +41,7 @@ class Oriented:
     area     (N,) of surface that each point stands for
     near     its neighbours
     tree     of the points
-    complex  their Delaunay complex
+    delaunay  their Delaunay complex
     spacing  median of the points
     """
 
@@ -49,7 +50,7 @@ class Oriented:
     area: Array
     near: Neighbours
     tree: Tree
-    complex: Complex
+    delaunay: Complex
     spacing: float
 
 
@@ -62,12 +63,12 @@ def oriented(cloud: Cloud) -> Oriented:
     """Return the surface elements of a cloud; normals that it carries are kept."""
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
     near, tree = cloud.near.scaled(1 / cloud.diagonal), Tree.of(xyz)
-    complex, spacing = Complex.of(xyz), float(np.median(near.spacing))
+    delaunay, spacing = Complex.of(xyz, tree.order), float(np.median(near.spacing))
     normals = cloud.normals
     if normals is None:
         sight = Sight.of(tree, tree)
-        normals = on_sheets(xyz, consistent(sight, spacing), near, complex, sight, spacing)
-    return Oriented(xyz, normals, areas(near, normals), near, tree, complex, spacing)
+        normals = on_sheets(xyz, consistent(sight, spacing), near, delaunay, sight, spacing)
+    return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing)
 
 
 def consistent(sight: Sight, spacing: float) -> Array:
@@ -81,14 +82,14 @@ def consistent(sight: Sight, spacing: float) -> Array:
     found: Any = np.zeros(len(tree.order), np.float32)
     for width in spacing * np.linspace(_WIDEST, _NARROWEST, _STEPS):
         push = sight.adjoint(np.float32(0.5) - found, width)
-        moved = sight.winding_and_gradient(push, width, _SAMPLED)[0]
+        moved = sight.winding(push, width, _SAMPLED)
         dipoles = dipoles + _length(push, moved[sampled]) * push
         found, gradient = sight.winding_and_gradient(dipoles, width)
         dipoles = -np.linalg.norm(dipoles, axis=0) * _units(gradient)
     return np.asarray(tree.back(_units(dipoles)).T, np.float64)
 
 
-def on_sheets(xyz: Array, first: Array, near: Neighbours, complex: Complex, sight: Sight, spacing: float) -> Array:
+def on_sheets(xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sight: Sight, spacing: float) -> Array:
     """Return unit normals (N, 3), those of points on flat pieces of surface decided piece by piece.
 
     In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
@@ -97,7 +98,7 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, complex: Complex, sigh
     """
     tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
     plane, link = sheet_planes(xyz, near.index, SLOPE)
-    ties = Ties.of(xyz, plane, near.index, link, complex, spacing)
+    ties = Ties.of(xyz, plane, near.index, link, delaunay, spacing)
     sign = ties.spread(np.sign((plane * first).sum(1)), _SWEEPS, _KEPT)
     discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing).response(sight)
     for step in range(_SIGN_STEPS):
@@ -108,7 +109,7 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, complex: Complex, sigh
             sign = np.clip(2 * sign, -1, 1)
     flat = (np.abs(link).sum(1) > _LINKED) & (np.abs(sign) > _CERTAIN)
     normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
-    ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), complex, spacing)
+    ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), delaunay, spacing)
     normals *= ties.settled(_LAST_SWEEPS, _LAST_KEPT)[:, None]
     gradient = sight.winding_and_gradient(np.ascontiguousarray(normals[order].T, np.float32), _EDGE * spacing)[1]
     return np.where(flat[:, None], normals, -tree.back(_units(gradient)).T)

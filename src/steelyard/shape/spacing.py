@@ -30,6 +30,12 @@ class Neighbours:
         distance, index = cKDTree(xyz).query(xyz, min(count + 1, len(xyz)))
         return cls(index[:, 1:], distance[:, 1:])
 
+    def reordered(self, order: Integers) -> Neighbours:
+        """Return the same neighbours where points come in another order (N,)."""
+        place = np.empty_like(order)
+        place[order] = np.arange(len(order))
+        return Neighbours(place[self.index[order]], self.distance[order])
+
     def scaled(self, factor: float) -> Neighbours:
         """Return the same neighbours with lengths `factor` times as large."""
         return Neighbours(self.index, factor * self.distance)

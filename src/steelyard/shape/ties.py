@@ -8,56 +8,11 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.complex import Complex
 from steelyard.shape.mesh import Integers
 
-_NUDGE = 1e-7  # of the diagonal
 _STEEP = 0.35  # cosine between an edge and a normal, at both ends, above which the edge leaves the surface there
-_SIDES = 100  # facets of the hull that are asked which way is out
-_LEVEL = 0.2  # spacings below a facet within which points lie on it
 _SEEN = 0.3  # cosine between a point's plane and a facet of the hull above which the facet shows its outer side
-
-
-@dataclass(frozen=True, eq=False)
-class Complex:
-    """The Delaunay complex of N points.
-
-    simplices  (S, 4) its cells
-    beside     (S, 4) the cell opposite each corner, -1 without one
-    start      (N + 1,) and other: the points joined to point i by edges are other[start[i]:start[i + 1]]
-    hull       (F, 3) corners of the facets around all points
-    across     (F, 3) their outward normals, as long as twice their area
-    """
-
-    simplices: Integers
-    beside: Integers
-    start: Integers
-    other: Integers
-    hull: Integers
-    across: Array
-
-    @classmethod
-    def of(cls, xyz: Array) -> Complex:
-        """Return the complex of points (N, 3) in units of their diagonal."""
-        from scipy.spatial import Delaunay
-
-        # Qhull spends most of its time on points in one plane: they are moved by less than any measurement notices.
-        made = Delaunay(xyz + _NUDGE * np.random.default_rng(0).uniform(-1, 1, xyz.shape))
-        start, other = made.vertex_neighbor_vertices
-        hull = made.convex_hull
-        a, b, c = xyz[hull].transpose(1, 0, 2)
-        across = np.cross(b - a, c - a)
-        outward = ((a - xyz[np.unique(hull)].mean(0)) * across).sum(1) >= 0
-        across = np.where(outward[:, None], across, -across)
-        return cls(made.simplices, made.neighbors, start.astype(np.int64), other.astype(np.int64), hull, across)
-
-    def flux(self, xyz: Array, normals: Array, spacing: float) -> float:
-        """Return how squarely the normals (N, 3) of points on the largest facets leave the hull: -1 to 1."""
-        twice = np.linalg.norm(self.across, axis=1)
-        largest = np.argsort(-twice, kind="stable")[:_SIDES]
-        out = self.across[largest] / np.maximum(twice[largest], 1e-30)[:, None]
-        on = xyz @ out.T > (xyz[self.hull[largest, 0]] * out).sum(1) - _LEVEL * spacing
-        along = ((normals @ out.T) * on).sum(0) / np.maximum(on.sum(0), 1)
-        return float((along * twice[largest]).sum() / twice[largest].sum())
 
 
 @dataclass(frozen=True, eq=False)

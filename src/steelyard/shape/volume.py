@@ -71,7 +71,7 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
     used, findings = working_cloud(cloud, points)
     X_CB, order = canonical(used.xyz)
-    made, around = _enclosed(used.chosen(order).in_frame(X_CB), findings)
+    made, around = _enclosed(used.reordered(order).in_frame(X_CB), findings)
     normals = np.empty_like(used.xyz)
     normals[order] = X_CB.inverse().rotation.apply(np.asarray(made.cloud.normals))
     mesh, around = (
@@ -107,7 +107,7 @@ def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
     """Return the cloud's surface elements; normals that came with it and all point inward are turned."""
     surface = oriented(cloud)
     # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
-    if surface.complex.flux(surface.xyz, surface.normals, surface.spacing) >= 0:
+    if surface.delaunay.flux(surface.xyz, surface.normals, surface.spacing) >= 0:
         return surface, ()
     text = "All normals that came with the cloud point into the solid; they were turned."
     found = (Finding.of("normals-flipped", text),) if cloud.normals is not None else ()
@@ -119,7 +119,7 @@ def cells_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
 
     A vote is how much the normals (-1..1) of its corners say that a cell lies inside.
     """
-    made = surface.complex
+    made = surface.delaunay
     tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.beside)
     unit = (np.ptp(xyz, axis=0) ** 2).sum() ** 1.5
     return TetMesh.known(xyz, tets, volumes * unit, neighbours), centres, votes
@@ -147,7 +147,7 @@ def _contradictions(surface: Oriented) -> float:
     xyz, normals, index = surface.xyz, surface.normals, surface.near.index
     plane, link = sheet_planes(xyz, index, SLOPE)
     link = signed_links(link, plane, normals, index)
-    ties = Ties.of(xyz, normals, index, link, surface.complex, surface.spacing)
+    ties = Ties.of(xyz, normals, index, link, surface.delaunay, surface.spacing)
     return stacked(xyz, normals, index, link) + ties.torn
 
 

@@ -95,16 +95,20 @@ class Sight:
         """The most points and nodes that any block sees."""
         return int(np.diff(self.near[0]).max()) * _LEAF + int(np.diff(self.far[0]).max())
 
-    def winding_and_gradient(self, dipoles: Array, width: float, every: int = 1) -> tuple[Array, Array]:
-        """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened.
-
-        Only every `every`-th block of targets is looked at, the others have 0.
-        """
+    def winding_and_gradient(self, dipoles: Array, width: float) -> tuple[Array, Array]:
+        """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened."""
         points = self.targets.points
         out, gradient = np.zeros(points.shape[1], np.float32), np.zeros(points.shape, np.float32)
-        seen_here = *self.elements(dipoles), points, self.targets.blocks, every, np.float32(width**2), self.most
+        seen_here = *self.elements(dipoles), points, self.targets.blocks, np.float32(width**2), self.most
         _gradient(*seen_here, out, gradient)
         return out, gradient
+
+    def winding(self, dipoles: Array, width: float, every: int = 1) -> Array:
+        """Return the winding number (M,) alone; only every `every`-th block of targets is looked at, others have 0."""
+        points = self.targets.points
+        out = np.zeros(points.shape[1], np.float32)
+        _winding(*self.elements(dipoles), points, self.targets.blocks, every, np.float32(width**2), self.most, out)
+        return out
 
     def adjoint(self, weights: Array, width: float) -> Array:
         """Return the sum (3, M) over sources of weight times how a dipole at the target turns the source's number."""
@@ -282,11 +286,11 @@ def seen(
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _gradient(
     own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
-    points: Array, blocks: Integers, every: int, soft: Any, most: int, out: Array, gradient: Array,
+    points: Array, blocks: Integers, soft: Any, most: int, out: Array, gradient: Array,
 ) -> None:  # fmt: skip
     all_seen, inverse = np.empty((6, most), np.float32), np.empty(most, np.float32)
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
-    for b in range(0, len(blocks) - 1, every):
+    for b in range(len(blocks) - 1):
         count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
@@ -306,6 +310,25 @@ def _gradient(
                 gz += mz[j] * cube - along * dz
             out[i] = -total * FOUR_PI
             gradient[0, i], gradient[1, i], gradient[2, i] = -gx * FOUR_PI, -gy * FOUR_PI, -gz * FOUR_PI
+
+
+@numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
+def _winding(
+    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    points: Array, blocks: Integers, every: int, soft: Any, most: int, out: Array,
+) -> None:  # fmt: skip
+    all_seen = np.empty((6, most), np.float32)
+    sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
+    for b in range(0, len(blocks) - 1, every):
+        count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
+        for i in range(blocks[b], blocks[b + 1]):
+            x, y, z = points[0, i], points[1, i], points[2, i]
+            total = np.float32(0)
+            for j in range(count):
+                dx, dy, dz = x - sx[j], y - sy[j], z - sz[j]
+                inverse = ONE / math.sqrt(dx * dx + dy * dy + dz * dz + soft)
+                total += (dx * mx[j] + dy * my[j] + dz * mz[j]) * inverse * inverse * inverse
+            out[i] = -total * FOUR_PI
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")

@@ -72,7 +72,7 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     """Return the largest of the pieces that lie far apart."""
     if len(cloud) < LEAST:
         return cloud, []
-    piece, spacing = _pieces(Neighbours.of(cloud.xyz, _LINKS))
+    piece, spacing = _pieces(cloud.near)
     sizes = np.bincount(piece)
     large = np.flatnonzero(sizes >= max(_PIECE * len(cloud), LEAST))
     if len(sizes) == 1 or not len(large):
@@ -92,11 +92,10 @@ def _pieces(near: Neighbours) -> tuple[Integers, float]:
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
-    count, k = near.index.shape
-    spacing = float(np.median(near.distance[:, k - 1])) * float(np.sqrt(np.pi / k))
-    close = near.distance < _APART * spacing
+    spacing = float(np.median(near.spacing))
+    index, close = near.index[:, :_LINKS], near.distance[:, :_LINKS] < _APART * spacing
     start = np.concatenate([[0], np.cumsum(close.sum(1))])
-    graph = csr_matrix((np.ones(start[-1]), near.index[close], start), (count, count))
+    graph = csr_matrix((np.ones(start[-1]), index[close], start), (len(index), len(index)))
     return np.asarray(connected_components(graph, directed=False)[1], np.int64), spacing
 
 
