@@ -43,6 +43,12 @@ def test_scans_of_two_tools() -> None:
     assert "2 of 2 volumes" in scan_table(result)
 
 
+def test_no_normals_show_what_is_hollow_inside(tmp_path: Path) -> None:
+    CliRunner().invoke(workshop, ["build", str(tmp_path), "--tools", "measuring-tape"])
+    row = result_of("segment", "--data", str(tmp_path))["objects"]["measuring-tape"]
+    assert row["volume_ratio_true_normals"] > 2
+
+
 def test_segments_of_a_built_tool(tmp_path: Path) -> None:
     CliRunner().invoke(workshop, ["build", str(tmp_path), "--tools", "rubber-mallet"])
     result = result_of("segment", "--data", str(tmp_path))
@@ -52,5 +58,7 @@ def test_segments_of_a_built_tool(tmp_path: Path) -> None:
     assert row["impurity"] < 0.1
     assert row["n_true"] == 2
     assert result["counts"]["volume_within_10_pct"] == 1
+    for told in ("sides", "normals"):  # little is gained where ours are right
+        assert row[f"volume_ratio_true_{told}"] == pytest.approx(row["volume_ratio"], abs=0.02)
     assert result["mean"]["objects"]["gce"] == row["gce"]
     assert "rubber-mallet" in segment_table(result)

@@ -13,6 +13,8 @@ _OURS = (
     ("parts", "n_parts", 0),
     ("true", "n_true", 0),
     ("volume", "volume_ratio", 3),
+    ("true sides", "volume_ratio_true_sides", 3),
+    ("true normals", "volume_ratio_true_normals", 3),
     ("IoU", "volume_iou", 3),
     ("Hausdorff mm", "hausdorff_mm", 1),
     ("CPU ms", "cpu_ms", 0),
