@@ -14,7 +14,7 @@ import numba
 import numpy as np
 
 from steelyard.shape.mesh import Integers
-from steelyard.shape.winding import FOUR_PI, ONE, Sight, Tree, seen, single, sums
+from steelyard.shape.winding import FOUR_PI, ONE, Numbers, Sight, Tree, seen, single, sums
 
 Array = Any  # single precision here, double at the border
 
@@ -52,8 +52,7 @@ class Discs:
     def response(self, sight: Sight) -> Response:
         """Return how the winding number at the targets depends on what each disc counts."""
         size = np.diff(sight.targets.blocks)
-        close = _close(self.tree.start, *sight.near)
-        beyond = np.diff(sight.far[0])
+        close, beyond = np.diff(sight.near[0]), np.diff(sight.far[0])
         at = np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(np.stack([size * close, 3 * size * beyond], 1), 0)])
         near, far = (np.empty(room, np.float32) for room in at[-1].tolist())
         self._turns(sight, near, far, at, np.empty(sight.targets.points.shape[1], np.float32))
@@ -90,7 +89,7 @@ class Response:
         share = single(share)
         dipole = sums(discs.normal * (discs.area * share), discs.tree.start)
         out = np.zeros(sight.targets.points.shape[1], np.float32)
-        where = discs.tree.start, *sight.near, *sight.far, sight.targets.blocks, self.at
+        where = *sight.near, *sight.far, sight.targets.blocks, self.at
         _apply(self.near, self.far, *where, every, sight.most, share, dipole, out)
         return out
 
@@ -103,19 +102,9 @@ class Response:
         return out
 
 
-@numba.njit(cache=True, nogil=True)
-def _close(start: Integers, first: Integers, near: Integers) -> Integers:
-    """Return how many points (B,) every block sees one by one."""
-    out = np.zeros(len(first) - 1, np.int64)
-    for b in range(len(out)):
-        for m in range(first[b], first[b + 1]):
-            out[b] += start[near[m] + 1] - start[near[m]]
-    return out
-
-
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _turns(
-    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
     points: Array, blocks: Integers, soft: Any, most: int, close_out: Array, far_out: Array, at: Integers, out: Array,
 ) -> None:  # fmt: skip
     """Write the winding number (M,), and, where there is room, by how much each disc and node turns it."""
@@ -124,7 +113,7 @@ def _turns(
     area, depth = all_seen[6], all_seen[7]
     kept, filled = len(at) > 1, 0
     for b in range(len(blocks) - 1):
-        close, count = seen(own, node, start, first, near, begin, far, b, all_seen)
+        close, count = seen(own, node, first, near, begin, far, b, all_seen)
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(close):
@@ -146,9 +135,9 @@ def _turns(
                 total += turn[j] * inverse[j]
             out[i] = total
             if kept:
-                row = at[b, 0] + (i - blocks[b]) * close
+                turned = close_out[at[b, 0] + (i - blocks[b]) * close :]
                 for j in range(close):
-                    close_out[row + j] = turn[j] * inverse[j]
+                    turned[j] = turn[j] * inverse[j]
                 beyond = count - close
                 for j in range(beyond):
                     far_out[filled + j] = (x - sx[close + j]) * inverse[close + j]
@@ -159,26 +148,25 @@ def _turns(
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _apply(
-    near_turn: Array, far_field: Array, start: Integers, first: Integers, near: Integers, begin: Integers,
-    far: Integers, blocks: Integers, at: Integers, every: int, most: int, share: Array, dipole: Array, out: Array,
+    near_turn: Array, far_field: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
+    blocks: Integers, at: Integers, every: int, most: int, share: Array, dipole: Array, out: Array,
 ) -> None:  # fmt: skip
     ours, theirs = np.empty(most, np.float32), np.empty(3 * most, np.float32)
     for b in range(0, len(blocks) - 1, every):
-        close, beyond, filled = 0, begin[b + 1] - begin[b], at[b, 1]
-        for m in range(first[b], first[b + 1]):
-            for i in range(start[near[m]], start[near[m] + 1]):
-                ours[close] = share[i]
-                close += 1
+        points, nodes = near[first[b] : first[b + 1]], far[begin[b] : begin[b + 1]]
+        close, beyond, filled = len(points), len(nodes), at[b, 1]
+        for m in range(close):
+            ours[m] = share[points[m]]
         for row in range(3):
             for m in range(beyond):
-                theirs[row * beyond + m] = dipole[row, far[begin[b] + m]]
+                theirs[row * beyond + m] = dipole[row, nodes[m]]
         for i in range(blocks[b], blocks[b + 1]):
-            row = at[b, 0] + (i - blocks[b]) * close
+            turned, field = near_turn[at[b, 0] + (i - blocks[b]) * close :], far_field[filled:]
             total = np.float32(0)
             for j in range(close):
-                total += near_turn[row + j] * ours[j]
+                total += turned[j] * ours[j]
             for j in range(3 * beyond):
-                total += far_field[filled + j] * theirs[j]
+                total += field[j] * theirs[j]
             filled += 3 * beyond
             out[i] = total
 
@@ -192,26 +180,23 @@ def _transposed(
     ours, theirs = np.empty(most, np.float32), np.empty(3 * most, np.float32)
     filled = 0
     for b in range(len(blocks) - 1):
-        beyond = begin[b + 1] - begin[b]
-        size = blocks[b + 1] - blocks[b]
-        close = (at[b + 1, 0] - at[b, 0]) // max(size, 1)
+        points, nodes = near[first[b] : first[b + 1]], far[begin[b] : begin[b + 1]]
+        close, beyond = len(points), len(nodes)
         ours[:close] = 0
         theirs[: 3 * beyond] = 0
         for i in range(blocks[b], blocks[b + 1]):
-            weight, row = weights[i], at[b, 0] + (i - blocks[b]) * close
+            turned, beyond_field = near_turn[at[b, 0] + (i - blocks[b]) * close :], far_field[filled:]
+            weight = weights[i]
             for j in range(close):
-                ours[j] += weight * near_turn[row + j]
+                ours[j] += weight * turned[j]
             for j in range(3 * beyond):
-                theirs[j] += weight * far_field[filled + j]
+                theirs[j] += weight * beyond_field[j]
             filled += 3 * beyond
-        j = 0
-        for m in range(first[b], first[b + 1]):
-            for i in range(start[near[m]], start[near[m] + 1]):
-                out[i] += ours[j]
-                j += 1
+        for m in range(close):
+            out[points[m]] += ours[m]
         for row in range(3):
             for m in range(beyond):
-                field[row, far[begin[b] + m]] += theirs[row * beyond + m]
+                field[row, nodes[m]] += theirs[row * beyond + m]
     leaves = len(start) - 1
     for k in range(2, 2 * leaves):
         for row in range(3):

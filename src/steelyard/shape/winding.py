@@ -19,6 +19,7 @@ import numpy as np
 from steelyard.shape.mesh import Integers
 
 Array = Any  # single precision here, double at the border
+Numbers = Any  # unsigned, or numba asks of each whether it counts from the end
 
 _LEAF = 8  # most points of a leaf
 _FAR = 3.5  # a node is far beyond this many of its radii: its points then err by about (1 / 2.5)^2 / 6 of a small sum
@@ -73,27 +74,27 @@ class Sight:
     """How blocks of the points of one tree see the nodes of another.
 
     targets, sources  the trees
-    near  numbers of the leaves whose points block b sees one by one: near[1][near[0][b]:near[0][b + 1]]
+    near  numbers of the points that block b sees one by one: near[1][near[0][b]:near[0][b + 1]]
     far   the same of the nodes that it sees as one
     """
 
     targets: Tree
     sources: Tree
-    near: tuple[Integers, Integers]
-    far: tuple[Integers, Integers]
+    near: tuple[Integers, Numbers]
+    far: tuple[Integers, Numbers]
 
     @classmethod
     def of(cls, targets: Tree, sources: Tree) -> Sight:
         """Return which leaves must be summed point by point."""
-        first, near, begin, far = _seen_by(
-            targets.centre, targets.radius, len(targets.blocks) - 1, sources.centre, sources.radius
-        )
+        blocks = len(targets.blocks) - 1
+        seen_from = targets.centre, targets.radius, blocks, sources.centre, sources.radius, sources.start
+        first, near, begin, far = _seen_by(*seen_from)
         return cls(targets, sources, (first, near), (begin, far))
 
     @cached_property
     def most(self) -> int:
         """The most points and nodes that any block sees."""
-        return int(np.diff(self.near[0]).max()) * _LEAF + int(np.diff(self.far[0]).max())
+        return int((np.diff(self.near[0]) + np.diff(self.far[0])).max())
 
     def winding_and_gradient(self, dipoles: Array, width: float) -> tuple[Array, Array]:
         """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened."""
@@ -118,8 +119,8 @@ class Sight:
         _adjoint(*seen_here, out)
         return out
 
-    def elements(self, values: Array, counted: Array | None = None) -> tuple[Any, Any, Any, Any, Any, Any, Any]:
-        """Return points with values (3 + K, N), nodes with theirs, starts of the leaves, and what each block sees.
+    def elements(self, values: Array, counted: Array | None = None) -> tuple[Any, Any, Any, Any, Any, Any]:
+        """Return points with values (3 + K, N), nodes with theirs, and what each block sees.
 
         counted  what a node has the sums of, the values where it is None
         """
@@ -127,7 +128,7 @@ class Sight:
         values = single(values)
         own = np.concatenate([tree.points, values])
         node = np.concatenate([tree.centre, sums(values if counted is None else single(counted), tree.start)])
-        return own, node, tree.start, *self.near, *self.far
+        return own, node, *self.near, *self.far
 
 
 def single(values: Any) -> Array:
@@ -229,20 +230,20 @@ def sums(values: Array, start: Integers) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _seen_by(
-    centre: Array, radius: Array, blocks: int, source: Array, size: Array
-) -> tuple[Integers, Integers, Integers, Integers]:
-    """Return starts and numbers of the leaves that every block sees point by point, and of the nodes it sees as one."""
+    centre: Array, radius: Array, blocks: int, source: Array, size: Array, start: Integers
+) -> tuple[Integers, Numbers, Integers, Numbers]:
+    """Return starts and numbers of the points that every block sees one by one, and of the nodes it sees as one."""
     leaves = len(size) // 2
     first, begin = np.zeros(blocks + 1, np.int64), np.zeros(blocks + 1, np.int64)
-    near, far = np.empty(64 * blocks, np.int64), np.empty(64 * blocks, np.int64)
+    near, far = np.empty(64 * _LEAF * blocks, np.uint32), np.empty(64 * blocks, np.uint32)
     stack = np.empty(128, np.int64)
     close, away = 0, 0
     for b in range(blocks):
         t = blocks + b
-        if close + leaves > len(near):
-            near = np.concatenate((near, np.empty(len(near) + leaves, np.int64)))
+        if close + start[-1] > len(near):
+            near = np.concatenate((near, np.empty(len(near) + start[-1], np.uint32)))
         if away + leaves > len(far):
-            far = np.concatenate((far, np.empty(len(far) + leaves, np.int64)))
+            far = np.concatenate((far, np.empty(len(far) + leaves, np.uint32)))
         waiting = 1
         stack[0] = 1
         while waiting > 0:
@@ -254,8 +255,9 @@ def _seen_by(
                 far[away] = k
                 away += 1
             elif k >= leaves:
-                near[close] = k - leaves
-                close += 1
+                for i in range(start[k - leaves], start[k - leaves + 1]):
+                    near[close] = i
+                    close += 1
             else:
                 stack[waiting], stack[waiting + 1] = 2 * k + 1, 2 * k
                 waiting += 2
@@ -265,33 +267,31 @@ def _seen_by(
 
 @numba.njit(cache=True, nogil=True)
 def seen(
-    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers, b: int,
-    out: Array,
-) -> tuple[int, int]:  # fmt: skip
+    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers, b: int, out: Array
+) -> tuple[int, int]:
     """Write what block b of targets sees into out, near points first; return their number and that of all."""
-    close = 0
-    for m in range(first[b], first[b + 1]):
-        a, size = start[near[m]], start[near[m] + 1] - start[near[m]]
-        for row in range(len(own)):
-            for i in range(size):
-                out[row, close + i] = own[row, a + i]
-        close += size
-    count = close + begin[b + 1] - begin[b]
+    points, nodes = near[first[b] : first[b + 1]], far[begin[b] : begin[b + 1]]
+    close, beyond = len(points), len(nodes)
+    for row in range(len(own)):
+        given, kept = own[row], out[row]
+        for m in range(close):
+            kept[m] = given[points[m]]
     for row in range(len(node)):
-        for m in range(count - close):
-            out[row, close + m] = node[row, far[begin[b] + m]]
-    return close, count
+        given, kept = node[row], out[row, close:]
+        for m in range(beyond):
+            kept[m] = given[nodes[m]]
+    return close, close + beyond
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _gradient(
-    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
     points: Array, blocks: Integers, soft: Any, most: int, out: Array, gradient: Array,
 ) -> None:  # fmt: skip
     all_seen, inverse = np.empty((6, most), np.float32), np.empty(most, np.float32)
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
     for b in range(len(blocks) - 1):
-        count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
+        count = seen(own, node, first, near, begin, far, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
@@ -314,13 +314,13 @@ def _gradient(
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _winding(
-    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
     points: Array, blocks: Integers, every: int, soft: Any, most: int, out: Array,
 ) -> None:  # fmt: skip
     all_seen = np.empty((6, most), np.float32)
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
     for b in range(0, len(blocks) - 1, every):
-        count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
+        count = seen(own, node, first, near, begin, far, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             total = np.float32(0)
@@ -333,13 +333,13 @@ def _winding(
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _adjoint(
-    own: Array, node: Array, start: Integers, first: Integers, near: Integers, begin: Integers, far: Integers,
+    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
     points: Array, blocks: Integers, soft: Any, most: int, out: Array,
 ) -> None:  # fmt: skip
     all_seen, inverse = np.empty((4, most), np.float32), np.empty(most, np.float32)
     sx, sy, sz, weight = all_seen[0], all_seen[1], all_seen[2], all_seen[3]
     for b in range(len(blocks) - 1):
-        count = seen(own, node, start, first, near, begin, far, b, all_seen)[1]
+        count = seen(own, node, first, near, begin, far, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
