@@ -8,20 +8,54 @@ walk; Melquiond, Pion 2007, what rounding leaves in doubt.
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.borrowed import borrowed, integer
 from steelyard.shape.mesh import Integers
 
-Table = Any  # (room, 4) or (room,) int32: half the memory to walk through
+Table = Any  # uint32
 
 _CELLS = 16  # per point, at most
 # Rounding of the determinants below, over the product of the sizes of their columns.
 _SIDE_DOUBT, _SPHERE_DOUBT = 5.2e-15, 1.25e-13
 _UNSURE = 2  # a sign in doubt
+NONE = np.uint32(2**32 - 1)
+
+
+class Room(NamedTuple):
+    """Room for the cells of a complex and for what is known of them; unsigned, or numba asks each number for its sign.
+
+    cells   (C, 4) corners of every cell; that of those that reach to infinity is the number of points, or NONE of all
+            that are no more
+    beside  (C, 4) the cell across from every corner
+    asked   (C,) the last point that a cell was asked for, and held: the last that its sphere held
+    gone    (C,) cells whose sphere holds the new point
+    faces   (4 C, 2) their outer faces: cell and corner across
+    made    (C, 4) the new cell on an outer face
+    free    (C,) cells that are no more
+    """
+
+    cells: Table
+    beside: Table
+    asked: Table
+    held: Table
+    gone: Table
+    faces: Table
+    made: Table
+    free: Table
+
+    @classmethod
+    def of(cls, points: int) -> Room:
+        """Return room for the complex of so many points."""
+        count = _CELLS * points + 256
+        cells, beside, made = (np.empty((count, 4), np.uint32) for _ in range(3))
+        asked, held = (np.full(count, NONE) for _ in range(2))
+        gone, faces, free = np.empty(count, np.uint32), np.empty((4 * count, 2), np.uint32), np.empty(count, np.uint32)
+        return cls(cells, beside, asked, held, gone, faces, made, free)
 
 
 def thinly(order: Integers) -> Integers:
@@ -40,8 +74,9 @@ def tetrahedra(xyz: Array, order: Integers) -> tuple[Integers, Integers] | None:
 
     None where a sign is in doubt: of points on one plane or sphere, or nearly.
     """
-    used, cells, beside = _inserted(xyz, order)
-    return _finite(cells[:used], beside, len(xyz)) if used else None
+    room = Room.of(len(xyz))
+    used = _inserted(xyz, order.astype(np.uint32), room)
+    return _finite(room.cells[:used], room.beside, len(xyz)) if used else None
 
 
 @numba.njit(cache=True, nogil=True)
@@ -103,7 +138,7 @@ def _conflict(xyz: Array, cells: Table, t: int, p: int) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
-def _started(xyz: Array, first: Integers, cells: Table, beside: Table) -> bool:
+def _started(xyz: Array, first: Table, cells: Table, beside: Table) -> bool:
     """Write the cell of four points and the four outside it; return whether the points are surely not in a plane."""
     side = _side(xyz, first[0], first[1], first[2], first[3])
     if side == _UNSURE:
@@ -138,14 +173,14 @@ def _found(xyz: Array, cells: Table, beside: Table, t: int, p: int) -> int:
                 before, t = t, beside[t, k]
                 break
         else:
-            return t
-    return t
+            break
+    return int(t)
 
 
 @numba.njit(cache=True, nogil=True)
 def _cavity(
     xyz: Array, cells: Table, beside: Table, asked: Table, held: Table, gone: Table, faces: Table, p: int, first: int
-) -> tuple[int, int]:  # fmt: skip
+) -> tuple[int, int]:
     """Write the cells whose spheres hold p into `gone` and their outer faces into `faces`; return how many of both.
 
     The second is -1 where a sign is in doubt.
@@ -186,26 +221,21 @@ def _join(
 
 
 @numba.njit(cache=True, nogil=True)
-def _inserted(xyz: Array, order: Integers) -> tuple[int, Table, Table]:
-    """Return how many cells there are, the cells, those to infinity among them, and the neighbours of each.
-
-    There are 0 where a sign was in doubt, or the room too small.
-    """
-    room = _CELLS * len(xyz) + 256
-    cells, beside = np.empty((room, 4), np.int32), np.empty((room, 4), np.int32)
-    made, faces = np.empty((room, 4), np.int32), np.empty((4 * room, 2), np.int32)
-    asked, held = np.full(room, -1, np.int32), np.full(room, -1, np.int32)  # the last point it was asked for, and held
-    free, gone = np.empty(room, np.int32), np.empty(room, np.int32)
+def _inserted(points: Array, order: Table, room: Room) -> int:
+    """Return how many rows of the room the complex takes; 0 where a sign was in doubt, or the room too small."""
+    xyz, cells, beside, made = borrowed(points), borrowed(room.cells), borrowed(room.beside), borrowed(room.made)
+    asked, held, gone, faces = borrowed(room.asked), borrowed(room.held), borrowed(room.gone), borrowed(room.faces)
+    free = borrowed(room.free)
     if not _started(xyz, order[:4], cells, beside):
-        return 0, cells, beside
-    used, spare, last = 5, 0, 0
+        return 0
+    used, spare, last = integer(5), integer(0), integer(0)
     for p in order[4:]:
-        last = _found(xyz, cells, beside, last, p)
+        last = integer(_found(xyz, cells, beside, last, p))
         if last < 0:
-            return 0, cells, beside
+            return 0
         dying, outer = _cavity(xyz, cells, beside, asked, held, gone, faces, p, last)
-        if outer < 0 or used + outer - spare > room:
-            return 0, cells, beside
+        if outer < 0 or used + outer - spare > len(cells):
+            return 0
         for m in range(outer):
             t, k = faces[m, 0], faces[m, 1]
             if spare > 0:
@@ -216,16 +246,16 @@ def _inserted(xyz: Array, order: Integers) -> tuple[int, Table, Table]:
                 used += 1
             made[t, k], n = last, beside[t, k]
             for j in range(4):
-                cells[last, j], beside[last, j] = cells[t, j], -1
+                cells[last, j], beside[last, j] = cells[t, j], NONE
             cells[last, k], beside[last, k], beside[n, _slot(beside, n, t)] = p, n, last
         for m in range(outer):
             t, k = faces[m, 0], faces[m, 1]
             for j in range(4):
-                if beside[made[t, k], j] < 0:
+                if beside[made[t, k], j] == NONE:
                     _join(cells, beside, held, made, p, t, k, j)
         for m in range(dying):
-            free[spare], cells[gone[m], 0], spare = gone[m], -1, spare + 1
-    return used, cells, beside
+            free[spare], cells[gone[m], 0], spare = gone[m], NONE, spare + 1
+    return int(used)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -233,7 +263,7 @@ def _finite(cells: Table, beside: Table, points: int) -> tuple[Integers, Integer
     """Return the cells in use that do not reach to infinity, and their neighbours."""
     number, count = np.full(len(cells), -1), 0
     for t in range(len(cells)):
-        if cells[t, 0] >= 0 and max(cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]) < points:
+        if cells[t, 0] != NONE and max(cells[t, 0], cells[t, 1], cells[t, 2], cells[t, 3]) < points:
             number[t] = count
             count += 1
     simplices, neighbours = np.empty((count, 4), np.int64), np.empty((count, 4), np.int64)

@@ -57,7 +57,9 @@ class Ties:
         return np.where(self._swept(np.ones(len(self.index)), sweeps, kept, 2.0) < 0, -1.0, 1.0)
 
     def _swept(self, values: Array, sweeps: int, kept: float, gain: float) -> Array:
-        ties = self.index, self.link, self.start, self.other, self.faced, self.outward
+        # Numbers as unsigned ones, or numba asks of each whether it counts from the end.
+        index, other = self.index.view(np.uint64), self.other.view(np.uint64)
+        ties = index, self.link, self.start, other, self.faced, self.outward
         return np.asarray(_swept(values, *ties, sweeps, kept, gain))
 
     @property
@@ -95,16 +97,20 @@ def _swept(
     values: Array, index: Integers, link: Array, start: Integers, other: Integers, faced: Array, outward: Array,
     sweeps: int, kept: float, gain: float,
 ) -> Array:  # fmt: skip
-    old, new = values.astype(np.float64), np.empty(len(values))
+    old, new, weight = values.astype(np.float64), np.empty(len(values)), np.empty(len(values))
+    for i in range(len(values)):
+        weight[i] = kept + abs(outward[i])
+        for a in range(index.shape[1]):
+            weight[i] += abs(link[i, a])
+        for k in range(start[i], start[i + 1]):
+            weight[i] += abs(faced[k])
     for _ in range(sweeps):
         for i in range(len(values)):
-            total, weight = kept * values[i] + outward[i], kept + abs(outward[i])
+            total = kept * values[i] + outward[i]
             for a in range(index.shape[1]):
                 total += link[i, a] * old[index[i, a]]
-                weight += abs(link[i, a])
             for k in range(start[i], start[i + 1]):
                 total += faced[k] * old[other[k]]
-                weight += abs(faced[k])
-            new[i] = min(1.0, max(-1.0, gain * total / weight))
+            new[i] = min(1.0, max(-1.0, gain * total / weight[i]))
         old, new = new, old
     return old
