@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Mask
+from steelyard.team.definite import _inverses
 
 ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
@@ -44,17 +45,11 @@ def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Arr
     count = len(noise)
     if not rows:
         return noise
-    stack = J.reshape(6 * count, 6)
+    stack = np.ascontiguousarray(J).reshape(6 * count, 6)
     variance, least = noise.ravel() ** 2, np.tile(LEAST**2, count)
     likeness = _likeness(count)
-    seen, size, squares = np.empty(2 * count), np.empty(2 * count), np.empty((2 * count, 2 * count))
     for _ in range(ROUNDS):
-        pulled = stack * np.repeat(1 / variance, 3)[:, None]
-        _scores(scatter, variance, pulled, pulled @ np.linalg.inv(pulled.T @ stack), seen, size, squares)
-        slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
-        curve = (0.5 * rows * variance[:, None]) * variance * squares + likeness
-        curve.ravel()[:: 2 * count + 1] += 1e-9 * np.trace(curve) / len(curve)
-        change = np.linalg.solve(curve, slope)
+        change = np.linalg.solve(*_curve_and_slope(scatter, rows, stack, variance, likeness))
         new = np.maximum(variance * (1 + np.maximum(change, -0.9)), least)
         moved = float(np.abs(np.log(new / variance)).max())
         variance = new
@@ -69,6 +64,31 @@ def _likeness(count: int) -> Array:
     out = np.asarray(ALIKE * np.kron(np.eye(count) - 1 / count, np.eye(2)))
     out.flags.writeable = False
     return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _curve_and_slope(
+    scatter: Array, rows: float, stack: Array, variance: Array, likeness: Array
+) -> tuple[Array, Array]:
+    """Return the information (2 N, 2 N) about the logarithms of the variances (2 N,), and the slope (2 N,) there."""
+    parts = len(variance)
+    pulled, held = np.empty_like(stack), np.zeros((1, 6, 6))
+    for a in range(len(stack)):
+        for k in range(6):
+            pulled[a, k] = stack[a, k] / variance[a // 3]
+            for m in range(6):
+                held[0, k, m] += pulled[a, k] * stack[a, m]
+    seen, size, curve = np.empty(parts), np.empty(parts), np.empty((parts, parts))
+    _scores(scatter, variance, pulled, pulled @ _inverses(held)[0][0], seen, size, curve)
+    slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
+    total = 0.0
+    for i in range(parts):
+        for j in range(parts):
+            curve[i, j] = 0.5 * rows * variance[i] * variance[j] * curve[i, j] + likeness[i, j]
+        total += curve[i, i]
+    for i in range(parts):
+        curve[i, i] += 1e-9 * total / parts
+    return curve, slope
 
 
 @numba.njit(cache=True, error_model="numpy")
