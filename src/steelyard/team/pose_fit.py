@@ -84,7 +84,8 @@ class Rows:
 
     def noise(self, noise: Array) -> Array:
         """Return the noise (N, 2) that the residuals show, from one to begin with."""
-        J = np.tile(np.eye(6), (self.data.count, 1, 1))
+        J = np.zeros((self.data.count, 6, 6))
+        J[:, range(6), range(6)] = 1.0
         J[:, 3:, :3] = -cross_matrix(self.team.grasps.position)
         return pose_noise(self.apart, self.data.complete, J, noise)
 

@@ -13,7 +13,7 @@ from steelyard.team.definite import _inverses
 
 ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
-LEAST = np.array([1e-7, 1e-7])
+LEAST = 1e-7
 # Scoring ends where noise changes by less than this share: the step after would change it by about its square.
 SETTLED = 1e-4
 # That robots of a team err alike counts as much as so many rows.
@@ -46,15 +46,7 @@ def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Arr
     if not rows:
         return noise
     stack = np.ascontiguousarray(J).reshape(6 * count, 6)
-    variance, least = noise.ravel() ** 2, np.tile(LEAST**2, count)
-    likeness = _likeness(count)
-    for _ in range(ROUNDS):
-        change = np.linalg.solve(*_curve_and_slope(scatter, rows, stack, variance, likeness))
-        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), least)
-        moved = float(np.abs(np.log(new / variance)).max())
-        variance = new
-        if moved < SETTLED:
-            break
+    variance = _scored(np.ascontiguousarray(scatter), rows, stack, noise.ravel() ** 2, _likeness(count))
     return np.asarray(np.sqrt(variance).reshape(count, 2))
 
 
@@ -67,28 +59,29 @@ def _likeness(count: int) -> Array:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _curve_and_slope(
-    scatter: Array, rows: float, stack: Array, variance: Array, likeness: Array
-) -> tuple[Array, Array]:
-    """Return the information (2 N, 2 N) about the logarithms of the variances (2 N,), and the slope (2 N,) there."""
+def _scored(scatter: Array, rows: float, stack: Array, variance: Array, likeness: Array) -> Array:
+    """Return the variances (2 N,) where scoring from `variance` ends; stack (6 N, 6), likeness (2 N, 2 N)."""
     parts = len(variance)
-    pulled, held = np.empty_like(stack), np.zeros((1, 6, 6))
-    for a in range(len(stack)):
-        for k in range(6):
-            pulled[a, k] = stack[a, k] / variance[a // 3]
-            for m in range(6):
-                held[0, k, m] += pulled[a, k] * stack[a, m]
+    pulled, held = np.empty(stack.shape), np.empty((1, 6, 6))
     seen, size, curve = np.empty(parts), np.empty(parts), np.empty((parts, parts))
-    _scores(scatter, variance, pulled, pulled @ _inverses(held)[0][0], seen, size, curve)
-    slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
-    total = 0.0
-    for i in range(parts):
-        for j in range(parts):
-            curve[i, j] = 0.5 * rows * variance[i] * variance[j] * curve[i, j] + likeness[i, j]
-        total += curve[i, i]
-    for i in range(parts):
-        curve[i, i] += 1e-9 * total / parts
-    return curve, slope
+    for _ in range(ROUNDS):
+        for a in range(len(stack)):
+            pulled[a] = stack[a] / variance[a // 3]
+        held[0] = pulled.T @ stack
+        _scores(scatter, variance, pulled, pulled @ _inverses(held)[0][0], seen, size, curve)
+        slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
+        for i in range(parts):
+            curve[i] = 0.5 * rows * variance[i] * variance * curve[i] + likeness[i]
+        ridge = 1e-9 * np.trace(curve) / parts
+        for i in range(parts):
+            curve[i, i] += ridge
+        change = np.linalg.solve(curve, slope)
+        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), LEAST**2)
+        moved = np.abs(np.log(new / variance)).max()
+        variance = new
+        if moved < SETTLED:
+            break
+    return variance
 
 
 @numba.njit(cache=True, error_model="numpy")
