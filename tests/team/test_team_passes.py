@@ -9,16 +9,18 @@ from scipy.interpolate import CubicSpline
 from steelyard.bench.tables import block
 from steelyard.bench.team_table import _SCALE
 from steelyard.check import Array
+from steelyard.errors import BadValue
 from steelyard.logs.cubic import cubic
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
 from steelyard.team import pose_statistic
 from steelyard.team.adjoint import adjoint_inverse, exp
+from steelyard.team.definite import definite, inverses
 from steelyard.team.pose_noise import _scores
 from steelyard.team.pose_rows import held
 from steelyard.team.pose_solver import SHOWN, Solver, unit
 from steelyard.team.slips import alone, find_slip
-from steelyard.team.turns import turned_by, turns_between, twists_between
+from steelyard.team.turns import moved, turned_by, turns_between, twists_between
 
 
 @pytest.mark.parametrize("rows", [4, 5, 300])
@@ -50,6 +52,28 @@ def test_turns_lead_where_they_say(size: float) -> None:
     one, turns = Rotation.exp(rng.normal(size=3)), rng.normal(0, size, (20, 3))
     led = turned_by(one, turns)
     np.testing.assert_allclose(led.matrix, (one @ Rotation.exp(turns[:, None])).matrix, atol=2e-15)
+    steps = np.concatenate([turns, rng.normal(size=(20, 3))], axis=1)
+    poses = Pose(Rotation.exp(rng.normal(size=(20, 3))), rng.normal(size=(20, 3)))
+    np.testing.assert_allclose(moved(poses, steps).matrix(), (poses @ exp(steps)).matrix(), atol=5e-15)
+
+
+def test_a_step_that_is_no_number_is_refused() -> None:
+    with pytest.raises(BadValue, match="step"):
+        moved(Pose.identity(2), np.full((2, 6), np.nan))
+
+
+@pytest.mark.parametrize("size", [1, 6, 17])
+def test_inverses_and_determinants_of_a_stack(size: int) -> None:
+    root = np.random.default_rng(size).normal(size=(2, 3, size, 2 * size))
+    stack = root @ root.swapaxes(-1, -2)
+    # One that is not positive definite, and has an inverse all the same.
+    stack[1, 2] = np.diag(np.r_[-2.0, np.ones(size - 1)])
+    inverse, logdet = inverses(stack)
+    np.testing.assert_allclose(inverse @ stack, np.broadcast_to(np.eye(size), stack.shape), atol=1e-10)
+    np.testing.assert_allclose(logdet, np.linalg.slogdet(stack)[1], rtol=1e-12, atol=1e-12)
+    assert definite(stack[1]).tolist() == [True, True, False]
+    with pytest.raises(np.linalg.LinAlgError):
+        inverses(np.zeros((1, size, size)))
 
 
 def test_scores_of_noise_from_six_columns() -> None:

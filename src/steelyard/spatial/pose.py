@@ -114,7 +114,10 @@ class Pose:
         return Acceleration(alpha, self.rotation.apply(acceleration.linear) - lever)
 
     def __getitem__(self, index: Any) -> Pose:
-        return Pose(self.rotation[index], self.position[index])
+        rotation, position = self.rotation[index], self.position[index]
+        if position.shape != (*rotation.batch, 3):
+            raise BadValue(f"an index must choose among the batch {self.batch}; {index!r} cuts into the positions.")
+        return Pose._trusted(rotation, position)
 
     @property
     def batch(self) -> tuple[int, ...]:

@@ -10,20 +10,22 @@ from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload_fit import PayloadFit
 from steelyard.team.payload_model import gain_columns
 
+# The features of the motion and the one of a bias among all that `Spectra` scatters.
+SEEN = np.array([*range(12), -1])
+
 
 def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
     """Return d phi / d grasps (10, 6 N) for steps in each grasp's own axes; X_BG (N,) in the balance frame."""
     count = len(X_BG.position)
     turned = turned_by_step(X_BG)
-    right = np.zeros((10, count, 6))
+    right = np.zeros((6 * count, 10))
     for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
         for part, blind in zip(group.parts, blinds, strict=True):
             for W, S in zip(weights, part.scatter, strict=True):
-                pushes = S[:, 12:-1].reshape(len(S), count, 6)
-                change = np.einsum("ab,ikbc,xic->axik", W, turned, pushes, optimize=True)
-                right += np.einsum("pax,axik->pik", basis(), change[:, :12])
-                right -= np.tensordot(blind, change[:, -1], axes=1)
-    return np.asarray(_kept(fit) @ right.reshape(10, -1))
+                pushes = S[SEEN, 12:-1].reshape(len(SEEN), count, 6).transpose(1, 2, 0)
+                change = turned.reshape(count, 36, 6) @ pushes
+                right += change.reshape(6 * count, -1) @ (W @ _levers(blind)).reshape(10, -1).T
+    return np.asarray(_kept(fit) @ right.T)
 
 
 def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
@@ -34,13 +36,16 @@ def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
         for part, blind in zip(group.parts, blinds, strict=True):
             S = part.scatter
             mean = S[:, :, -1].sum(0) / max(float(S[:, -1, -1].sum()), 1e-300)
-            varying = S[:, :, 12 + force] - S[:, :, -1:] * mean[12 + force]
-            pulled = weights @ unit
-            right = np.einsum("pax,kau,kxu->pu", basis(), pulled, varying[:, :12], optimize=True)
-            right -= blind @ np.einsum("kau,ku->au", pulled, varying[:, -1])
-            moved = back @ right
+            varying = (S[:, :, 12 + force] - S[:, :, -1:] * mean[12 + force])[:, SEEN]
+            each = np.einsum("kau,kxu->axu", weights @ unit, varying)
+            moved = back @ _levers(blind).reshape(10, -1) @ each.reshape(-1, len(force))
             out += fit.gain**2 * moved @ moved.T
     return out
+
+
+def _levers(blind: Array) -> Array:
+    """Return what the wrench of a row with features SEEN says of the ten parameters (10, 6, 13) beside its bias."""
+    return np.concatenate([basis(), -blind[..., None]], axis=2)
 
 
 def _kept(fit: PayloadFit) -> Array:

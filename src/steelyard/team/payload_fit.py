@@ -16,6 +16,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
 from steelyard.logs.log import Mask
+from steelyard.team.definite import definite, inverses
 from steelyard.team.payload_model import ROUNDING, Group, Normal, normal, residual_scatter
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
@@ -164,8 +165,8 @@ class Models:
         pulled = np.stack([n.pulled for n in normals])
         bias, gain = np.square(ladder.T)[..., None, None, None]
         spread = bias * C + gain * pulled
-        held = H[:, size:, size:] + np.linalg.inv(spread)
-        inner = np.linalg.inv(held)
+        narrow, wide = inverses(spread)
+        inner, held = inverses(H[:, size:, size:] + narrow)
         blind = H[:, :size, size:] @ inner
         plain = H[:, :size, :size].sum(0) - (blind @ H[:, size:, :size]).sum(1)
         right = g[:, :size].sum(0) - (blind @ g[:, size:, None])[..., 0].sum(1)
@@ -173,10 +174,9 @@ class Models:
         unit = np.outer(scale, scale)
         full = plain * unit
         ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(size)
-        seen = np.linalg.solve(full + ridge, (scale * right)[..., None])[..., 0]
+        seen = (inverses(full + ridge)[0] @ (scale * right)[..., None])[..., 0]
         chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
-        evidence = -0.5 * (chi2 + np.linalg.slogdet(np.eye(size) + full)[1])
-        evidence -= 0.5 * (np.linalg.slogdet(spread)[1] + np.linalg.slogdet(held)[1]).sum(1)
+        evidence = -0.5 * (chi2 + inverses(np.eye(size) + full)[1] + (wide + held).sum(1))
         phi, covariance = _answers(full, sum((n.noise for n in normals), np.zeros((size, size))) * unit, scale * right)
         return cls(
             scale * phi, unit * covariance, plain, evidence, np.asarray(chi2), np.asarray(inner), blind, g[:, size:]
@@ -200,7 +200,13 @@ def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
     What noise in the motion adds to the information is taken out. A lost direction stays at zero, as unsure as a body
     of this mass and size can be.
     """
-    values, vectors = np.linalg.eigh(full - noise)
+    known, all_of = full - noise, np.eye(len(noise))
+    least = np.maximum(SHOWN**-2.0, RANK * np.trace(known, axis1=1, axis2=2))[:, None, None]
+    if definite(known - noise).all() and definite(known - least * all_of).all():
+        # Every direction is shown, whichever they are.
+        inverse = inverses(known)[0]
+        return (inverse @ right[..., None])[..., 0], inverse @ full @ inverse
+    values, vectors = np.linalg.eigh(known)
     shown = shown_of(values, vectors, noise)
     inverse = (vectors * np.where(shown, 1 / np.where(shown, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
     lost = vectors * ~shown[:, None]

@@ -19,9 +19,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.team import pose_rows, pose_statistic
-from steelyard.team.adjoint import adjoint_inverse, exp
+from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.definite import inverses
 from steelyard.team.pose_noise import pose_noise
 from steelyard.team.pose_solver import Shown, Solver
 from steelyard.team.pose_statistic import OWN
@@ -54,49 +55,39 @@ EXACT, NEARLY, ROUGHLY = Close(1e-13, 1e-7, 0.02), Close(1e-8, 1e-5, 0.05), Clos
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """The rows at one set of grasps, homes and delays, with the motion that fits them.
+    """The rows where everything is at `team`, of which the motion fits them best.
 
-    still   the team, its motion as it was before
-    turns   (T, 3, 3), places (T, 3) the motion that fits
     apart   (T, N, 6) residuals from predicted to measured, in the payload's axes
     """
 
     data: TeamMotion
-    still: Team
-    turns: Array
-    places: Array
+    team: Team
     apart: Array
 
     @classmethod
-    def settled(
-        cls, data: TeamMotion, team: Team, noise: Array, sweeps: int = 1, path: tuple[Array, Array] | None = None
-    ) -> Rows:
-        """Return the rows when the motion, or `path`, has followed grasps and homes; noise (N, 2) [rad, m]."""
-        turns, places = path or (team.motion.rotation.matrix, team.motion.position)
-        G, Z = team.grasps, team.homes
+    def settled(cls, data: TeamMotion, team: Team, noise: Array, sweeps: int = 1) -> Rows:
+        """Return the rows when the motion has followed grasps and homes; noise (N, 2) [rad, m]."""
+        G, Z, X = team.grasps, team.homes, team.motion
         W, inverse, pattern = _weights(data, team, noise)
         turns, places, apart = pose_rows.settled(
             data.poses.rotation.matrix, data.poses.position, data.valid, G.rotation.matrix, G.position,
-            Z.rotation.matrix, Z.position, turns, places, data.twists, team.delays, W, inverse, pattern, sweeps,
+            Z.rotation.matrix, Z.position, X.rotation.matrix, X.position, data.twists, team.delays, W, inverse,
+            pattern, sweeps,
         )  # fmt: skip
-        for made in (turns, places, apart):
-            made.flags.writeable = False
-        return cls(data, team, turns, places, apart)
-
-    @cached_property
-    def team(self) -> Team:
-        """Where everything is."""
-        return replace(self.still, motion=Pose(Rotation(self.turns), self.places))
+        apart.flags.writeable = False
+        return cls(data, replace(team, motion=Pose._trusted(Rotation._trusted(turns), places)), apart)
 
     @cached_property
     def residual(self) -> Array:
         """Residuals (T, N, 6) in each grasp's own axes."""
-        return pose_rows.in_own(self.apart, self.still.grasps.rotation.matrix)
+        return pose_rows.in_own(self.apart, self.team.grasps.rotation.matrix)
 
     def noise(self, noise: Array) -> Array:
         """Return the noise (N, 2) that the residuals show, from one to begin with."""
-        along = Pose(Rotation.identity(self.data.count), self.still.grasps.position)
-        return pose_noise(self.apart, self.data.complete, adjoint_inverse(along), noise)
+        J = np.zeros((self.data.count, 6, 6))
+        J[:, range(6), range(6)] = 1.0
+        J[:, 3:, :3] = -cross_matrix(self.team.grasps.position)
+        return pose_noise(self.apart, self.data.complete, J, noise)
 
     def pull(self, noise: Array) -> Array:
         """Return half the gradient of chi^2 (13 N,), sign turned."""
@@ -104,18 +95,18 @@ class Rows:
 
     def pulls(self, noise: Array, rows: int) -> Array:
         """Return what every so many rows add to half the gradient of chi^2 (T / rows, 13 N), sign turned."""
-        G, Z = self.still.grasps, self.still.homes
-        W, inverse, pattern = _weights(self.data, self.still, noise)
+        G, Z, X = self.team.grasps, self.team.homes, self.team.motion
+        W, inverse, pattern = _weights(self.data, self.team, noise)
         return pose_rows.pulled(
-            self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position, self.turns,
-            self.places, self.data.twists, W, inverse, pattern, rows,
+            self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position,
+            X.rotation.matrix, X.position, self.data.twists, W, inverse, pattern, rows,
         )  # fmt: skip
 
 
 def _weights(data: TeamMotion, team: Team, noise: Array) -> tuple[Array, Array, Integers]:
     """Return weights (N, 2), the inverse information about the motion per pattern (C, 6, 6), and patterns (T,)."""
     W, (found, place) = np.asarray(noise**-2.0), data.patterns
-    return W, np.asarray(np.linalg.inv(pose_rows.held(team.grasps.position, W, found))), place
+    return W, inverses(pose_rows.held(team.grasps.position, W, found))[0], place
 
 
 def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
@@ -213,11 +204,11 @@ def fit_poses(
     own = np.arange(OWN if data.twist is not None else OWN - 1)
     unknown = np.concatenate([OWN * i + (own if i != reference else own[OWN - 1 :]) for i in range(count)])
     timed, near = unknown % OWN == OWN - 1, 0 if noise is not None else NEAR
-    team, path = start, None
+    team = start
     noise = np.full((count, 2), GUESS) if noise is None else noise
     step_number = 0
     while True:
-        here = Rows.settled(data, team, noise, 1, path)
+        here = Rows.settled(data, team, noise)
         # Far from the optimum, a robot that starts out badly would be taken for a noisy one and stay where it is.
         new = here.noise(noise) if step_number >= near else noise
         quiet = step_number >= near and bool(np.abs(np.log(new / noise)).max() < close.noise)
@@ -231,6 +222,4 @@ def fit_poses(
             return PoseFit(reference, here, known, noise, unknown)
         full = np.zeros(OWN * count)
         full[unknown] = step
-        each, path = full.reshape(-1, OWN), (here.turns, here.places)
-        moved = exp(each[:, :12].reshape(-1, 2, 6))
-        team = Team(team.grasps @ moved[:, 0], team.homes @ moved[:, 1], team.motion, team.delays + each[:, 12])
+        team = here.team.moved(full.reshape(-1, OWN))

@@ -9,10 +9,11 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Mask
+from steelyard.team.definite import _inverses
 
 ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
-LEAST = np.array([1e-7, 1e-7])
+LEAST = 1e-7
 # Scoring ends where noise changes by less than this share: the step after would change it by about its square.
 SETTLED = 1e-4
 # That robots of a team err alike counts as much as so many rows.
@@ -44,22 +45,8 @@ def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Arr
     count = len(noise)
     if not rows:
         return noise
-    stack = J.reshape(6 * count, 6)
-    variance, least = noise.ravel() ** 2, np.tile(LEAST**2, count)
-    likeness = _likeness(count)
-    seen, size, squares = np.empty(2 * count), np.empty(2 * count), np.empty((2 * count, 2 * count))
-    for _ in range(ROUNDS):
-        pulled = stack * np.repeat(1 / variance, 3)[:, None]
-        _scores(scatter, variance, pulled, pulled @ np.linalg.inv(pulled.T @ stack), seen, size, squares)
-        slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
-        curve = (0.5 * rows * variance[:, None]) * variance * squares + likeness
-        curve.ravel()[:: 2 * count + 1] += 1e-9 * np.trace(curve) / len(curve)
-        change = np.linalg.solve(curve, slope)
-        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), least)
-        moved = float(np.abs(np.log(new / variance)).max())
-        variance = new
-        if moved < SETTLED:
-            break
+    stack = np.ascontiguousarray(J).reshape(6 * count, 6)
+    variance = _scored(np.ascontiguousarray(scatter), rows, stack, noise.ravel() ** 2, _likeness(count))
     return np.asarray(np.sqrt(variance).reshape(count, 2))
 
 
@@ -69,6 +56,32 @@ def _likeness(count: int) -> Array:
     out = np.asarray(ALIKE * np.kron(np.eye(count) - 1 / count, np.eye(2)))
     out.flags.writeable = False
     return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _scored(scatter: Array, rows: float, stack: Array, variance: Array, likeness: Array) -> Array:
+    """Return the variances (2 N,) where scoring from `variance` ends; stack (6 N, 6), likeness (2 N, 2 N)."""
+    parts = len(variance)
+    pulled, held = np.empty(stack.shape), np.empty((1, 6, 6))
+    seen, size, curve = np.empty(parts), np.empty(parts), np.empty((parts, parts))
+    for _ in range(ROUNDS):
+        for a in range(len(stack)):
+            pulled[a] = stack[a] / variance[a // 3]
+        held[0] = pulled.T @ stack
+        _scores(scatter, variance, pulled, pulled @ _inverses(held)[0][0], seen, size, curve)
+        slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
+        for i in range(parts):
+            curve[i] = 0.5 * rows * variance[i] * variance * curve[i] + likeness[i]
+        ridge = 1e-9 * np.trace(curve) / parts
+        for i in range(parts):
+            curve[i, i] += ridge
+        change = np.linalg.solve(curve, slope)
+        new = np.maximum(variance * (1 + np.maximum(change, -0.9)), LEAST**2)
+        moved = np.abs(np.log(new / variance)).max()
+        variance = new
+        if moved < SETTLED:
+            break
+    return variance
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -66,7 +66,7 @@ def _grasps(T_r: Pose, T: Pose) -> Pose:
     A, B = T_r[middle].inverse() @ T_r, T[middle].inverse() @ T
     alpha, beta = (turns_between(Rotation.identity(), X.rotation) for X in (A, B))
     a, b = A.position - A.position.mean(0), B.position - B.position.mean(0)
-    turning, moving = (np.einsum("mi,mkj->kij", x, y, optimize=True) for x, y in ((alpha, beta), (a, b)))
+    turning, moving = (x.T @ y.swapaxes(0, 1) for x, y in ((alpha, beta), (a, b)))
     first = _wahba(turning)
     seen, axes = np.linalg.eigh(alpha.T @ alpha)
     if seen[1] > ONE_AXIS**2 * seen[2] and seen[1] > rows * (10 * ROTATION_NOISE) ** 2:
@@ -102,7 +102,8 @@ def _positions(A: Pose, B: Pose, R: Rotation) -> tuple[Array, Array]:
     # An offset of the row m itself is noise: means are taken away.
     left, right = left - left.mean(0), right - right.mean(0)
     ridge = len(left) * ROTATION_NOISE**2
-    along = np.einsum("mai,mka->ik", left, right, optimize=True)
-    p = np.linalg.solve(np.einsum("mai,maj->ij", left, left) + ridge * np.eye(3), along).T
-    off = np.einsum("mai,ki->mka", left, p, optimize=True) - right
+    along = np.tensordot(left, right, ((0, 1), (0, 2)))
+    held = np.tensordot(left, left, ((0, 1), (0, 1))) + ridge * np.eye(3)
+    p = np.asarray(np.linalg.solve(held, along).T)
+    off = (left @ p.T).swapaxes(1, 2) - right
     return p, (off**2).sum((0, 2)) + ridge * (p**2).sum(1)

@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.logs.log import Integers, Mask
 from steelyard.spatial import Pose
 from steelyard.team.pose_statistic import scatter
+from steelyard.team.turns import moved
 
 
 @dataclass(frozen=True, eq=False)
@@ -89,3 +90,8 @@ class Team:
     homes: Pose
     motion: Pose
     delays: Array
+
+    def moved(self, steps: Array) -> Team:
+        """Return the team with grasps, homes and delays a small step (N, 13) on, the motion where it is."""
+        grasps, homes = moved(self.grasps, steps[:, :6]), moved(self.homes, steps[:, 6:12])
+        return Team(grasps, homes, self.motion, self.delays + steps[:, 12])

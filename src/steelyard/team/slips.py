@@ -180,8 +180,9 @@ def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tupl
         # The few windows of a recording tell the spread along one direction poorly: it is not taken below that of all.
         spread = np.maximum(np.median(along, axis=1), np.median(along)) / 0.6745
         score[good] = ((along / np.maximum(spread, 1e-300)[:, None]) ** 2).sum(0)
-    ends = width + gap
-    return np.pad(score, ends), np.pad(step.T, ((ends, ends), (0, 0)))
+    inner, every = slice(width + gap, len(seen) - width - gap), np.zeros((len(seen), 7))
+    every[inner, 0], every[inner, 1:] = score, step.T
+    return every[:, 0], every[:, 1:]
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.spatial import Pose, Rotation
 
@@ -17,7 +18,14 @@ def turns_between(first: Rotation, second: Rotation) -> Array:
 
 def turned_by(first: Rotation, turns: Array) -> Rotation:
     """Return the rotations (T, 1) that a single one comes to by rotation vectors (T, 3) [rad] in its own axes."""
-    return Rotation._trusted(_turned_by(first.matrix, turns)[:, None])
+    return Rotation._trusted(_turned_by(first.matrix[None], turns)[:, None])
+
+
+def moved(poses: Pose, steps: Array) -> Pose:
+    """Return poses (N,) after small steps (N, 6) in their own axes: rotation vector [rad] and position [m]."""
+    steps, turn = check.vectors("step", steps, 6), poses.rotation
+    turned = Rotation._trusted(_turned_by(turn.matrix, steps[:, :3]))
+    return Pose._trusted(turned, turn._turned(steps[:, 3:]) + poses.position)
 
 
 def twists_between(first: Pose, second: Pose) -> Array:
@@ -59,9 +67,13 @@ def _turns(A: Array, B: Array) -> Array:
 
 @numba.njit(cache=True, error_model="numpy")
 def _turned_by(A: Array, turns: Array) -> Array:
-    """Return A exp(v) (T, 3, 3) for vectors v (T, 3) (Rodrigues; the half angle keeps digits near zero)."""
+    """Return A exp(v) (T, 3, 3) for vectors v (T, 3) (Rodrigues; the half angle keeps digits near zero).
+
+    A (T, 3, 3) or (1, 3, 3).
+    """
     out = np.empty((len(turns), 3, 3))
     for t in range(len(turns)):
+        s = t if len(A) > 1 else 0
         x, y, z = turns[t, 0], turns[t, 1], turns[t, 2]
         square = x * x + y * y + z * z
         a, b = 1 - square / 6, 0.5 - square / 24
@@ -69,7 +81,7 @@ def _turned_by(A: Array, turns: Array) -> Array:
             angle = np.sqrt(square)
             a, b = np.sin(angle) / angle, 2 * (np.sin(0.5 * angle) / angle) ** 2
         for i in range(3):
-            u, v, w = A[i, 0], A[i, 1], A[i, 2]
+            u, v, w = A[s, i, 0], A[s, i, 1], A[s, i, 2]
             out[t, i, 0] = u * (1 - b * (y * y + z * z)) + v * (b * x * y + a * z) + w * (b * x * z - a * y)
             out[t, i, 1] = u * (b * x * y - a * z) + v * (1 - b * (x * x + z * z)) + w * (b * y * z + a * x)
             out[t, i, 2] = u * (b * x * z + a * y) + v * (b * y * z - a * x) + w * (1 - b * (x * x + y * y))
