@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numba
 import numpy as np
@@ -58,7 +59,8 @@ class Ties:
 
     def _swept(self, values: Array, sweeps: int, kept: float, gain: float) -> Array:
         # Numbers as unsigned ones, or numba asks of each whether it counts from the end.
-        index, other = self.index.view(np.uint64), self.other.view(np.uint64)
+        index: Any = self.index.view(np.uint64)
+        other: Any = self.other.view(np.uint64)
         ties = index, self.link, self.start, other, self.faced, self.outward
         return np.asarray(_swept(values, *ties, sweeps, kept, gain))
 

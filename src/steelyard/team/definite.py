@@ -15,7 +15,7 @@ def inverses(stack: Array) -> tuple[Array, Array]:
     Where one is not positive definite, or not for sure, they are those of its general factors.
     """
     flat = stack.reshape(-1, *stack.shape[-2:])
-    inverse, logdet = _inverses(flat)
+    inverse, logdet = inverses_by_pivots(flat)
     doubtful = np.isnan(logdet)
     if doubtful.any():
         inverse[doubtful], logdet[doubtful] = np.linalg.inv(flat[doubtful]), np.linalg.slogdet(flat[doubtful])[1]
@@ -32,13 +32,13 @@ def definite(stack: Array) -> Mask:
 
 
 @numba.njit(cache=True, error_model="numpy")
-def _inverses(stack: Array) -> tuple[Array, Array]:
-    """Return inverses (L, n, n) and logarithms of determinants (L,), NaN where a matrix is not positive definite."""
+def inverses_by_pivots(stack: Array) -> tuple[Array, Array]:
+    """Return inverses (L, n, n) and logarithms of determinants (L,), both NaN where a matrix is not definite."""
     size = stack.shape[1]
     out, logdet, root = np.empty(stack.shape), np.zeros(len(stack)), np.empty((size, size))
     for k in range(len(stack)):
         if not _factor(stack[k], root):
-            logdet[k] = np.nan
+            out[k], logdet[k] = np.nan, np.nan
             continue
         for i in range(size):
             logdet[k] += 2 * np.log(root[i, i])

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Mask
-from steelyard.team.definite import _inverses
+from steelyard.team.definite import inverses_by_pivots
 
 ROUNDS = 60
 # [rad], [m] what encoders resolve at best: noise is not taken below it.
@@ -68,7 +68,7 @@ def _scored(scatter: Array, rows: float, stack: Array, variance: Array, likeness
         for a in range(len(stack)):
             pulled[a] = stack[a] / variance[a // 3]
         held[0] = pulled.T @ stack
-        _scores(scatter, variance, pulled, pulled @ _inverses(held)[0][0], seen, size, curve)
+        _scores(scatter, variance, pulled, pulled @ inverses_by_pivots(held)[0][0], seen, size, curve)
         slope = 0.5 * variance * (seen - rows * size) - likeness @ np.log(variance)
         for i in range(parts):
             curve[i] = 0.5 * rows * variance[i] * variance * curve[i] + likeness[i]
