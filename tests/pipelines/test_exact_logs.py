@@ -20,4 +20,4 @@ def test_a_log_of_which_nothing_is_left_over_is_answered(name: str, tmp_path: Pa
     found = sy.identify(tmp_path / name / "log.toml")
     assert found.mass == pytest.approx(float(known.truth.mass), rel=1e-5)
     assert found.com == pytest.approx(known.truth.com, abs=1e-5)
-    assert "base-tilted" not in found.codes()
+    assert not {"base-tilted", "channel-stuck"} & set(found.codes())

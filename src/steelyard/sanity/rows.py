@@ -83,11 +83,11 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     for quantity in (q for q in _NOISY if q in stream.channels):
         values = stream.channels[quantity]
         same = values[1:] == values[:-1]
-        dead = _dead(values)
+        dead, noisy = _dead(values), _noise_shares(values) > NOISE_SHARE
         for axis in range(3):
             name = f"{quantity} {'xyz'[axis]}"
             others = np.delete(np.arange(3), axis)
-            rows = _frozen_rows(values[:, axis], stream.time) & ~frozen
+            rows = _frozen_rows(values[:, axis], stream.time) & ~frozen & noisy[others].any()
             if dead[axis]:
                 found.append(_stuck(stream, name, "does not change at all while its neighbours do"))
             elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
