@@ -8,7 +8,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 REMEDIES: dict[str, str] = {
-    "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] (or "on-object" if it says "on-sensor" now).',
+    "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] or the [[robot]] ("on-object" if that is "on-sensor").',
     "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
     "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
     "force-unit": "Check the force and torque units of the wrench stream.",

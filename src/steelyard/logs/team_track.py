@@ -106,10 +106,15 @@ class Track:
         return rows
 
     @property
+    def rotation(self) -> Rotation:
+        """Rotations R_HG (T,); identity in rows where `mask("rotation")` is False."""
+        # They were judged when the track was made.
+        return Rotation._trusted(self.channels["rotation"])
+
+    @property
     def pose(self) -> Pose:
         """Poses X_HG (T,); identity in rows where `mask("rotation", "position")` is False."""
-        # They were judged when the track was made.
-        return Pose._trusted(Rotation._trusted(self.channels["rotation"]), self.channels["position"])
+        return Pose._trusted(self.rotation, self.channels["position"])
 
     def wrench(self) -> Array:
         """Return wrenches (T, 6) [N m, N], moment zero for a passive gimbal; zero where `mask("force")` is False."""

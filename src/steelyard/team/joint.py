@@ -30,9 +30,13 @@ from steelyard.team.payload_model import Group, unit_bias
 from steelyard.team.pose_covariance import grasp_covariance
 from steelyard.team.pose_team import PoseTeam
 from steelyard.team.published import require_wrenches
+from steelyard.team.signs import with_one_sign
 from steelyard.team.spectra import band_edges, gathered
 from steelyard.team.team_findings import bad_robots, gains, late_clocks, lost_directions, open_parameters, vertical
 from steelyard.team.twist_team import TwistTeam
+
+# Below this chi^2 per degree of freedom the motion is no measurement.
+LEAST_CHI2 = -0.1
 
 
 @dataclass(frozen=True)
@@ -74,12 +78,14 @@ class JointTeam:
         placed = balance_frame(grasps).inverse() @ grasps
         require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)
-        D = summing(placed)
+        D, turned = with_one_sign(groups, summing(placed), log.names)
         size = team_size(grasps, spread)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
+        _require_one_clock(payload.chi2)
         team = _without_wrists(assembled(log, grasps, spread, payload, D, late), self.wrists)
         found += [
+            *turned,
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *bad_robots(log.names, noise),
@@ -123,6 +129,15 @@ def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEsti
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
     return replace(team, parameters=team.parameters - points)
+
+
+def _require_one_clock(chi2: float) -> None:
+    """Raise CannotAnswer where noise of the motion would explain more of the wrench than there is."""
+    if chi2 < LEAST_CHI2:
+        raise CannotAnswer(
+            f"motion and forces do not belong together: what noise of the motion makes of them is more than all that "
+            f"was measured (chi^2 per degree of freedom {chi2:.3g}). Check units of time and rates of the streams."
+        )
 
 
 def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:

@@ -127,7 +127,7 @@ def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:
     """Return a track's rotations at `time` (M,), and where they were measured."""
     good = track.valid["rotation"]
     if good.all() and len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6):
-        return track.pose.rotation, good
+        return track.rotation, good
     vectors, turned = channel_at(track, "rotation", time)
     return mean_rotation(track) @ Rotation.exp(vectors), turned
 

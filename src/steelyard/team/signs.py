@@ -1,0 +1,60 @@
+"""Whether forces have the sign that they should: each robot's beside the others', and all of them under the weight.
+
+What robots push against one another cancels in the sum over the team. Where one of them says what it feels instead of
+what it applies, it adds up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
+from steelyard.team.payload_model import Group
+
+# What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
+FALLS = 4.0
+
+
+def with_one_sign(groups: Sequence[Group], D: Array, names: Sequence[str]) -> tuple[Array, tuple[Finding, ...]]:
+    """Return D (6, 6 N), the sum of pushes at B, with a robot's sign turned where its forces ask for it, and why.
+
+    Raises CannotAnswer where the forces of all then pull the payload down.
+    """
+    total = [part.scatter.sum(0) for group in groups for part in group.parts]
+    forces = D[3:].reshape(3, -1, 6)
+    lifted = np.sum([np.einsum("aix,ixa->i", forces, S[12:-1, 3:6].reshape(-1, 6, 3)) for S in total], axis=0)
+    each = np.sum([_beside_one_another(S, forces) for S in total], axis=0)
+    turned = each.sum() - 4 * (each.sum(1) - np.diag(each))
+    asking = np.flatnonzero(turned < each.sum() / FALLS)
+    found = []
+    if len(asking):
+        # Of two robots each asks for it: it is the one that pulls down.
+        wrong = int(asking[np.argmin(lifted[asking])])
+        D, lifted = D.copy(), lifted.copy()
+        D[:, 6 * wrong : 6 * wrong + 6] *= -1
+        lifted[wrong] *= -1
+        text = (
+            f"What '{names[wrong]}' and the others push against one another cancels only with its sign turned; it was."
+        )
+        found.append(Finding.of("wrench-sign-flipped", text))
+    mass = float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total))
+    if not mass > 0:
+        raise CannotAnswer(
+            f"the forces must hold the payload up; they add up to a mass of {mass:.3g} kg. Check the sign of the "
+            "forces (what the robot applies to the payload) and gravity in the home frames."
+        )
+    return D, tuple(found)
+
+
+def _beside_one_another(S: Array, forces: Array) -> Array:
+    """Return products (N, N) of what any motion and bias leave of the robots' forces; `forces` (3, N, 6) of pushes."""
+    inner = np.r_[:12, len(S) - 1]
+    pushes = S[12:-1, inner]
+    left = S[12:-1, 12:-1] - pushes @ np.linalg.pinv(S[np.ix_(inner, inner)], 1e-9, hermitian=True) @ pushes.T
+    count = forces.shape[1]
+    one = np.einsum("aix,ixq->aiq", forces, left.reshape(count, 6, -1)).reshape(3, count, count, 6)
+    return np.asarray(np.einsum("aijy,ajy->ij", one, forces))

@@ -1,0 +1,68 @@
+"""Forces of the wrong sign: of one robot they are put right, of all they are refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard.errors import CannotAnswer
+from steelyard.logs.team_log import TeamLog
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import TeamNoise, TeamScene
+from steelyard.team.joint import JointTeam, _require_one_clock
+
+NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
+
+
+def trial(robots: int, sensing: str = "poses", seed: int = 100) -> TeamTrial:
+    kinds = ("still", "motion")
+    rigid = frozenset({0} if robots == 2 else ())  # two gimbals alone let the payload swing
+    return simulate_team(
+        TeamScene(NOISY, robots, sensing=sensing, kinds=kinds, motion_samples=1500, six_axis=rigid), seed
+    )
+
+
+def turned(log: TeamLog, *names: str) -> TeamLog:
+    """Return the log with what these robots push of the other sign."""
+    made = []
+    for recording in log.recordings:
+        tracks = dict(recording.tracks)
+        for name in names:
+            track = tracks[name]
+            pushed = {key: -value for key, value in track.channels.items() if key in ("force", "torque")}
+            tracks[name] = replace(track, channels={**track.channels, **pushed})
+        made.append(replace(recording, tracks=tracks))
+    return log.with_recordings(*made)
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+@pytest.mark.parametrize("robots", [2, 3, 6])
+def test_one_wrong_sign_is_put_right_and_named(robots: int, sensing: str) -> None:
+    made = trial(robots, sensing)  # with twists, bases stand and positions are not measured
+    for name in made.log.names:
+        right, found = JointTeam().identify(made.log), JointTeam().identify(turned(made.log, name))
+        assert "wrench-sign-flipped" in found.codes()
+        assert f"'{name}'" in next(f.message for f in found.findings if f.code == "wrench-sign-flipped")
+        assert found.mass == pytest.approx(right.mass, rel=1e-9)
+        assert "wrench-sign-flipped" not in right.codes()
+
+
+def test_all_signs_wrong_are_refused() -> None:
+    made = trial(3)
+    with pytest.raises(CannotAnswer, match="a mass of -12 kg"):
+        JointTeam().identify(turned(made.log, *made.log.names))
+
+
+@pytest.mark.parametrize("seed", range(100, 106))
+def test_right_signs_are_left_alone(seed: int) -> None:
+    found = JointTeam().identify(trial(3, seed=seed).log)
+    assert "wrench-sign-flipped" not in found.codes()
+
+
+def test_a_motion_that_is_no_measurement_is_refused() -> None:
+    with pytest.raises(CannotAnswer, match="units of time and rates"):
+        _require_one_clock(-9.0)
+    for chi2 in (0.0, 1.0, 50.0, float(np.nan)):
+        _require_one_clock(chi2)
