@@ -103,3 +103,9 @@ def test_holes_of_an_organised_cloud_are_left_out(tmp_path: Path) -> None:
     np.savez(tmp_path / "b.npz", xyz=xyz)
     with pytest.raises(BadFile, match="must be finite"):
         read_cloud(tmp_path / "b.npz")
+
+
+def test_parts_are_told_where_they_belong(tmp_path: Path) -> None:
+    np.savez(tmp_path / "parts.npz", tets=np.zeros((1, 4), int))
+    with pytest.raises(BadFile, match="which --parts takes"):
+        read_cloud(tmp_path / "parts.npz")

@@ -95,7 +95,8 @@ BAD: dict[str, tuple[Callable[[], bytes], str]] = {
     ),
     "no faces": (
         swapped("vertex_indices", "corners"),
-        "F: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both.",
+        "F: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both. "
+        "A cloud is given with --scan.",
     ),
     "far vertex": (swapped("3 0 1 2", "3 0 1 9"), "F: triangles must name vertices 0..2; got 0..9."),
     "nan": (

@@ -15,7 +15,7 @@ from steelyard.shape.scan import fuse
 from steelyard.shape.thinning import spread
 from steelyard.shape.views import Intrinsics, Views
 from steelyard.shape.volume import enclose
-from steelyard.simulate.camera import disturbed
+from steelyard.simulate.camera import D435, disturbed
 from steelyard.simulate.scanning import Scanned, resting_pose, scan_mesh
 from steelyard.spatial import Pose
 
@@ -133,6 +133,15 @@ def test_the_larger_of_two_objects_is_kept_and_said() -> None:
     scan = fuse(scanned(two).views)
     assert [finding.code for finding in scan.findings] == ["several-objects"]
     assert scan.cloud.xyz[:, 0].max() < 0.005
+
+
+@pytest.mark.parametrize(("camera", "lost"), [(D435, False), (SMALL, True)], ids=["fine", "coarse"])
+def test_a_rod_too_thin_for_the_pixels_is_said_to_be_lost(camera: Intrinsics, lost: bool) -> None:
+    grip = block((-0.04, 0.04), (-0.012, 0.012), (0, 0.02))
+    rod = manifold3d.Manifold.cylinder(0.09, 0.0015, 0.0015, 32).rotate((0, 90, 0)).translate((0.04, 0, 0.01))
+    scan = fuse(scan_mesh(mesh_of(grip + rod), 1, count=30, intrinsics=camera, X_WO=LIES).views)
+    assert (np.ptp(scan.cloud.xyz[:, 0]) < 0.15) == lost
+    assert ("surface-open" in {finding.code for finding in scan.findings}) == lost
 
 
 def test_an_empty_table_is_said() -> None:

@@ -29,6 +29,8 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_json: bool) -> None:
     """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""
+    if output is not None and output.suffix.lower() != ".npz":
+        raise BadValue(f"{output}: parts are written as .npz.")
     if output is not None and output.resolve() == scan.resolve():
         raise BadValue(f"{output} is the scan itself; give the parts another name, such as parts.npz.")
     say_if_compiling()

@@ -81,7 +81,8 @@ def _rgb(columns: dict[str, Any]) -> Colours | None:
 def _of_arrays(path: Path) -> tuple[Any, ...]:
     header = ArrayTable.open(path).header  # refuses pickles by their header
     if "xyz" not in header.groups:
-        raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing.')
+        parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
+        raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
     found: list[Any] = []
     with np.load(path, allow_pickle=False) as archive:
         for name in ("xyz", "rgb", "label", "normals", "seen"):

@@ -146,7 +146,8 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     indices = next((face[name] for name in _INDICES if name in face), None)
     if indices is None or not {"x", "y", "z"} <= set(vertex):
         raise BadFile(
-            f"{path}: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both."
+            f"{path}: a mesh needs vertices with x, y, z and faces with vertex_indices; this PLY has not both. "
+            "A cloud is given with --scan."
         )
     if len(indices) and indices.shape[1] != 3:
         raise BadFile(f"{path}: faces have {indices.shape[1]} corners. Save every face as a triangle.")

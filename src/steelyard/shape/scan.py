@@ -16,7 +16,7 @@ from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.registration import agreed
-from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, object_on_table, scene_of, surface_of, surfels
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, object_on_table, scene_of, surface_of, surfels
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.views import TablePlane, Views
@@ -27,6 +27,7 @@ _CLEAR = 3.0  # times the depth noise: what is measured higher than this above t
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
+_LOST = 0.1  # of where the object stands: so much without surface is not a ragged rim
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,13 +75,14 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     patches, disagree, shift = agreed(scene, patches, mask, low, pitch)
     clock.lap("registration")
     xyz, normal = surface_of(scene, patches, mask, low, pitch, points)
+    lost = lost_share(scene, xyz, low, pitch)
     clock.lap("surface")
     xyz, normal, seen, spacing, bottom = _closed(scene, xyz, normal, points)
     clock.lap("underside")
     rgb, coloured = _colours(scene, xyz, normal, seen)
     clock.lap("colour")
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, others, disagree)
+    findings = _findings(scene, others, disagree, lost)
     return Scan(
         cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
         disagree=disagree, moved_m=shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
@@ -159,7 +161,7 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, others: int, disagree: float) -> tuple[Finding, ...]:
+def _findings(scene: Scene, others: int, disagree: float, lost: float) -> tuple[Finding, ...]:
     found = []
     if others:
         found.append(
@@ -174,6 +176,14 @@ def _findings(scene: Scene, others: int, disagree: float) -> tuple[Finding, ...]
                 "views-disagree",
                 f"The views of one surface spread {disagree:.1f} times as far as the depth noise of "
                 f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}.",
+            )
+        )
+    if lost > _LOST:
+        found.append(
+            Finding.of(
+                "surface-open",
+                f"Of where the object stands on the table {100 * lost:.0f} % has no surface in the cloud: it is too "
+                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer.",
             )
         )
     return tuple(found)

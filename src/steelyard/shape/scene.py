@@ -27,6 +27,7 @@ _SEEDS = 4  # points that are settled, for each that stays
 _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the object is sought
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
+_NEAR = 3  # cells of the map of heights: a point so near shows the surface there
 _MARGIN = 0.008  # of table kept around the object [m]
 
 
@@ -41,6 +42,7 @@ class Scene:
     distance: float
     noise: float
     highest: float = np.inf  # point measured over the object [m]
+    stands: Any = None  # cells (I, J) of the map of heights in which the object stands out of the table
 
     @property
     def pixel(self) -> float:
@@ -115,8 +117,18 @@ def object_on_table(scene: Scene) -> tuple[Any, Array, float, int]:
         (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(area > 25)), np.ones((3, 3))
     )
     mine &= ~stranger
+    scene.stands = label == largest
     scene.highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
     return mine, low, pitch, others
+
+
+def lost_share(scene: Scene, xyz: Array, low: Array, pitch: float) -> float:
+    """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
+    covered = np.zeros_like(scene.stands)
+    i, j = np.floor((xyz[:, :2] - low) / pitch).astype(int).T
+    covered[i.clip(0, len(covered) - 1), j.clip(0, covered.shape[1] - 1)] = True
+    covered = ndimage.binary_dilation(covered, np.ones((3, 3)), iterations=_NEAR)
+    return float((scene.stands & ~covered).sum() / scene.stands.sum())
 
 
 def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
