@@ -128,6 +128,12 @@ def test_views_of_a_wrong_scale_are_named(box: Scanned) -> None:
     assert "views-disagree" in found
 
 
+def test_wrong_intrinsics_are_named(box: Scanned) -> None:
+    lens = box.views.intrinsics
+    wrong = replace(box.views, intrinsics=replace(lens, fx=0.8 * lens.fx, fy=0.8 * lens.fy))
+    assert "views-disagree" in {finding.code for finding in fuse(wrong).findings}
+
+
 def test_the_larger_of_two_objects_is_kept_and_said() -> None:
     two = mesh_of(block((-0.05, 0.0), (-0.03, 0.03), (0, 0.03)), block((0.05, 0.07), (-0.01, 0.01), (0, 0.02)))
     scan = fuse(scanned(two).views)

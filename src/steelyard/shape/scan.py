@@ -27,6 +27,7 @@ _CLEAR = 3.0  # times the depth noise: what is measured higher than this above t
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
+_FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _LOST = 0.1  # of where the object stands: so much without surface is not a ragged rim
 
 
@@ -82,7 +83,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     rgb, coloured = _colours(scene, xyz, normal, seen)
     clock.lap("colour")
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, others, disagree, lost)
+    findings = _findings(scene, others, disagree, shift, lost)
     return Scan(
         cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
         disagree=disagree, moved_m=shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
@@ -161,7 +162,7 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, others: int, disagree: float, lost: float) -> tuple[Finding, ...]:
+def _findings(scene: Scene, others: int, disagree: float, shift: float | None, lost: float) -> tuple[Finding, ...]:
     found = []
     if others:
         found.append(
@@ -178,6 +179,9 @@ def _findings(scene: Scene, others: int, disagree: float, lost: float) -> tuple[
                 f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}.",
             )
         )
+    if shift is not None and shift > _FAR:
+        text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed."
+        found.append(Finding.of("views-disagree", text))
     if lost > _LOST:
         found.append(
             Finding.of(
