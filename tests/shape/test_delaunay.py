@@ -10,7 +10,7 @@ from scipy.spatial import Delaunay
 
 from steelyard.shape.complex import Complex
 from steelyard.shape.delaunay import tetrahedra, thinly
-from steelyard.shape.winding import Tree
+from steelyard.shape.tree import Tree
 
 
 def _ball(rng: np.random.Generator) -> np.ndarray:

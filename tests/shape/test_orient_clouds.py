@@ -12,7 +12,8 @@ from steelyard.shape.discs import Discs
 from steelyard.shape.orient import orient
 from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours, areas
-from steelyard.shape.winding import Sight, Tree
+from steelyard.shape.tree import Tree
+from steelyard.shape.winding import Sight
 from steelyard.spatial import Pose, Rotation
 
 

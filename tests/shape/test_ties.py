@@ -10,7 +10,7 @@ from steelyard.shape.orient import SLOPE
 from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours
 from steelyard.shape.ties import Ties
-from steelyard.shape.winding import Tree
+from steelyard.shape.tree import Tree
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import sheet_of
 from steelyard.workshop.solids import ring

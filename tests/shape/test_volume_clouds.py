@@ -15,8 +15,8 @@ from steelyard.shape.complex import Complex
 from steelyard.shape.islands import without_islands
 from steelyard.shape.nesting import winding_number
 from steelyard.shape.tets import TetMesh
+from steelyard.shape.tree import Tree
 from steelyard.shape.volume import Solid, enclose
-from steelyard.shape.winding import Tree
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly

@@ -9,7 +9,8 @@ from scipy.spatial import Delaunay
 from steelyard.shape.cells import cells
 from steelyard.shape.discs import Discs
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.winding import Sight, Tree
+from steelyard.shape.tree import Tree
+from steelyard.shape.winding import Sight
 
 WIDTH = 0.02
 

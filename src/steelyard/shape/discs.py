@@ -14,7 +14,8 @@ import numba
 import numpy as np
 
 from steelyard.shape.mesh import Integers
-from steelyard.shape.winding import FOUR_PI, ONE, Numbers, Sight, Tree, seen, single, sums
+from steelyard.shape.tree import Tree, single, sums
+from steelyard.shape.winding import FOUR_PI, ONE, Numbers, Sight, seen
 
 Array = Any  # single precision here, double at the border
 

@@ -14,7 +14,8 @@ from steelyard.shape.discs import Discs
 from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours, areas
 from steelyard.shape.ties import Ties
-from steelyard.shape.winding import Sight, Tree
+from steelyard.shape.tree import Tree
+from steelyard.shape.winding import Sight
 
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15

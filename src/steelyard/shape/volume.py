@@ -19,7 +19,8 @@ from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_link
 from steelyard.shape.sheets import sheet_planes, stacked
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.ties import Ties
-from steelyard.shape.winding import Sight, Tree
+from steelyard.shape.tree import Tree
+from steelyard.shape.winding import Sight
 
 POINTS = 4000
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
