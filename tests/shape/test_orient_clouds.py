@@ -55,6 +55,13 @@ def test_both_sheets_of_a_plate_thinner_than_the_spacing_are_told_apart(plate: t
     assert ((orient(Cloud(xyz)) * normal).sum(1) > 0.9).mean() > 0.9
 
 
+def test_normals_of_a_wire_thinner_than_flat_pieces_can_follow_leave_it() -> None:
+    along, about = np.random.default_rng(0).uniform(0, 2 * np.pi, (2, 500))
+    spoke = np.stack([np.cos(along), np.sin(along), 0 * along], axis=1)
+    normal = np.cos(about)[:, None] * spoke + np.sin(about)[:, None] * np.array([0.0, 0.0, 1.0])
+    assert ((orient(Cloud(0.1 * spoke + 0.005 * normal)) * normal).sum(1) > 0).mean() > 0.95
+
+
 def test_normals_turn_with_the_cloud_and_do_not_care_about_its_order() -> None:
     xyz, _ = box((0.06, 0.04, 0.03), 700)
     plain = orient(Cloud(xyz))

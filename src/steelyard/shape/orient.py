@@ -29,6 +29,7 @@ _LAST_SWEEPS, _LAST_KEPT = 10, 2.0  # of the last look at signs: a normal turns 
 _LINKED = 3.0  # links of a point that lies on a sheet
 _CERTAIN = 0.3  # of a sign
 _EDGE = 0.5  # width, in spacings, of the field that gives the normals off the sheets
+_EDGE_STEPS = 6
 _SPREAD_AREA = 1.5  # area per point in squared spacings where two sheets lie close
 _JUMP = 0.1  # of a spacing: height over which the jump through a disc is spread
 
@@ -95,7 +96,7 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sig
 
     In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
     toward a winding number of 1/2 at every point and spread along each sheet and across to those that face it, in
-    turn. Points on edges take their normal from the field of all.
+    turn. Points off them, as on edges, are then found anew, with the sheets as they are.
     """
     tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
     plane, link = sheet_planes(xyz, near.index, SLOPE)
@@ -112,8 +113,26 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sig
     normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
     ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), delaunay, spacing)
     normals *= ties.settled(_LAST_SWEEPS, _LAST_KEPT)[:, None]
-    gradient = sight.winding_and_gradient(np.ascontiguousarray(normals[order].T, np.float32), _EDGE * spacing)[1]
-    return np.where(flat[:, None], normals, -tree.back(_units(gradient)).T)
+    return _off_sheets(normals, flat, areas(near, normals), sight, _EDGE * spacing)
+
+
+def _off_sheets(normals: Array, flat: Any, area: Array, sight: Sight, width: float) -> Array:
+    """Return unit normals (N, 3), those of points off the sheets from the dipoles that these lack to a number of 1/2.
+
+    Where both sheets of a wall cancel, the normals on its edges were found beside nothing; the sheets now have their
+    sides. Steps are those of `consistent`, at one width.
+    """
+    tree, order = sight.sources, sight.sources.order
+    free: Any = np.float32(~flat[order])
+    dipoles: Any = np.ascontiguousarray((normals * area[:, None])[order].T, np.float32)
+    sheets, dipoles = (np.float32(1) - free) * dipoles, free * dipoles
+    found = sight.winding(sheets + dipoles, width)
+    for _ in range(_EDGE_STEPS):
+        push = free * sight.adjoint(np.float32(0.5) - found, width)
+        dipoles = dipoles + _length(push, sight.winding(push, width)) * push
+        found, gradient = sight.winding_and_gradient(sheets + dipoles, width)
+        dipoles = -free * np.linalg.norm(dipoles, axis=0) * _units(gradient)
+    return np.where(flat[:, None], normals, tree.back(_units(dipoles)).T)
 
 
 def signed_links(link: Array, plane: Array, normals: Array, index: Any) -> Array:
