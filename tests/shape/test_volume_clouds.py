@@ -175,6 +175,25 @@ def test_millimetres_are_read_as_such(brick: Sheet) -> None:
     assert long.mesh.volume == pytest.approx(brick.volume, rel=0.05)
 
 
+def test_what_would_be_small_in_millimetres_may_be_centimetres_or_inches() -> None:
+    seen = sheet(block((0, 300), (0, 40), (0, 30)), 400).cloud.xyz  # 304 mm across
+    (found,) = enclose(Cloud(100 * seen)).findings
+    assert found.code == "cloud-in-mm"
+    assert found.message.endswith(
+        "then 30.4 mm long. If it is not, they are perhaps centimetres (304 mm) or inches (773 mm)."
+    )
+    (found,) = enclose(Cloud(1000 * seen)).findings
+    assert found.message.endswith("the object is then 304 mm long.")
+
+
+def test_what_is_too_small_to_hold_is_said(brick: Sheet) -> None:
+    tiny = enclose(Cloud(1e-3 * brick.cloud.xyz))
+    (found,) = tiny.findings
+    assert found.code == "cloud-in-mm"
+    assert "The points span 0.0781 mm" in found.message
+    assert tiny.mesh.volume == pytest.approx(1e-9 * brick.volume, rel=0.05)
+
+
 def test_of_two_objects_the_larger_is_kept(brick: Sheet) -> None:
     other = brick.cloud.xyz[:400] * 0.5 + (0.3, 0, 0)
     solid = enclose(Cloud(np.concatenate([other, brick.cloud.xyz])))
