@@ -14,10 +14,10 @@ from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
 from steelyard.io.whole_files import write_bytes
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Colours
 
 SUFFIXES = (".ply", ".pcd", ".npz")
 _LABELS = ("label", "segmentation", "part")
+_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
 
 
@@ -62,14 +62,11 @@ def _stacked(columns: dict[str, Any], names: Any) -> Any:
     return np.stack([np.asarray(columns[name]) for name in names], axis=1)
 
 
-def _rgb(columns: dict[str, Any]) -> Colours | None:
-    """Return colours (N, 3) from red, green, blue (0..255, or 0..1 as floats) or from packed rgb."""
-    for names in (("red", "green", "blue"), ("r", "g", "b")):
+def _rgb(columns: dict[str, Any]) -> Any:
+    """Return colours (N, 3) as they stand in red, green, blue, or from packed rgb; None where there are none."""
+    for names in _COLOURS:
         if set(names) <= set(columns):
-            rgb = _stacked(columns, names)
-            if rgb.dtype.kind == "f" and np.nanmax(rgb, initial=0.0) <= 1:
-                rgb = rgb * 255
-            return np.asarray(np.clip(np.round(np.nan_to_num(rgb)), 0, 255), np.uint8)
+            return _stacked(columns, names)
     for name in ("rgb", "rgba"):
         if name in columns:
             packed = np.ascontiguousarray(columns[name])
@@ -85,7 +82,7 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
     found: list[Any] = []
     with np.load(path, allow_pickle=False) as archive:
-        for name in ("xyz", "rgb", "label", "normals", "seen"):
+        for name in ("xyz", _coloured(header.groups), "label", "normals", "seen"):
             try:
                 values = archive.get(name)
             except Exception as error:  # zip, zlib and numpy each raise their own
@@ -94,6 +91,11 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
                 raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {values.dtype}.')
             found.append(values)
     return tuple(found)
+
+
+def _coloured(names: Any) -> str:
+    """Return the name of the array that holds colours, as other programs call it too."""
+    return next((name for name in ("rgb", "colors", "colours") if name in names), "rgb")
 
 
 def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any) -> Cloud:
