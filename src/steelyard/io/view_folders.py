@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.images import read_colour, read_depth, write_image
+from steelyard.io.images import read_colour, read_depth, require_images, write_image
 from steelyard.io.whole_files import write_bytes
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
@@ -152,6 +152,7 @@ def _table(path: Path) -> TablePlane:
 
 def write_views(views: Views, folder: Path | str) -> None:
     """Write views as a folder; images are named 0000, 0001, ... Raises BadFile."""
+    require_images()
     folder = Path(folder)
     try:
         for name in ("depth", *(["color"] if views.rgb is not None else [])):
