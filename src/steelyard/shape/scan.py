@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from steelyard.check import Array
+from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
@@ -19,6 +20,7 @@ from steelyard.shape.registration import agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, object_on_table, scene_of, surface_of, surfels
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
+from steelyard.shape.view_mistakes import likely_mistake
 from steelyard.shape.views import TablePlane, Views
 
 POINTS = 3000  # of the cloud, about
@@ -27,6 +29,7 @@ _CLEAR = 3.0  # times the depth noise: what is measured higher than this above t
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
+_UNSHARP = 1.5  # times the depth noise: views that spread more and lose surface may have wrong intrinsics
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _LOST = 0.1  # of where the object stands: so much without surface is not a ragged rim
 
@@ -69,6 +72,38 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock = _Clock()
     scene, table = scene_of(views)
     clock.lap("table")
+    try:
+        found = _surface(scene, points, clock)
+    except CannotAnswer as error:
+        raise CannotAnswer(" ".join(filter(None, (str(error), likely_mistake(views))))) from None
+    xyz, normal, seen, spacing, bottom = _closed(scene, found.xyz, found.normal, points)
+    clock.lap("underside")
+    rgb, coloured = _colours(scene, xyz, normal, seen)
+    clock.lap("colour")
+    cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
+    findings = _findings(scene, found)
+    return Scan(
+        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
+        disagree=found.disagree, moved_m=found.shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """What was seen of the object: points (N, 3) and normals, and how well the views agree on them.
+
+    others, disagree, shift, lost   as in `_findings`
+    """
+
+    xyz: Array
+    normal: Array
+    others: int
+    disagree: float
+    shift: float | None
+    lost: float
+
+
+def _surface(scene: Scene, points: int, clock: _Clock) -> _Surface:
     mask, low, pitch, others = object_on_table(scene)
     clock.lap("object")
     patches = surfels(scene, mask, low, pitch)
@@ -78,16 +113,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     xyz, normal = surface_of(scene, patches, mask, low, pitch, points)
     lost = lost_share(scene, xyz, low, pitch)
     clock.lap("surface")
-    xyz, normal, seen, spacing, bottom = _closed(scene, xyz, normal, points)
-    clock.lap("underside")
-    rgb, coloured = _colours(scene, xyz, normal, seen)
-    clock.lap("colour")
-    cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, others, disagree, shift, lost)
-    return Scan(
-        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
-        disagree=disagree, moved_m=shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
-    )  # fmt: skip
+    return _Surface(xyz, normal, others, disagree, shift, lost)
 
 
 class _Clock:
@@ -162,32 +188,37 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, others: int, disagree: float, shift: float | None, lost: float) -> tuple[Finding, ...]:
-    found = []
-    if others:
+def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
+    found, disagree, shift = [], surface.disagree, surface.shift
+    if others := surface.others:
         found.append(
             Finding.of(
                 "several-objects",
                 f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept.",
             )
         )
+    wrong = disagree > _WRONG or (shift is not None and shift > _FAR)
+    why = " " + said if wrong and (said := likely_mistake(scene.views)) else ""
     if disagree > _WRONG:
         found.append(
             Finding.of(
                 "views-disagree",
                 f"The views of one surface spread {disagree:.1f} times as far as the depth noise of "
-                f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}.",
+                f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}."
+                f"{why}",
             )
         )
     if shift is not None and shift > _FAR:
-        text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed."
+        text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed.{why}"
         found.append(Finding.of("views-disagree", text))
-    if lost > _LOST:
+    if (lost := surface.lost) > _LOST:
+        unsharp = f" The views spread {disagree:.1f} times the depth noise: check fx, fy, cx, cy too."
+        unsharp = unsharp if disagree > _UNSHARP else ""
         found.append(
             Finding.of(
                 "surface-open",
                 f"Of where the object stands on the table {100 * lost:.0f} % has no surface in the cloud: it is too "
-                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer.",
+                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer.{unsharp}",
             )
         )
     return tuple(found)
