@@ -269,3 +269,15 @@ def test_published_clouds(name: str, data_dir: Path) -> None:
     assert found.volume_ratio == pytest.approx(1, abs=0.1)
     assert found.iou > 0.9
     assert codes(solid) == set()
+
+
+def test_sides_with_unlike_patterns_of_points_are_closed() -> None:
+    """A ruler as `scan` leaves it: its underside a regular grid, its upper side at random and half as dense."""
+    made = sheet(block((0, 300), (0, 30), (0, 1.5)), 1500)
+    seen = made.cloud.xyz[made.cloud.xyz[:, 2] > 1e-4]
+    x, y = np.meshgrid(np.arange(1, 300, 2.2), np.arange(1, 30, 2.2))
+    below = 1e-3 * np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    solid = enclose(Cloud(np.concatenate([seen, below])))
+    assert solid.mesh.volume == pytest.approx(made.volume, rel=0.05)
+    assert codes(solid) == set()
+    assert "surface-open" in codes(enclose(Cloud(seen)))
