@@ -101,7 +101,7 @@ def test_holes_of_an_organised_cloud_are_left_out(tmp_path: Path) -> None:
     xyz[1, 0] = np.nan
     xyz[1, 1] = 0
     np.savez(tmp_path / "b.npz", xyz=xyz)
-    with pytest.raises(BadFile, match="must be finite"):
+    with pytest.raises(BadFile, match="points must be finite; 1 of 50 are not, the first is point 2"):
         read_cloud(tmp_path / "b.npz")
 
 

@@ -104,6 +104,7 @@ def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
     holes = np.isnan(xyz).all(1)
+    _require_finite(path, xyz, holes)
     try:
         whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
         if holes.any() and not holes.all():
@@ -111,6 +112,15 @@ def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any
         return Cloud(xyz, *whole)
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
+
+
+def _require_finite(path: Path, xyz: Any, holes: Any) -> None:
+    """Raise BadFile where points that are no holes hold NaN or infinity, the first of them counted from 1."""
+    bad = np.flatnonzero(~np.isfinite(xyz).all(1) & ~holes)
+    if len(bad):
+        raise BadFile(
+            f"{path}: points must be finite; {len(bad)} of {len(xyz)} are not, the first is point {bad[0] + 1}."
+        )
 
 
 def write_cloud(cloud: Cloud, path: Path | str) -> None:
