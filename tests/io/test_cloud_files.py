@@ -144,6 +144,12 @@ def test_colours_of_no_known_range_are_refused(tmp_path: Path, suffix: str) -> N
         read_cloud(path)
 
 
+def test_colours_that_rounding_took_over_the_edge_are_clipped() -> None:
+    seen = Cloud(np.eye(3), np.array([[255.3, 0, -0.2]] * 3)).rgb  # type: ignore[arg-type]
+    assert seen is not None
+    assert seen.tolist() == [[255, 0, 0]] * 3
+
+
 def test_colours_by_the_names_of_other_programs(tmp_path: Path) -> None:
     assert CLOUD.rgb is not None
     names = ("diffuse_red", "diffuse_green", "diffuse_blue")

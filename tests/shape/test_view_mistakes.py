@@ -85,3 +85,9 @@ def test_what_no_single_mistake_explains_is_told_what_to_check(right: Views) -> 
         CannotAnswer, match=r"give table\.json\. Otherwise check that the poses are those of the camera"
     ):
         fuse(right.posed(right.X_WC[::-1]))
+
+
+def test_a_principal_point_that_is_off_is_among_what_to_check(right: Views) -> None:
+    (found,) = fuse(seen_by(right, cx=184)).findings
+    assert found.code == "surface-open"
+    assert "check fx, fy, cx, cy in camera.json" in found.message

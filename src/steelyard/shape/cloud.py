@@ -109,12 +109,12 @@ def _colours(values: Any, shape: tuple[int, ...]) -> Colours:
     levels = np.nan_to_num(array.astype(np.float64))
     least, most = float(levels.min()), float(levels.max())
     if array.dtype.kind == "f" and most <= _BRIGHT:
-        levels, most = levels * 255, min(most, 1.0)
+        levels = 255 * np.minimum(levels, 1.0)
     elif array.dtype == np.uint16 and most > 255:
-        levels, most = levels / 257, 255.0
-    if least < 0 or most > 255:
+        levels /= 257
+    if levels.min() <= -1 or levels.max() >= 256:  # rounding may lead a little beyond
         raise BadValue(
             f"colours must be numbers 0 to 255, or floats 0 to 1; they go from {least:.4g} to {most:.4g}. "
             "Scale them, or leave them out."
         )
-    return np.asarray(_column("colours", np.round(np.minimum(levels, 255)), shape, np.uint8))
+    return np.asarray(_column("colours", np.round(np.clip(levels, 0, 255)), shape, np.uint8))

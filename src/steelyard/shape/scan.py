@@ -29,7 +29,6 @@ _CLEAR = 3.0  # times the depth noise: what is measured higher than this above t
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
-_UNSHARP = 1.5  # times the depth noise: views that spread more and lose surface may have wrong intrinsics
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _LOST = 0.1  # of where the object stands: so much without surface is not a ragged rim
 
@@ -92,7 +91,10 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
 class _Surface:
     """What was seen of the object: points (N, 3) and normals, and how well the views agree on them.
 
-    others, disagree, shift, lost   as in `_findings`
+    others    objects that stand beside it
+    disagree  spread of the views, in depth noise
+    shift     rms move of the cameras that made them agree [m], None where none was needed
+    lost      share of where the object stands without surface
     """
 
     xyz: Array
@@ -212,13 +214,12 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
         text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed.{why}"
         found.append(Finding.of("views-disagree", text))
     if (lost := surface.lost) > _LOST:
-        unsharp = f" The views spread {disagree:.1f} times the depth noise: check fx, fy, cx, cy too."
-        unsharp = unsharp if disagree > _UNSHARP else ""
         found.append(
             Finding.of(
                 "surface-open",
                 f"Of where the object stands on the table {100 * lost:.0f} % has no surface in the cloud: it is too "
-                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer.{unsharp}",
+                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer, and check "
+                "fx, fy, cx, cy in camera.json.",
             )
         )
     return tuple(found)
