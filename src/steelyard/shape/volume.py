@@ -179,7 +179,7 @@ def _solid(
     sure = np.minimum(2 * score, 1.0)
     total = float(surface.area.sum())
     gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
-    thin, hole = doubt > _BLURRED, gap > _OPEN and _lid(surface, solid) > _LID
+    thin, hole = doubt > _BLURRED, gap > _OPEN  # areas that do not close leave doubt, whether or not a side is missing
     if thin:
         apart = surface.spacing * cloud.diagonal * 1e3
         text = (
@@ -187,7 +187,7 @@ def _solid(
             f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
         )
         findings += (Finding.of("thin-thickened", text),)
-    if hole:
+    if hole and _lid(surface, solid) > _LID:
         text = (
             f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
         )
