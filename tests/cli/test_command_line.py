@@ -459,6 +459,11 @@ def test_demo(tmp_path: Path) -> None:
     text = page.read_text()
     assert "A hammer, scanned and weighed" in text
     assert "http://" not in text.replace("http://www.w3.org", "")
+    seen = steelyard("scan", kept / "views", "-o", tmp_path / "seen.ply", "--json")
+    assert (seen.status, seen.json["views"], seen.json["findings"]) == (0, 36, [])
+    anew = steelyard("identify", kept / "log.toml", "--scan", kept / "views", "--json")
+    volumes = [[part["volume_m3"] for part in answer["parts"]] for answer in (anew.json, run.json)]
+    assert volumes[0] == pytest.approx(volumes[1], rel=1e-3)
     again = steelyard("identify", kept / "log.toml", "--scan", kept / "hammer.ply", "--json")
     assert again.status == 0
     assert again.json["mass_kg"] == pytest.approx(run.json["mass_kg"], rel=1e-4)
@@ -468,6 +473,16 @@ def test_demo(tmp_path: Path) -> None:
     assert len(cut.json["parts"]) == 2
     assert (tmp_path / "two.npz").exists()
     assert "How many parts, by shape and colour" in steelyard("segment", kept / "hammer.ply").out
+
+
+def test_without_pillow_the_demo_keeps_all_but_the_views(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(sys.modules, "PIL.Image", None)
+    run = steelyard("demo", "-o", tmp_path / "report.html", "--keep", tmp_path)
+    assert run.status == 0
+    assert "The views are not kept: that needs pip install 'steelyard[images]'." in run.err
+    assert sorted(path.name for path in tmp_path.iterdir()) == [
+        "hammer.ply", "log.toml", "parts.npz", "pose.csv", "report.html", "result.json", "wrench.csv",
+    ]  # fmt: skip
 
 
 def test_the_demo_is_slow_enough_beside_people() -> None:

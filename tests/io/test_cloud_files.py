@@ -101,8 +101,61 @@ def test_holes_of_an_organised_cloud_are_left_out(tmp_path: Path) -> None:
     xyz[1, 0] = np.nan
     xyz[1, 1] = 0
     np.savez(tmp_path / "b.npz", xyz=xyz)
-    with pytest.raises(BadFile, match="must be finite"):
+    with pytest.raises(BadFile, match="points must be finite; 1 of 50 are not, the first is point 2"):
         read_cloud(tmp_path / "b.npz")
+
+
+def written(path: Path, rgb: np.ndarray, kind: str, names: tuple[str, ...] = ("red", "green", "blue")) -> Path:
+    """Write CLOUD's points with other colours; `kind` is that of a PLY property."""
+    if path.suffix == ".npz":
+        np.savez(path, xyz=CLOUD.xyz, rgb=rgb)
+        return path
+    if path.suffix == ".ply":
+        fields = [f"property double {axis}" for axis in "xyz"] + [f"property {kind} {name}" for name in names]
+        head = "\n".join(["ply", "format ascii 1.0", "element vertex 50", *fields, "end_header\n"])
+    else:
+        head = (
+            "VERSION 0.7\nFIELDS x y z r g b\nSIZE 8 8 8 4 4 4\nTYPE F F F F F F\nCOUNT 1 1 1 1 1 1\n"
+            "WIDTH 50\nHEIGHT 1\nPOINTS 50\nDATA ascii\n"
+        )
+    rows = np.concatenate([CLOUD.xyz, rgb], axis=1).tolist()
+    whole = [[*map(repr, row[:3]), *(f"{v:.9g}" for v in row[3:])] for row in rows]
+    path.write_text(head + "\n".join(" ".join(row) for row in whole) + "\n")
+    return path
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".pcd", ".npz"])
+@pytest.mark.parametrize("scale", [1 / 255, (1 + 1e-6) / 255, 1.0], ids=["0..1", "rounded above 1", "0..255"])
+def test_colours_as_floats_are_not_black(tmp_path: Path, suffix: str, scale: float) -> None:
+    path = written(tmp_path / f"a{suffix}", scale * np.asarray(CLOUD.rgb, float), "float")
+    assert np.array_equal(read_cloud(path).rgb, CLOUD.rgb)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".npz"])
+def test_colours_of_sixteen_bits_are_not_white(tmp_path: Path, suffix: str) -> None:
+    path = written(tmp_path / f"a{suffix}", 257 * CLOUD.rgb.astype(np.uint16), "ushort")  # type: ignore[union-attr]
+    assert np.array_equal(read_cloud(path).rgb, CLOUD.rgb)
+
+
+@pytest.mark.parametrize("suffix", [".ply", ".pcd", ".npz"])
+def test_colours_of_no_known_range_are_refused(tmp_path: Path, suffix: str) -> None:
+    path = written(tmp_path / f"a{suffix}", np.asarray(CLOUD.rgb, float) / 127.5 - 1, "float")
+    with pytest.raises(BadFile, match=r"a\....: colours must be numbers 0 to 255, or floats 0 to 1; they go from -"):
+        read_cloud(path)
+
+
+def test_colours_that_rounding_took_over_the_edge_are_clipped() -> None:
+    seen = Cloud(np.eye(3), np.array([[255.3, 0, -0.2]] * 3)).rgb  # type: ignore[arg-type]
+    assert seen is not None
+    assert seen.tolist() == [[255, 0, 0]] * 3
+
+
+def test_colours_by_the_names_of_other_programs(tmp_path: Path) -> None:
+    assert CLOUD.rgb is not None
+    names = ("diffuse_red", "diffuse_green", "diffuse_blue")
+    assert np.array_equal(read_cloud(written(tmp_path / "a.ply", CLOUD.rgb, "uchar", names)).rgb, CLOUD.rgb)
+    np.savez(tmp_path / "a.npz", xyz=CLOUD.xyz, colors=CLOUD.rgb / 255)
+    assert np.array_equal(read_cloud(tmp_path / "a.npz").rgb, CLOUD.rgb)
 
 
 def test_parts_are_told_where_they_belong(tmp_path: Path) -> None:

@@ -80,6 +80,14 @@ WRONG: list[tuple[str, Callable[[Path], object], str]] = [
 ]  # fmt: skip
 
 
+def test_lines_are_those_of_the_file_where_some_are_blank(folder: Path) -> None:
+    pose("x", "here")(folder)
+    text = (folder / "poses.csv").read_text().replace("\n", "\n\n")
+    (folder / "poses.csv").write_text(text)
+    with pytest.raises(BadFile, match='line 5, column "x": expected a number; found "here"'):
+        read_views(folder)
+
+
 @pytest.mark.parametrize(("make", "message"), [row[1:] for row in WRONG], ids=[row[0] for row in WRONG])
 def test_wrong_folders(folder: Path, make: Callable[[Path], object], message: str) -> None:
     make(folder)

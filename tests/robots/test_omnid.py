@@ -90,8 +90,8 @@ def test_gimbal_angles_and_rotation_undo_each_other() -> None:
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ((0, 0, np.deg2rad(85)), r"Delta joint 1 must be within 0.0 to 80.0 deg; 1 of 3 rows .* row 0 at 85.0"),
-        ((1, 4, 0.7), r"gimbal joint y must be within -38.2 to 38.2 deg; 1 of 3 rows .* row 1 at 40.1"),
+        ((0, 0, np.deg2rad(85)), r"Delta joint 1 must be within 0.0 to 80.0 deg; 1 of 3 rows .* row 1 at 85.0"),
+        ((1, 4, 0.7), r"gimbal joint y must be within -38.2 to 38.2 deg; 1 of 3 rows .* row 2 at 40.1"),
         ((2, 5, 0.9), r"gimbal joint z must travel at most 40.5 deg; it travels 51.6 deg"),
     ],
 )  # fmt: skip

@@ -175,6 +175,25 @@ def test_millimetres_are_read_as_such(brick: Sheet) -> None:
     assert long.mesh.volume == pytest.approx(brick.volume, rel=0.05)
 
 
+def test_what_would_be_small_in_millimetres_may_be_centimetres_or_inches() -> None:
+    seen = sheet(block((0, 300), (0, 40), (0, 30)), 400).cloud.xyz  # 304 mm across
+    (found,) = enclose(Cloud(100 * seen)).findings
+    assert found.code == "cloud-in-mm"
+    assert found.message.endswith(
+        "then 30.4 mm long. If it is not, they are perhaps centimetres (304 mm) or inches (773 mm)."
+    )
+    (found,) = enclose(Cloud(1000 * seen)).findings
+    assert found.message.endswith("the object is then 304 mm long.")
+
+
+def test_what_is_too_small_to_hold_is_said(brick: Sheet) -> None:
+    tiny = enclose(Cloud(1e-3 * brick.cloud.xyz))
+    (found,) = tiny.findings
+    assert found.code == "cloud-in-mm"
+    assert "The points span 0.0781 mm" in found.message
+    assert tiny.mesh.volume == pytest.approx(1e-9 * brick.volume, rel=0.05)
+
+
 def test_of_two_objects_the_larger_is_kept(brick: Sheet) -> None:
     other = brick.cloud.xyz[:400] * 0.5 + (0.3, 0, 0)
     solid = enclose(Cloud(np.concatenate([other, brick.cloud.xyz])))
@@ -250,3 +269,15 @@ def test_published_clouds(name: str, data_dir: Path) -> None:
     assert found.volume_ratio == pytest.approx(1, abs=0.1)
     assert found.iou > 0.9
     assert codes(solid) == set()
+
+
+def test_sides_with_unlike_patterns_of_points_are_closed() -> None:
+    """A ruler as `scan` leaves it: its underside a regular grid, its upper side at random and half as dense."""
+    made = sheet(block((0, 300), (0, 30), (0, 1.5)), 1500)
+    seen = made.cloud.xyz[made.cloud.xyz[:, 2] > 1e-4]
+    x, y = np.meshgrid(np.arange(1, 300, 2.2), np.arange(1, 30, 2.2))
+    below = 1e-3 * np.column_stack([x.ravel(), y.ravel(), np.zeros(x.size)])
+    solid = enclose(Cloud(np.concatenate([seen, below])))
+    assert solid.mesh.volume == pytest.approx(made.volume, rel=0.05)
+    assert codes(solid) == set()
+    assert "surface-open" in codes(enclose(Cloud(seen)))

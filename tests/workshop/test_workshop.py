@@ -240,6 +240,32 @@ def test_the_verb_writes_folders_that_are_read(tmp_path: Path) -> None:
     )
 
 
+@pytest.mark.parametrize(
+    ("more", "words"),
+    [
+        (("--tools", "rulr"), "There is no tool 'rulr'"),
+        (("--tools", "rulr", "--variants", "2"), "There is no tool 'rulr'"),
+        (("--graded",), "There is no graded tool 'ruler'"),
+    ],
+)
+def test_the_verb_writes_nothing_where_a_name_is_wrong(tmp_path: Path, more: tuple[str, ...], words: str) -> None:
+    first = "hammer" if "--graded" in more else "file"
+    arguments = ["build", str(tmp_path / "out"), "--tools", first, "--tools", "ruler", *more]
+    done = CliRunner().invoke(workshop, arguments)
+    assert isinstance(done.exception, BadValue)
+    assert words in str(done.exception)
+    assert not (tmp_path / "out").exists()
+
+
+def test_the_verb_wants_a_folder_and_each_tool_once(tmp_path: Path) -> None:
+    (tmp_path / "out").write_text("mine")
+    done = CliRunner().invoke(workshop, ["build", str(tmp_path / "out"), "--tools", "ruler"])
+    assert "this is a file" in str(done.exception)
+    assert (tmp_path / "out").read_text() == "mine"
+    done = CliRunner().invoke(workshop, ["build", str(tmp_path / "on"), "--tools", "ruler", "--tools", "ruler"])
+    assert "1 object folder in" in done.stderr
+
+
 def test_the_verb_makes_variants(tmp_path: Path) -> None:
     arguments = ["build", str(tmp_path), "--tools", "screwdriver", "--variants", "2", "--seed", "5"]
     done = CliRunner().invoke(workshop, arguments)

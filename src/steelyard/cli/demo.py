@@ -31,8 +31,10 @@ SEED = 0
     help="The page to write.",
 )  # fmt: skip
 @click.option(
-    "--keep", type=click.Path(path_type=Path), metavar="DIR", help="Keep the made files and the result in this folder."
-)
+    "--keep", type=click.Path(path_type=Path), metavar="DIR",
+    help="Keep the made files and the result in this folder; of the hammer the views too (20 MB, needs "
+    "steelyard[images]).",
+)  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def demo(story: str, seed: int, output: Path, keep: Path | None, as_json: bool) -> None:
     """A whole story on made data, against the truth.
@@ -75,6 +77,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         names = [name for name, _ in _names(best, shape, seen).values()]
         chosen = shape.segmentation.cut(len(best.parts)).named(names)
         api.save_parts(replace(shape, segmentation=chosen), folder / "parts.npz")
+        views = keep and _kept_views(seen, keep / "views")
     write_report(_page(answers, shape, rows, seen, seed), output)
     if as_json:
         keys = ("without_scan", "ols", "geo")
@@ -86,11 +89,26 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     click.echo(estimate_table(best, title, hammer.truth_for_people(seen.truth), _names(best, shape, seen)))
     click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
     say(f"The page with the parts in 3D: {output}")
-    say(
-        f"Log, cloud and parts are in {keep}; try: steelyard identify {log} --parts {keep / 'parts.npz'}"
-        if keep
-        else "Keep log, cloud and parts with --keep DIR."
-    )
+    if keep is None:
+        say("Keep log, views, cloud and parts with --keep DIR.")
+        return
+    say(f"Log, cloud and parts are in {keep}; try: steelyard identify {log} --parts {keep / 'parts.npz'}")
+    if views:
+        say(f"The views are in {views}; try: steelyard scan {views} -o {keep / 'cloud.ply'}")
+    else:
+        say("The views are not kept: that needs pip install 'steelyard[images]'.")
+
+
+def _kept_views(seen: Seen, folder: Path) -> Path | None:
+    """Write the views as a camera would have left them; return the folder, None where nothing writes images here."""
+    from steelyard.errors import MissingDependency
+    from steelyard.io.view_folders import write_views
+
+    try:
+        write_views(seen.views, folder)
+    except MissingDependency:
+        return None
+    return folder
 
 
 def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, Estimate]:

@@ -10,6 +10,7 @@ from typing import Any
 import click
 
 from steelyard.cli.console import print_json, progress_bar, say
+from steelyard.errors import BadValue
 
 
 @click.group(context_settings={"help_option_names": ["-h", "--help"]})
@@ -37,13 +38,17 @@ def build(
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
     from steelyard.io.object_writing import write_object
     from steelyard.simulate.workshop import known_object
-    from steelyard.workshop.catalogue import FAMILIES, build_graded
+    from steelyard.workshop.catalogue import FAMILIES, build_graded, require
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED
 
     begun = time.perf_counter()
     build_tool, families = (build_graded, GRADED) if graded else (build_even, FAMILIES)
-    jobs = [(name, k) for k in range(max(variants, 1)) for name in tools or families]
+    for name in tools:  # all of them before the first is written
+        require(name, graded=graded)
+    if folder.exists() and not folder.is_dir():
+        raise BadValue(f"{folder}: this is a file; give a folder to write the tools into.")
+    jobs = [(name, k) for k in range(max(variants, 1)) for name in dict.fromkeys(tools or families)]
     progress = progress_bar("workshop build")
     rows: list[dict[str, Any]] = []
     for done, (name, k) in enumerate(jobs, start=1):
@@ -63,4 +68,4 @@ def build(
         return
     for row in rows:
         click.echo(f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {row['parts']:2d} parts  {row['half']}")
-    say(f"{len(rows)} object folders in {folder} ({seconds:.1f} s).")
+    say(f"{len(rows)} object folder{'s' * (len(rows) != 1)} in {folder} ({seconds:.1f} s).")

@@ -14,10 +14,10 @@ from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
 from steelyard.io.whole_files import write_bytes
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Colours
 
 SUFFIXES = (".ply", ".pcd", ".npz")
 _LABELS = ("label", "segmentation", "part")
+_COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
 
 
@@ -62,14 +62,11 @@ def _stacked(columns: dict[str, Any], names: Any) -> Any:
     return np.stack([np.asarray(columns[name]) for name in names], axis=1)
 
 
-def _rgb(columns: dict[str, Any]) -> Colours | None:
-    """Return colours (N, 3) from red, green, blue (0..255, or 0..1 as floats) or from packed rgb."""
-    for names in (("red", "green", "blue"), ("r", "g", "b")):
+def _rgb(columns: dict[str, Any]) -> Any:
+    """Return colours (N, 3) as they stand in red, green, blue, or from packed rgb; None where there are none."""
+    for names in _COLOURS:
         if set(names) <= set(columns):
-            rgb = _stacked(columns, names)
-            if rgb.dtype.kind == "f" and np.nanmax(rgb, initial=0.0) <= 1:
-                rgb = rgb * 255
-            return np.asarray(np.clip(np.round(np.nan_to_num(rgb)), 0, 255), np.uint8)
+            return _stacked(columns, names)
     for name in ("rgb", "rgba"):
         if name in columns:
             packed = np.ascontiguousarray(columns[name])
@@ -85,7 +82,7 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
     found: list[Any] = []
     with np.load(path, allow_pickle=False) as archive:
-        for name in ("xyz", "rgb", "label", "normals", "seen"):
+        for name in ("xyz", _coloured(header.groups), "label", "normals", "seen"):
             try:
                 values = archive.get(name)
             except Exception as error:  # zip, zlib and numpy each raise their own
@@ -96,12 +93,18 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
     return tuple(found)
 
 
+def _coloured(names: Any) -> str:
+    """Return the name of the array that holds colours, as other programs call it too."""
+    return next((name for name in ("rgb", "colors", "colours") if name in names), "rgb")
+
+
 def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any) -> Cloud:
     """Return the cloud of finite points; raises BadFile where none is left or columns differ in length."""
     xyz = np.asarray(xyz, np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
     holes = np.isnan(xyz).all(1)
+    _require_finite(path, xyz, holes)
     try:
         whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
         if holes.any() and not holes.all():
@@ -109,6 +112,15 @@ def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any
         return Cloud(xyz, *whole)
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
+
+
+def _require_finite(path: Path, xyz: Any, holes: Any) -> None:
+    """Raise BadFile where points that are no holes hold NaN or infinity, the first of them counted from 1."""
+    bad = np.flatnonzero(~np.isfinite(xyz).all(1) & ~holes)
+    if len(bad):
+        raise BadFile(
+            f"{path}: points must be finite; {len(bad)} of {len(xyz)} are not, the first is point {bad[0] + 1}."
+        )
 
 
 def write_cloud(cloud: Cloud, path: Path | str) -> None:

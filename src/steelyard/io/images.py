@@ -24,6 +24,11 @@ def _pillow() -> Any:
     return PIL.Image
 
 
+def require_images() -> None:
+    """Raise MissingDependency where nothing reads and writes images here."""
+    _pillow()
+
+
 def read_depth(path: Path) -> Depths:
     """Return a depth image (H, W) uint16; raises BadFile where it has not one channel of 16 bits."""
     image = _opened(path)

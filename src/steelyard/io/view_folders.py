@@ -12,7 +12,7 @@ from typing import Any, TypeVar
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.images import read_colour, read_depth, write_image
+from steelyard.io.images import read_colour, read_depth, require_images, write_image
 from steelyard.io.whole_files import write_bytes
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
@@ -92,32 +92,37 @@ def _poses(path: Path) -> tuple[list[str], Pose]:
     """Return the names of the views and the poses (V,) of the camera in W."""
     try:
         with path.open(newline="", encoding="utf-8") as lines:
-            rows = list(csv.DictReader(lines, skipinitialspace=True))
+            reader = csv.DictReader(lines, skipinitialspace=True)
+            numbered = [(reader.line_num, row) for row in reader]  # blank lines are passed over
     except FileNotFoundError:
         raise BadFile(f"{path}: this file is missing. It needs the columns {', '.join(_COLUMNS)}.") from None
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise BadFile(f"{path}: cannot be read as CSV; {error}.") from None
+    line, rows = [number for number, _ in numbered], [row for _, row in numbered]
     if not rows or not set(_COLUMNS) <= {str(key) for key in rows[0]}:
         raise BadFile(f"{path}: expected the columns {', '.join(_COLUMNS)} and a row per view.")
     names, numbers = [], np.empty((len(rows), 7))
     for k, row in enumerate(rows):
-        names.append(_name(path, k + 2, str(row["name"] or "")))
+        names.append(_name(path, line[k], str(row["name"] or "")))
         for c, key in enumerate(_COLUMNS[1:]):
             try:
                 numbers[k, c] = float(row[key] or "")
             except ValueError:
-                raise BadFile(f'{path}: line {k + 2}, column "{key}": expected a number; found "{row[key]}".') from None
+                raise BadFile(
+                    f'{path}: line {line[k]}, column "{key}": expected a number; found "{row[key]}".'
+                ) from None
     if len(set(names)) < len(names):
         twice = next(name for name in names if names.count(name) > 1)
         raise BadFile(f'{path}: the view "{twice}" is named {names.count(twice)} times. Give each view its own name.')
     bad = np.flatnonzero(~np.isfinite(numbers).all(1))
     if len(bad):
-        raise BadFile(f"{path}: line {bad[0] + 2} holds NaN or infinity; {len(bad)} of {len(rows)} poses do.")
+        raise BadFile(f"{path}: line {line[bad[0]]} holds NaN or infinity; {len(bad)} of {len(rows)} poses do.")
     length = np.linalg.norm(numbers[:, 3:], axis=1)
     off = np.flatnonzero(np.abs(length - 1) > _UNIT)
     if len(off):
         raise BadFile(
-            f"{path}: line {off[0] + 2}: the quaternion qw, qx, qy, qz must have length 1; it has {length[off[0]]:.4g}."
+            f"{path}: line {line[off[0]]}: the quaternion qw, qx, qy, qz must have length 1; "
+            f"it has {length[off[0]]:.4g}."
         )
     return names, Pose(Rotation.from_quaternion_wxyz(numbers[:, 3:] / length[:, None]), numbers[:, :3])
 
@@ -152,6 +157,7 @@ def _table(path: Path) -> TablePlane:
 
 def write_views(views: Views, folder: Path | str) -> None:
     """Write views as a folder; images are named 0000, 0001, ... Raises BadFile."""
+    require_images()
     folder = Path(folder)
     try:
         for name in ("depth", *(["color"] if views.rgb is not None else [])):

@@ -59,7 +59,7 @@ class Track:
             raise BadValue(f"time must have shape (T,) with at least one sample; got {time.shape}.")
         falling = np.diff(time) <= 0
         if falling.any():
-            row = int(np.argmax(falling)) + 1
+            row = int(np.argmax(falling)) + 2  # counted from 1, the later of the two
             raise BadValue(f"time must rise from row to row; {int(falling.sum())} rows do not, the first is row {row}.")
         object.__setattr__(self, "time", time)
         channels = {name: _accepted(name, values, len(time)) for name, values in self.channels.items()}

@@ -29,7 +29,15 @@ from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
-from steelyard.sanity import after, dead_channels, examine, fitted_gravity, levelled, untouched
+from steelyard.sanity import (
+    after,
+    dead_channels,
+    examine,
+    fitted_gravity,
+    impossible_density,
+    levelled,
+    untouched,
+)
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -106,6 +114,9 @@ def identify(
     if unmeasured:
         estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())
+    if shape is not None:
+        dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts if known is None else ())
+        estimate = replace(estimate, findings=(*dense, *estimate.findings))
     if parts is not None and not isinstance(parts, Parts):
         before = (*before, *parts.findings)
     if parts is not None and not any(recording.object_pose_std or ()):
@@ -185,6 +196,12 @@ def _shape(parts: Parts | Shape, recording: Recording) -> Placed:
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts.parts)
     return placed, cuts.prior, replace(parts.error, **grasp)
+
+
+def _volume(parts: Parts | Shape | None, placed: Placed) -> tuple[float, float]:
+    """Return the volume of a shape [m^3] and its standard deviation, as a share of it."""
+    std = placed[2].stretch if parts is None or isinstance(parts, Parts) else parts.solid.volume_std
+    return float(placed[0][0].volume.sum()), std
 
 
 def _require_metres(parts: Parts) -> None:

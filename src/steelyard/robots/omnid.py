@@ -150,6 +150,6 @@ def _refuse(angle: Array, low: float, high: float, name: str) -> None:
         row = int(np.argmax(outside))
         raise BadValue(
             f"{name} must be within {np.rad2deg(low):.1f} to {np.rad2deg(high):.1f} deg; {int(outside.sum())} of "
-            f"{len(angle)} rows are not, the first is row {row} at {np.rad2deg(angle[row]):.1f} deg. Check the order "
-            "of the joint columns and their unit."
+            f"{len(angle)} rows are not, the first is row {row + 1} at {np.rad2deg(angle[row]):.1f} deg. Check the "
+            "order of the joint columns and their unit."
         )

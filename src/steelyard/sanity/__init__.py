@@ -3,7 +3,8 @@
 from steelyard.sanity.after import after
 from steelyard.sanity.before import examine
 from steelyard.sanity.contact import untouched
+from steelyard.sanity.density import impossible_density
 from steelyard.sanity.gravity import fitted_gravity, levelled
 from steelyard.sanity.rows import dead_channels
 
-__all__ = ["after", "dead_channels", "examine", "fitted_gravity", "levelled", "untouched"]
+__all__ = ["after", "dead_channels", "examine", "fitted_gravity", "impossible_density", "levelled", "untouched"]

@@ -16,6 +16,7 @@ from steelyard.shape.spacing import Neighbours
 from steelyard.spatial import Pose
 
 Flags = np.ndarray[Any, np.dtype[np.bool_]]
+_BRIGHT = 2.0  # floats up to here are 0..1, some of them overexposed: read as 0..255 they would all be black
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,7 +24,7 @@ class Cloud:
     """N points of the visible surface in one frame.
 
     xyz      (N, 3) [m]
-    rgb      (N, 3) uint8, None where colours are not known
+    rgb      (N, 3) uint8, None where colours are not known; given as floats 0..1 or numbers 0..255
     label    (N,) label of the true part that each point lies on, None where it is not known
     normals  (N, 3) unit vectors that leave the solid, None where they are not known
     seen     (N,) whether a camera saw the colour of each point; the rest have that of the nearest that one saw.
@@ -42,7 +43,7 @@ class Cloud:
             raise BadValue(f"a cloud needs points (N, 3), N > 0; got {xyz.shape}.")
         object.__setattr__(self, "xyz", xyz)
         if self.rgb is not None:
-            object.__setattr__(self, "rgb", _column("colours", self.rgb, xyz.shape, np.uint8))
+            object.__setattr__(self, "rgb", _colours(self.rgb, xyz.shape))
         if self.label is not None:
             object.__setattr__(self, "label", _column("labels", self.label, xyz.shape[:1], np.int64))
         if self.normals is not None:
@@ -98,3 +99,22 @@ def _column(name: str, values: Any, shape: tuple[int, ...], dtype: type) -> Any:
         raise BadValue(f"a cloud of {shape[0]} points needs {name} of shape {shape}; got {array.shape}.")
     array.flags.writeable = False
     return array
+
+
+def _colours(values: Any, shape: tuple[int, ...]) -> Colours:
+    """Return colours (N, 3) as 8 bits, of numbers 0..255, floats 0..1 or 16-bit numbers; what is not known is black."""
+    array = np.asarray(values)
+    if array.dtype == np.uint8 or array.dtype.kind not in "fiu" or array.shape != shape:
+        return np.asarray(_column("colours", array, shape, np.uint8))
+    levels = np.nan_to_num(array.astype(np.float64))
+    least, most = float(levels.min()), float(levels.max())
+    if array.dtype.kind == "f" and most <= _BRIGHT:
+        levels = 255 * np.minimum(levels, 1.0)
+    elif array.dtype == np.uint16 and most > 255:
+        levels /= 257
+    if levels.min() <= -1 or levels.max() >= 256:  # rounding may lead a little beyond
+        raise BadValue(
+            f"colours must be numbers 0 to 255, or floats 0 to 1; they go from {least:.4g} to {most:.4g}. "
+            "Scale them, or leave them out."
+        )
+    return np.asarray(_column("colours", np.round(np.clip(levels, 0, 255)), shape, np.uint8))

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from steelyard.check import Array
+from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
@@ -19,6 +20,7 @@ from steelyard.shape.registration import agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, object_on_table, scene_of, surface_of, surfels
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
+from steelyard.shape.view_mistakes import likely_mistake
 from steelyard.shape.views import TablePlane, Views
 
 POINTS = 3000  # of the cloud, about
@@ -69,6 +71,41 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock = _Clock()
     scene, table = scene_of(views)
     clock.lap("table")
+    try:
+        found = _surface(scene, points, clock)
+    except CannotAnswer as error:
+        raise CannotAnswer(" ".join(filter(None, (str(error), likely_mistake(views))))) from None
+    xyz, normal, seen, spacing, bottom = _closed(scene, found.xyz, found.normal, points)
+    clock.lap("underside")
+    rgb, coloured = _colours(scene, xyz, normal, seen)
+    clock.lap("colour")
+    cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
+    findings = _findings(scene, found)
+    return Scan(
+        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
+        disagree=found.disagree, moved_m=found.shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
+    )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Surface:
+    """What was seen of the object: points (N, 3) and normals, and how well the views agree on them.
+
+    others    objects that stand beside it
+    disagree  spread of the views, in depth noise
+    shift     rms move of the cameras that made them agree [m], None where none was needed
+    lost      share of where the object stands without surface
+    """
+
+    xyz: Array
+    normal: Array
+    others: int
+    disagree: float
+    shift: float | None
+    lost: float
+
+
+def _surface(scene: Scene, points: int, clock: _Clock) -> _Surface:
     mask, low, pitch, others = object_on_table(scene)
     clock.lap("object")
     patches = surfels(scene, mask, low, pitch)
@@ -78,16 +115,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     xyz, normal = surface_of(scene, patches, mask, low, pitch, points)
     lost = lost_share(scene, xyz, low, pitch)
     clock.lap("surface")
-    xyz, normal, seen, spacing, bottom = _closed(scene, xyz, normal, points)
-    clock.lap("underside")
-    rgb, coloured = _colours(scene, xyz, normal, seen)
-    clock.lap("colour")
-    cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, others, disagree, shift, lost)
-    return Scan(
-        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
-        disagree=disagree, moved_m=shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
-    )  # fmt: skip
+    return _Surface(xyz, normal, others, disagree, shift, lost)
 
 
 class _Clock:
@@ -162,32 +190,36 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, others: int, disagree: float, shift: float | None, lost: float) -> tuple[Finding, ...]:
-    found = []
-    if others:
+def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
+    found, disagree, shift = [], surface.disagree, surface.shift
+    if others := surface.others:
         found.append(
             Finding.of(
                 "several-objects",
                 f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept.",
             )
         )
+    wrong = disagree > _WRONG or (shift is not None and shift > _FAR)
+    why = " " + said if wrong and (said := likely_mistake(scene.views)) else ""
     if disagree > _WRONG:
         found.append(
             Finding.of(
                 "views-disagree",
                 f"The views of one surface spread {disagree:.1f} times as far as the depth noise of "
-                f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}.",
+                f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}."
+                f"{why}",
             )
         )
     if shift is not None and shift > _FAR:
-        text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed."
+        text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed.{why}"
         found.append(Finding.of("views-disagree", text))
-    if lost > _LOST:
+    if (lost := surface.lost) > _LOST:
         found.append(
             Finding.of(
                 "surface-open",
                 f"Of where the object stands on the table {100 * lost:.0f} % has no surface in the cloud: it is too "
-                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer.",
+                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer, and check "
+                "fx, fy, cx, cy in camera.json.",
             )
         )
     return tuple(found)

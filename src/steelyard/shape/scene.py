@@ -12,8 +12,9 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
-from steelyard.shape.table_plane import find_table, table_frame, table_spreads
+from steelyard.shape.table_plane import find_table, looked_at, table_frame, table_spreads
 from steelyard.shape.thinning import in_cubes, spread_to
+from steelyard.shape.view_mistakes import advice
 from steelyard.shape.views import TablePlane, Views
 from steelyard.spatial import Pose
 
@@ -64,24 +65,17 @@ def scene_of(views: Views) -> tuple[Scene, TablePlane]:
     R, p = views.X_WC.rotation.matrix, views.X_WC.position
     stride = max(1, int(np.sqrt(views.depth.size / _SAMPLES)))
     sampled = images.sampled(views.depth, views.depth_unit, views.intrinsics.vector, R, p, stride)
-    looks = _looked_at(R, p)
+    looks = looked_at(R, p)
     distance = float(np.median(np.linalg.norm(p - looks, axis=1)))
-    table = find_table(sampled[:, :3], p, distance, views.table)
+    try:
+        table = find_table(sampled[:, :3], p, distance, views.table)
+    except CannotAnswer as error:
+        raise CannotAnswer(f"{error} {advice(views)}") from None
     X_WT = table_frame(table, looks)
     noise = _depth_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), views.depth_unit, distance)
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
     return Scene(views, X_WT, R.copy(), p.copy(), distance, noise), table
-
-
-def _looked_at(R: Array, p: Array) -> Array:
-    """Return the point (3,) nearest to all optical axes; where they are parallel, half a metre along the first."""
-    axis = R[:, :, 2]
-    across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
-    # A weak pull, so that a single view has an answer too.
-    start = p.mean(0) + 0.5 * axis.mean(0)
-    H = across.sum(0) + 1e-3 * np.eye(3)
-    return np.asarray(np.linalg.solve(H, np.einsum("vij,vj->i", across, p) + 1e-3 * start))
 
 
 def _depth_noise(sampled: Array, xyz: Array, unit: float, distance: float) -> float:
@@ -137,7 +131,10 @@ def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
     floor = -4 * scene.sigma - 2 * cell
     layers = int((min(scene.highest, _REACH * scene.distance) - floor) / cell) + 2
     found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, mask, low, pitch, cell, floor, layers, scene.noise)
-    return np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
+    found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
+    if not len(found):
+        raise CannotAnswer("no object was found on the table: the views agree on no surface there.")
+    return found
 
 
 def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int) -> Array:

@@ -14,7 +14,7 @@ from steelyard.shape.views import TablePlane
 from steelyard.spatial import Pose, Rotation
 
 _TRIES, _JUDGED = 300, 3000  # planes tried, points that judge them
-_NEAR = 0.012  # of the distance: a point this near a plane counts as on it
+NEAR = 0.012  # of the distance: a point this near a plane counts as on it
 _LEAST = 0.2  # share of the points that must lie on the table
 _ROUNDS = 8
 _FEW = 30  # points of one view that its noise is not told from
@@ -30,13 +30,13 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
 
     Raises CannotAnswer where fewer than a fifth of the points lie on one plane.
     """
-    near = _NEAR * distance
-    plane = start or _largest_plane(points, cameras, near)
+    near = NEAR * distance
+    plane = start or largest_plane(points, cameras, near)
     height = plane.height(points)
     if (share := float((np.abs(height) < near).mean())) < _LEAST:
         raise CannotAnswer(
             f"no table was found: {100 * share:.0f} % of the measured points lie on one plane below the cameras, "
-            f"expected {100 * _LEAST:.0f} % or more. Give table.json, or move the camera so that more of it is seen."
+            f"expected {100 * _LEAST:.0f} % or more."
         )
     for _ in range(_ROUNDS):
         on = np.abs(height) < near
@@ -47,7 +47,18 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
     return plane
 
 
-def _largest_plane(points: Array, cameras: Array, near: float) -> TablePlane:
+def looked_at(R: Array, p: Array) -> Array:
+    """Return the point (3,) nearest to all optical axes; where they are parallel, half a metre along the first."""
+    axis = R[:, :, 2]
+    across = np.eye(3) - axis[:, :, None] * axis[:, None, :]
+    # A weak pull, so that a single view has an answer too.
+    start = p.mean(0) + 0.5 * axis.mean(0)
+    H = across.sum(0) + 1e-3 * np.eye(3)
+    return np.asarray(np.linalg.solve(H, np.einsum("vij,vj->i", across, p) + 1e-3 * start))
+
+
+def largest_plane(points: Array, cameras: Array, near: float) -> TablePlane:
+    """Return the plane that most of points (N, 3) are within `near` of, no camera (V, 3) below; or CannotAnswer."""
     rng = np.random.default_rng(0)
     a, b, c = points[rng.integers(len(points), size=(3, _TRIES))]
     normal = np.cross(b - a, c - a)
@@ -60,7 +71,7 @@ def _largest_plane(points: Array, cameras: Array, near: float) -> TablePlane:
     votes[((cameras @ normal.T - offset) < near).any(0)] = -1
     best = int(np.argmax(votes))
     if votes[best] <= 0:
-        raise CannotAnswer("no table was found: no plane of measured points has all cameras above it. Give table.json.")
+        raise CannotAnswer("no table was found: no plane of measured points has all cameras above it.")
     return TablePlane(normal[best], float(offset[best]))
 
 

@@ -48,7 +48,10 @@ class Intrinsics:
                 )
         for name, value, size in (("cx", self.cx, self.width), ("cy", self.cy, self.height)):
             if not -0.5 <= value <= size - 0.5:
-                raise BadValue(f"the camera's {name} must lie inside the image, 0..{size - 1}; got {value:g}.")
+                raise BadValue(
+                    f"the camera's {name} must lie inside the image, 0..{size - 1}; got {value:g}. "
+                    "Give the intrinsics of images of this size."
+                )
 
     @property
     def vector(self) -> Array:
@@ -141,5 +144,5 @@ def _require_depth(depth: Depths, unit: float) -> None:
     if not NEAREST <= middle <= FARTHEST:
         raise BadValue(
             f"the depth unit of {unit:g} m puts the scene {middle:.3g} m away (median), "
-            f"expected {NEAREST:g} to {FARTHEST:g} m. Correct depth_unit_m."
+            f"expected {NEAREST:g} to {FARTHEST:g} m. Correct depth_unit_m: 0.001 is for depth in millimetres."
         )

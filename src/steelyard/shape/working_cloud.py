@@ -14,7 +14,8 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.spacing import Neighbours
 
 LEAST = 20  # points that can show a solid
-_TOO_LONG_M = 5.0  # no object that an arm holds is longer
+_TOO_LONG_M, _TOO_SHORT_M = 5.0, 0.005  # no object that an arm holds is longer, or shorter
+_DOUBTFUL_M = 0.1  # shorter than this once read as millimetres: they may have been centimetres or inches
 _SAME = 1e-7  # of the diagonal: points nearer than this are one
 _FLAT = 1e-4  # of the longest extent: less depth than this is a plane
 _DRAWN = 12  # points drawn for each that is kept
@@ -41,9 +42,19 @@ def working_cloud(cloud: Cloud, most: int) -> tuple[Cloud, tuple[Finding, ...]]:
 
 
 def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
-    if cloud.diagonal <= _TOO_LONG_M:
+    span = cloud.diagonal
+    if span < _TOO_SHORT_M:
+        text = f"The points span {1e3 * span:.3g} mm: an object so small cannot be held, but they were read as metres."
+        remedy = "Give the points in metres: they seem to have been scaled down once too often."
+        return cloud, [Finding("cloud-in-mm", text, remedy)]
+    if span <= _TOO_LONG_M:
         return cloud, []
-    text = f"The points span {cloud.diagonal:.4g} m, more than an arm can hold; they were read as millimetres."
+    text = (
+        f"The points span {span:.4g} m, more than an arm can hold; they were read as millimetres: "
+        f"the object is then {span:.3g} mm long."
+    )
+    if 1e-3 * span < _DOUBTFUL_M:
+        text += f" If it is not, they are perhaps centimetres ({10 * span:.3g} mm) or inches ({25.4 * span:.3g} mm)."
     return replace(cloud, xyz=cloud.xyz * 1e-3), [Finding.of("cloud-in-mm", text)]
 
 

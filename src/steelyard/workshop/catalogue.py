@@ -53,13 +53,19 @@ TABLE_II: Mapping[str, tuple[float, int]] = MappingProxyType({
 })  # fmt: skip
 
 
+def require(name: str, *, graded: bool = False) -> None:
+    """Raise BadValue where there is no family of this name, or no graded form of it."""
+    known = GRADED if graded else FAMILIES
+    if name not in known:
+        raise BadValue(f"There is no {'graded ' * graded}tool '{name}'; there are: {', '.join(known)}.")
+
+
 def build(name: str, seed: int | Sequence[int] | None = None) -> Tool:
     """Return a tool of the family `name`: the nominal one, or the variant of that seed.
 
     Raises BadValue where there is no such family.
     """
-    if name not in FAMILIES:
-        raise BadValue(f"There is no tool '{name}'; there are: {', '.join(FAMILIES)}.")
+    require(name)
     rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(name.encode())])
     return FAMILIES[name](Draw(rng))
 
@@ -69,8 +75,7 @@ def build_graded(name: str, seed: int | Sequence[int] | None = None) -> Tool:
 
     Surfaces, labels and colours are those of the even tool. Raises BadValue where the family has no graded form.
     """
-    if name not in GRADED:
-        raise BadValue(f"There is no graded tool '{name}'; there are: {', '.join(GRADED)}.")
+    require(name, graded=True)
     rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(f"graded-{name}".encode())])
     tool = build(name, seed)
     return replace(graded(tool, GRADED[name](Draw(rng))), name=f"graded-{name}")

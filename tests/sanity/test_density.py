@@ -1,0 +1,84 @@
+"""Densities that no material has: shapes of the wrong scale and masses that are not the object's alone."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+from steelyard.findings import Finding
+from steelyard.identify.estimate import Estimate, PartMass
+from steelyard.parts.parts import Parts
+from steelyard.pipelines.shape_in_parts import shape_of
+from steelyard.sanity import impossible_density
+from steelyard.shape.cloud import Cloud
+from steelyard.simulate import hammer
+from steelyard.workshop.sampling import surface_cloud
+
+VOLUME = 1e-4  # of 0.62 kg: 6200 kg/m^3
+
+
+@pytest.fixture(scope="module")
+def made() -> hammer.Example:
+    return hammer.recording(0)
+
+
+@pytest.fixture(scope="module")
+def answer(made: hammer.Example) -> Estimate:
+    return sy.identify(made.recording, parts=made.tool.parts)
+
+
+def part(mass: float, std: float, density: float, label: int = 3) -> PartMass:
+    return PartMass(label, mass, std, mass / density, np.zeros(3))
+
+
+def named(estimate: Estimate) -> list[Finding]:
+    return [f for f in estimate.findings if f.code == "materials-impossible"]
+
+
+@pytest.mark.parametrize("density", [6.0, 12.0, 900.0, 7850.0, 19300.0, 22590.0])
+def test_what_materials_have_is_not_named(answer: Estimate, density: float) -> None:
+    assert impossible_density(answer, answer.mass / density, 0.025, [part(0.3, 0.001, density)]) == ()
+
+
+@pytest.mark.parametrize(("density", "words"), [(2.0, "as light"), (60_000.0, "as dense")])
+def test_what_none_has_is_named_unless_the_bar_reaches_one(answer: Estimate, density: float, words: str) -> None:
+    (found,) = impossible_density(answer, answer.mass / density, 0.025)
+    assert found.code == "materials-impossible"
+    assert words in found.message
+    assert "--tool" in found.remedy
+    assert impossible_density(answer, answer.mass / density, 0.9) == ()
+
+
+def test_a_part_is_named_by_its_label_where_its_own_bar_excludes_a_material(answer: Estimate) -> None:
+    (found,) = impossible_density(answer, VOLUME, 0.025, [part(0.3, 0.01, 7850.0, 0), part(0.3, 0.01, 60_000.0)])
+    assert found.message.startswith("Part 3, 0.3 kg in 5 cm^3, has a density of 6e+04 ± 2e+03 kg/m^3")
+    assert "Part 0" not in found.message
+    assert impossible_density(answer, VOLUME, 0.025, [part(0.3, 0.1, 60_000.0)]) == ()
+
+
+@pytest.mark.parametrize(
+    ("per_metre", "words"), [(100.0, "centimetres taken for millimetres"), (39.3701, "inches taken for millimetres")]
+)
+def test_a_cloud_in_other_units_is_named_with_them(made: hammer.Example, per_metre: float, words: str) -> None:
+    seen = surface_cloud(made.tool)
+    found = sy.identify(made.recording, scan=shape_of(Cloud(per_metre * seen.xyz, seen.rgb)))
+    assert found.findings[0].code == "materials-impossible"
+    assert words in found.findings[0].message
+    assert "cloud-in-mm" in found.codes()
+
+
+def test_a_mesh_of_a_tenth_of_its_size_is_named_by_every_method(made: hammer.Example) -> None:
+    tenth = Parts(made.tool.parts.label, made.tool.parts.moments * np.repeat([1e-3, 1e-4, 1e-5], [1, 3, 6]))
+    for method in ("auto", "noise-aware"):
+        found = named(sy.identify(made.recording, sy.Options(method=method), parts=tenth))  # type: ignore[arg-type]
+        assert [f.message[:9] for f in found] == ["The whole"], method
+        assert "centimetres taken for millimetres" in found[0].message
+
+
+def test_the_right_shape_is_not_named(made: hammer.Example, answer: Estimate) -> None:
+    assert named(answer) == []
+    moved = replace(made.recording, object_pose_std=(0.001, 0.01))
+    assert named(sy.identify(moved, parts=made.tool.parts)) == []
