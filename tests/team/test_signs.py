@@ -12,6 +12,8 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.team.joint import JointTeam, _require_one_clock
+from steelyard.team.mass_and_com import require_lift
+from steelyard.team.published import PublishedTeam
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 
@@ -53,6 +55,18 @@ def test_all_signs_wrong_are_refused() -> None:
     made = trial(3)
     with pytest.raises(CannotAnswer, match="a mass of -12 kg"):
         JointTeam().identify(turned(made.log, *made.log.names))
+
+
+def test_both_methods_refuse_in_the_same_words() -> None:
+    wrong, said = turned(trial(3).log, "robot0", "robot1", "robot2"), []
+    for method, forces in ((JointTeam(), "the forces"), (PublishedTeam(), "the still forces")):
+        with pytest.raises(CannotAnswer) as refused:
+            method.identify(wrong)
+        said.append(str(refused.value).removeprefix(forces))
+    assert said[0] == said[1]
+    with pytest.raises(CannotAnswer, match="the springs must hold the payload up; they add up to a mass of nan kg"):
+        require_lift(float("nan"), "the springs")
+    require_lift(1e-3, "the springs")
 
 
 @pytest.mark.parametrize("seed", range(100, 106))

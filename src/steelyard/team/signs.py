@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
+from steelyard.team.mass_and_com import require_lift
 from steelyard.team.payload_model import Group
 
 # What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
@@ -41,12 +41,7 @@ def with_one_sign(groups: Sequence[Group], D: Array, names: Sequence[str]) -> tu
             f"What '{names[wrong]}' and the others push against one another cancels only with its sign turned; it was."
         )
         found.append(Finding.of("wrench-sign-flipped", text))
-    mass = float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total))
-    if not mass > 0:
-        raise CannotAnswer(
-            f"the forces must hold the payload up; they add up to a mass of {mass:.3g} kg. Check the sign of the "
-            "forces (what the robot applies to the payload) and gravity in the home frames."
-        )
+    require_lift(float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total)), "the forces")
     return D, tuple(found)
 
 
