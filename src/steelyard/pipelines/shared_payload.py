@@ -19,6 +19,7 @@ from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.team import PublishedTeam, TeamEstimate
+from steelyard.team.angle_units import require_one_angle_unit
 from steelyard.team.joint import JointTeam
 
 Method = Literal["joint", "paper"]
@@ -38,6 +39,7 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     """
     if method not in METHODS:
         raise BadValue(f"method must be one of {', '.join(METHODS)}; got {method!r}.")
+    require_one_angle_unit(log)
     found = ESTIMATORS[method].identify(log)
     return replace(found, findings=(*_missing_rows(log), *_missing_wrenches(log, method), *found.findings))
 
