@@ -4,17 +4,15 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording
-from steelyard.logs.team_track import Track
-from steelyard.spatial import Rotation
-from steelyard.team.turns import turns_between
+from steelyard.team.turning_speed import turning_speed
 
 # Turning so many times as fast as the others, to within this factor, is degrees beside radians.
 DEGREES, WITHIN = 180 / np.pi, 2.0
-# They must turn in step: least correlation of how fast. Rates are taken over so long [s], in so many places.
-IN_STEP, OVER_S, PLACES = 0.6, 0.05, 200
+# They must turn in step: least correlation of how fast. Rates are taken over so long [s], in so many places,
+# of which so many must be measured by all.
+IN_STEP, OVER_S, PLACES, FEWEST = 0.6, 0.05, 200, 50
 # Faster than so many times the usual is a jump.
 JUMP = 4.0
 # Shorter recordings [s] are not judged.
@@ -33,10 +31,14 @@ def _require_one_unit(recording: TeamRecording) -> None:
     if end - begin < SHORTEST_S:
         return
     time = np.linspace(begin, end - OVER_S, PLACES)
-    rates = {name: found for name, track in recording.tracks.items() if (found := _rates(track, time)) is not None}
+    every = {name: turning_speed(track, time, OVER_S) for name, track in recording.tracks.items()}
+    rates = {name: speed for name, speed in every.items() if np.isfinite(speed).mean() > 0.5}
     if len(rates) < 2:
         return
     names, speed = list(rates), np.stack(list(rates.values()))
+    speed = speed[:, np.isfinite(speed).all(0)]
+    if speed.shape[1] < FEWEST:
+        return
     # Angles that go round at half a turn jump where they are misread.
     size = np.median(speed, axis=1)
     speed = np.minimum(speed, JUMP * size[:, None])
@@ -52,18 +54,3 @@ def _require_one_unit(recording: TeamRecording) -> None:
                 f"'{recording.name}', in step with it: its angles look like {looks}. Set the unit of its "
                 '"joint_position", "rotation" or "angular_velocity", or that of the other robot.'
             )
-
-
-def _rates(track: Track, time: Array) -> Array | None:
-    """Return how fast a grasp turns (T,) [rad/s] at `time` (T,); None where it was not measured."""
-    name = "rotation" if track.has("rotation") else "angular_velocity"
-    if not track.has(name):
-        return None
-    good = track.valid[name]
-    known, values = (track.time, track.channels[name]) if good.all() else (track.time[good], track.channels[name][good])
-    first, last = (np.minimum(np.searchsorted(known, time + later), len(known) - 1) for later in (0.0, OVER_S))
-    if name == "angular_velocity":
-        return np.asarray(np.linalg.norm(values[first], axis=1))
-    turns = turns_between(Rotation._trusted(values[first]), Rotation._trusted(values[last]))
-    seconds = known[last] - known[first]
-    return np.asarray(np.linalg.norm(turns, axis=1) * (seconds > 0) / np.maximum(seconds, 1e-9))
