@@ -21,6 +21,7 @@ from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
 from steelyard.team.clock_search import F, searched
 from steelyard.team.estimate import TeamEstimate
+from steelyard.team.exchanged import require_own_files
 from steelyard.team.hinge import Split, find_split, rigidity_findings
 from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
@@ -73,6 +74,8 @@ class JointTeam:
             jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
             if jointed is not None:
                 return jointed
+            if standing.rough:
+                require_own_files(log)
             found = [*standing.findings, *rigidity_findings(split, log.names)]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
