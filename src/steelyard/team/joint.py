@@ -122,6 +122,7 @@ class JointTeam:
         team = replace(team, clock_offsets_s=_added(team.clock_offsets_s, begun))
         found = [
             *hinge_findings(team),
+            *team.findings,
             *(finding for finding in standing if finding.code in ("robot-left", "robot-joined")),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *gains(payload.gain),
