@@ -246,16 +246,43 @@ def test_wrong_descriptions(files: Path, what: str) -> None:
     assert str(error.value).startswith(said)
 
 
-def test_degrees_called_radians_are_no_angles_of_an_omnid(files: Path) -> None:
-    table = files.with_suffix("") / "robot1-motion-5.csv"
+def rewritten(files: Path, name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
+    """Write one table of the team anew, its joint angles changed."""
+    table = files.with_suffix("") / name
     head, *rows = table.read_text().splitlines()
     numbers = np.array([row.split(",") for row in rows], float)
-    numbers[:, 1:7] = np.rad2deg(numbers[:, 1:7])
+    numbers[:, 1:7] = change(numbers[:, 1:7])
     np.savetxt(table, numbers, delimiter=",", header=head, comments="")
+
+
+def test_degrees_called_radians_are_named_with_the_key_to_set(files: Path) -> None:
+    rewritten(files, "robot1-motion-5.csv", np.rad2deg)
     with pytest.raises(
-        BadInput, match=r'\("robot1"\), recording 6: Delta joint 1 must be within -25.0 to 105.0 deg; 200 of 200 rows'
+        BadInput,
+        match=r'\("robot1"\), recording 6: joint angles look like degrees that are read as "rad": they would be between '
+        r'.* deg, where no Omnid works. Set unit = "deg" for "joint_position".',
     ):
         read_team(files)
+
+
+@pytest.mark.parametrize("recording", ["motion-5", "still-2"])
+def test_radians_called_degrees_are_named_with_the_key_to_set(files: Path, recording: str) -> None:
+    rewritten(files, f"robot1-{recording}.csv", np.deg2rad)
+    with pytest.raises(
+        BadInput, match=r'\("robot1"\).*: joint angles look like radians that are read as "deg": .*Set unit = "rad" for'
+    ):
+        read_team(files)
+
+
+def test_joints_in_another_order_are_no_matter_of_units(files: Path) -> None:
+    rewritten(files, "robot1-motion-5.csv", lambda q: q[:, [3, 4, 5, 0, 1, 2]] - 1.0)
+    with pytest.raises(BadInput, match=r'\("robot1"\), recording 6: Delta joint 1 must be within -25.0 to 105.0 deg;'):
+        read_team(files)
+
+
+def test_an_arm_parked_below_where_it_works_is_read(files: Path) -> None:
+    rewritten(files, "robot1-still-2.csv", lambda q: 0.05 * q + np.deg2rad([2.0, 2.0, 2.0, 0.0, 0.0, 0.0]))
+    assert read_team(files).names == ("robot0", "robot1", "robot2")
 
 
 def test_counts_that_differ_need_names(files: Path) -> None:

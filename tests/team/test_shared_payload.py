@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -11,7 +12,7 @@ import steelyard as sy
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.pipelines.shared_payload import METHODS, identify_team
+from steelyard.pipelines.shared_payload import METHODS, Method, _missing_wrenches, identify_team
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team import TeamEstimate
@@ -58,6 +59,46 @@ def test_missing_rows_are_said_and_cost_only_their_data(method: str) -> None:
     moments = trial().truth.moments
     assert cut.principal_moments is not None
     np.testing.assert_allclose(cut.principal_moments, moments, rtol=0.03)
+
+
+def without(log: TeamLog, number: int, name: str, *channels: str) -> TeamLog:
+    """Return the log without one robot's channels in one recording, or without its track where none are named."""
+    recordings = list(log.recordings)
+    tracks = dict(recordings[number].tracks)
+    track = tracks.pop(name)
+    if channels:
+        tracks[name] = track.without(*channels)
+    recordings[number] = replace(recordings[number], tracks=tracks)
+    return log.with_recordings(*recordings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("channels", "lacks"), [((), "recording"), (("force",), "force")])
+def test_a_recording_that_a_robot_lacks_is_said(method: Method, channels: tuple[str, ...], lacks: str) -> None:
+    log = without(trial().log, 2, "robot1", *channels)
+    rows = len(trial().log.recordings[2].tracks["robot1"])
+    found = identify_team(log, method)
+    (said,) = [f for f in found.findings if f.code == "rows-missing"]
+    assert said.message.startswith(f"'robot1' has no {lacks} of 'still-2': {rows} rows tell nothing of mass, centre")
+    assert found.evidence.samples <= identify_team(trial().log, method).evidence.samples - rows
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_who_was_away_or_held_nothing_lacks_nothing(method: Method) -> None:
+    log = without(trial().log, 2, "robot1")
+    away = replace(log.recordings[2], away=frozenset({"robot1"}))
+    recordings = (*log.recordings[:2], away, *log.recordings[3:])
+    found = identify_team(log.with_recordings(*recordings), method)
+    assert "rows-missing" not in found.codes()
+    log = without(trial().log, 2, "robot1", "force")
+    track = log.recordings[2].tracks["robot1"]
+    idle = replace(track, carrying=np.zeros(len(track), np.bool_))
+    free = replace(log.recordings[2], tracks={**log.recordings[2].tracks, "robot1": idle})
+    assert "rows-missing" not in {f.code for f in _missing_wrenches(log.with_recordings(free), method)}
+    # Nobody's force is missing where nobody's was to be measured.
+    for name in log.names:
+        log = without(log, 0, name, "force") if log.recordings[0].tracks[name].has("force") else log
+    assert {f.message.split("'")[3] for f in _missing_wrenches(log, method)} == {"still-2"}
 
 
 @pytest.mark.parametrize("method", METHODS)

@@ -10,8 +10,10 @@ import pytest
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import TeamNoise, TeamScene
+from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
 from steelyard.team.joint import JointTeam, _require_one_clock
+from steelyard.team.mass_and_com import require_lift
+from steelyard.team.published import PublishedTeam
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 
@@ -52,6 +54,45 @@ def test_one_wrong_sign_is_put_right_and_named(robots: int, sensing: str) -> Non
 def test_all_signs_wrong_are_refused() -> None:
     made = trial(3)
     with pytest.raises(CannotAnswer, match="a mass of -12 kg"):
+        JointTeam().identify(turned(made.log, *made.log.names))
+
+
+def test_both_methods_refuse_in_the_same_words() -> None:
+    wrong, said = turned(trial(3).log, "robot0", "robot1", "robot2"), []
+    for method, forces in ((JointTeam(), "the forces"), (PublishedTeam(), "the still forces")):
+        with pytest.raises(CannotAnswer) as refused:
+            method.identify(wrong)
+        said.append(str(refused.value).removeprefix(forces))
+    assert said[0] == said[1]
+    with pytest.raises(CannotAnswer, match="the springs must hold the payload up; they add up to a mass of nan kg"):
+        require_lift(float("nan"), "the springs")
+    require_lift(1e-3, "the springs")
+
+
+def hinged() -> TeamTrial:
+    held = Hinge(
+        frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
+        np.array([-0.6, 0.0, 0.0]),
+    )  # fmt: skip
+    return simulate_team(
+        TeamScene(NOISY, 4, sensing="poses", kinds=("still", "motion"), motion_samples=1500, hinge=held), 100
+    )
+
+
+def test_a_wrong_sign_is_put_right_beside_a_hinge() -> None:
+    made = hinged()
+    right = JointTeam().identify(made.log)
+    assert right.codes() == {"payload-jointed"}
+    for name in ("robot0", "robot3"):
+        found = JointTeam().identify(turned(made.log, name))
+        assert found.codes() == {"payload-jointed", "wrench-sign-flipped"}
+        assert f"'{name}'" in next(f.message for f in found.findings if f.code == "wrench-sign-flipped")
+        np.testing.assert_allclose(found.parameters.vector, right.parameters.vector, rtol=1e-9, atol=1e-9)
+
+
+def test_all_signs_wrong_are_refused_beside_a_hinge() -> None:
+    made = hinged()
+    with pytest.raises(CannotAnswer, match="the forces must hold the payload up; they add up to a mass of -1"):
         JointTeam().identify(turned(made.log, *made.log.names))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +13,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
 from steelyard.io.description import default_gravity
+from steelyard.io.joint_angles import require_likely
 from steelyard.io.stream_entries import StreamSpec
 from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
 from steelyard.io.tables import Table, find_file
@@ -22,9 +23,6 @@ from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRob
 from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
 from steelyard.logs.team_track import Track
 from steelyard.robots.omnid import Omnid
-
-# Readings may pass a stop by play and by the zero of an encoder; where most do by more than this [rad] they are others.
-_BEYOND = np.deg2rad(25.0)
 
 
 def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
@@ -189,7 +187,7 @@ def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
     joints = channels["joint_position"]
     good = np.isfinite(joints).all(1)
     robot = Omnid()
-    _require_likely(robot, joints[good])
+    require_likely(robot, joints[good])
     pose = robot.pose(joints[good])
     out["rotation"], out["position"] = np.full((len(joints), 3, 3), np.nan), np.full((len(joints), 3), np.nan)
     out["rotation"][good], out["position"][good] = pose.rotation.matrix, pose.position
@@ -198,14 +196,3 @@ def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
         out["force"] = np.full((len(joints), 3), np.nan)
         out["force"][both] = robot.wrench(joints[both], channels["joint_torque"][both]).force
     return out
-
-
-def _require_likely(robot: Omnid, joints: Array) -> None:
-    """Raise BadValue where joint angles (T, 6) [rad] are those of no Omnid, so that columns or units are others."""
-    low, high = robot.arm_limits
-    x, y, z = (stop + _BEYOND for stop in robot.gimbal_stops)
-    wide = replace(robot, arm_limits=(low - _BEYOND, high + _BEYOND), gimbal_stops=(x, y, z))
-    try:
-        wide.require_within(np.median(joints, axis=0))
-    except BadValue:
-        wide.require_within(joints)

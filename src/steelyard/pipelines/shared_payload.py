@@ -16,8 +16,10 @@ from typing import Literal, get_args
 
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
-from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_rows import common_time
 from steelyard.team import PublishedTeam, TeamEstimate
+from steelyard.team.angle_units import require_one_angle_unit
 from steelyard.team.joint import JointTeam
 
 Method = Literal["joint", "paper"]
@@ -37,8 +39,9 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     """
     if method not in METHODS:
         raise BadValue(f"method must be one of {', '.join(METHODS)}; got {method!r}.")
+    require_one_angle_unit(log)
     found = ESTIMATORS[method].identify(log)
-    return replace(found, findings=(*_missing_rows(log), *found.findings))
+    return replace(found, findings=(*_missing_rows(log), *_missing_wrenches(log, method), *found.findings))
 
 
 def _missing_rows(log: TeamLog) -> Iterator[Finding]:
@@ -53,3 +56,32 @@ def _missing_rows(log: TeamLog) -> Iterator[Finding]:
                     "rows-missing",
                     f"'{name}' has no number in {most} of {len(track)} rows of '{recording.name}' ({shown}).",
                 )
+
+
+def _missing_wrenches(log: TeamLog, method: Method) -> Iterator[Finding]:
+    """Yield a finding for every robot without a wrench in a recording of which others have theirs: the sum is short."""
+    weighed = log.recordings
+    if method == "paper":
+        weighed = tuple(r for r in weighed if r.kind == "still" or r in log.of_kind("motion"))
+    for recording in weighed:
+        if not any(track.has("force") for track in recording.tracks.values()):
+            continue
+        for name in log.names:
+            rows = 0 if name in recording.away else _rows_without_wrench(log, recording, name)
+            if rows:
+                lacks = "force" if name in recording.tracks else "recording"
+                yield Finding.of(
+                    "rows-missing",
+                    f"'{name}' has no {lacks} of '{recording.name}': {rows} rows tell nothing of mass, centre of mass "
+                    "and inertia. Say away = true there if the robot held nothing.",
+                )
+
+
+def _rows_without_wrench(log: TeamLog, recording: TeamRecording, name: str) -> int:
+    """Return in how many rows a robot of which no wrench was measured may have carried; 0 where one was."""
+    track = recording.tracks.get(name)
+    if track is None:
+        return len(common_time(recording, log.names))
+    if "force" in track.channels:
+        return 0
+    return len(track) if track.carrying is None else int(track.carrying.sum())

@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
 from steelyard.identify.estimate import Evidence
 from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters
@@ -26,7 +27,9 @@ from steelyard.team.hinged_bodies import FROM_TEN, both_bodies, second_body, see
 from steelyard.team.hinged_payload import HingedPayload, Kind, fit_hinged_payload
 from steelyard.team.hinged_poses import GUESS, Hinged, HingedFit, finished, fit_hinged, followed, rates
 from steelyard.team.hinged_rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame
+from steelyard.team.hinged_signs import robot_of_other_sign
 from steelyard.team.hinged_start import first_hinged
+from steelyard.team.mass_and_com import require_lift
 from steelyard.team.motion_noise import shares_of
 from steelyard.team.payload_doubt import turned_by_step
 from steelyard.team.pose_statistic import OWN
@@ -97,11 +100,12 @@ def identify_two_bodies(
     """
     parts, fit, late = fit_two_bodies(log, split, clocks)
     team, sums = fit.team, Sums.of(fit.team)
-    kinds = _kinds(log, parts, fit, sums, highest_hz)
+    kinds, turned = _kinds(log, parts, fit, sums, highest_hz)
     size = reach(team.grasps)
     six_axis = np.repeat([not log.force_only(name) for name in log.names], 6)
     force = np.arange(len(six_axis)) % 6 >= 3
     payload = fit_hinged_payload(kinds, sums, np.where(force, 1.0, size * six_axis), size, gains)
+    require_lift(float(payload.parameters[0]), "the forces")
     doubt, frame = _Doubt.of(payload, fit, force), hinge_frame(team)
     seventeen = payload.parameters - _wrists(log, team, wrists)
     units, whole = payload.scale[:WHOLE], slice(0, WHOLE)
@@ -128,7 +132,7 @@ def identify_two_bodies(
         identified=known(body, outer, units) if payload.lost.size else np.ones(10, np.bool_),
         frame=log.reference, reference=log.reference, grasps=grasps,
         clock_offsets_s=late if clocks else {},
-        clock_offset_std_s=_late_std(fit, log) if clocks else {}, hinge=hinge,
+        clock_offset_std_s=_late_std(fit, log) if clocks else {}, hinge=hinge, findings=turned,
     )  # fmt: skip
     return found, payload
 
@@ -182,14 +186,22 @@ def _late_std(fit: HingedFit, log: TeamLog) -> dict[str, float]:
     return {name: float(np.sqrt(max(v, 0.0))) for name, v in zip(log.names, variance, strict=True)}
 
 
-def _kinds(log: TeamLog, parts: tuple[Stretch, ...], fit: HingedFit, sums: Sums, highest_hz: float) -> tuple[Kind, ...]:
-    """Return the recordings with complete wrenches, at rest and in motion. Raises CannotAnswer where there are none."""
+def _kinds(
+    log: TeamLog, parts: tuple[Stretch, ...], fit: HingedFit, sums: Sums, highest_hz: float
+) -> tuple[tuple[Kind, ...], tuple[Finding, ...]]:
+    """Return the recordings with complete wrenches, at rest and in motion, and whose sign was turned.
+
+    Raises CannotAnswer where there are none.
+    """
     gravity, made, start = mean_gravity(log, fit.team.homes), [], 0
     for part in parts:
         rows = slice(start, start + len(part))
         start += len(part)
         team = fit.team.rows(rows)
         made.append((team, fit.residual[rows], *bodies_of(part, team, gravity, highest_hz)))
+    wrong, turned = robot_of_other_sign([(team, one, two) for team, _, one, two in made], sums, log.names, highest_hz)
+    if wrong is not None:
+        made = [(team, left, _turned(one, wrong), _turned(two, wrong)) for team, left, one, two in made]
     out = []
     for still in (True, False):
         some = [row for row in made if row[2].runs and row[2].still == still]
@@ -203,7 +215,13 @@ def _kinds(log: TeamLog, parts: tuple[Stretch, ...], fit: HingedFit, sums: Sums,
         raise CannotAnswer(
             "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
         )
-    return tuple(out)
+    return tuple(out), turned
+
+
+def _turned(body: BodyRows, robot: int) -> BodyRows:
+    """Return the rows with what one robot pushes of the other sign."""
+    own = np.arange(body.runs[0].pushed.shape[1] if body.runs else 0) // 6 == robot
+    return replace(body, runs=tuple(replace(run, pushed=np.where(own, -run.pushed, run.pushed)) for run in body.runs))
 
 
 def _motion_noise(ones: list[BodyRows], left: list[Array], fit: HingedFit, edges: Array, highest_hz: float) -> Array:

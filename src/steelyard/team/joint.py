@@ -6,7 +6,7 @@ per recording
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -19,7 +19,9 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, summing
+from steelyard.team.clock_search import F, searched
 from steelyard.team.estimate import TeamEstimate
+from steelyard.team.exchanged import require_own_files
 from steelyard.team.hinge import Split, find_split, rigidity_findings
 from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
@@ -60,18 +62,20 @@ class JointTeam:
         require_wrenches(log)
         self._require_wrists(log)
         if needs_twists(log):
-            moving = TwistTeam.of(log, self.clocks)
+            log, moving, begun = self._fitted(log, TwistTeam.of)
             grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
-            standing = PoseTeam.of(log, self.clocks)
+            log, standing, begun = self._fitted(log, PoseTeam.of)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
             late, order = _against(standing.late, log.reference), 2
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
-            jointed = None if split is None else self._jointed(log, split, standing.findings)
+            jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
             if jointed is not None:
                 return jointed
+            if standing.rough:
+                require_own_files(log)
             found = [*standing.findings, *rigidity_findings(split, log.names)]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
@@ -83,7 +87,7 @@ class JointTeam:
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
         _require_one_clock(payload.chi2)
-        team = _without_wrists(assembled(log, grasps, spread, payload, D, late), self.wrists)
+        team = _without_wrists(assembled(log, grasps, spread, payload, D, _added(late, begun)), self.wrists)
         found += [
             *turned,
             *lost_directions(team.grasps, down),
@@ -94,7 +98,16 @@ class JointTeam:
         ]
         return replace(team, findings=tuple(found))
 
-    def _jointed(self, log: TeamLog, split: Split, standing: Sequence[Finding]) -> TeamEstimate | None:
+    def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, dict[str, float]]:
+        """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""
+        team = of(log, self.clocks)
+        if not (self.clocks and team.rough):
+            return log, team, {}
+        return searched(log, team, lambda moved: of(moved, True))
+
+    def _jointed(
+        self, log: TeamLog, split: Split, standing: Sequence[Finding], begun: Mapping[str, float]
+    ) -> TeamEstimate | None:
         """Return the estimate of two bodies with a hinge, None where there is no hinge or too little is shown of it.
 
         Numbers that degenerate on the way count as too little. Of the rigid fit's findings (`standing`), only who let
@@ -106,8 +119,10 @@ class JointTeam:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
         except (CannotAnswer, BadValue, np.linalg.LinAlgError):
             return None
+        team = replace(team, clock_offsets_s=_added(team.clock_offsets_s, begun))
         found = [
             *hinge_findings(team),
+            *team.findings,
             *(finding for finding in standing if finding.code in ("robot-left", "robot-joined")),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *gains(payload.gain),
@@ -143,6 +158,11 @@ def _require_one_clock(chi2: float) -> None:
 def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:
     """Return how late every clock is against the reference's."""
     return {name: seconds - late[reference] for name, seconds in late.items()}
+
+
+def _added(late: Mapping[str, float], begun: Mapping[str, float]) -> dict[str, float]:
+    """Return how late every clock is with what it was begun from."""
+    return {name: seconds + begun.get(name, 0.0) for name, seconds in late.items()}
 
 
 def needs_twists(log: TeamLog) -> bool:

@@ -48,6 +48,15 @@ def mass(gravity: Array, force: Array) -> tuple[float, float]:
     return found, float(np.sqrt((left**2).sum() / max(len(left) - 1, 1) / (size**2).sum()))
 
 
+def require_lift(mass_kg: float, forces: str) -> None:
+    """Raise CannotAnswer where `forces` pull the payload down, or are none: no mass is negative."""
+    if not mass_kg > 0:
+        raise CannotAnswer(
+            f"{forces} must hold the payload up; they add up to a mass of {mass_kg:.3g} kg. Check the sign of the "
+            "forces (what the robot applies to the payload) and gravity in the home frames."
+        )
+
+
 def com(gravity: Array, moment: Array, mass_kg: float) -> tuple[Array, Array]:
     """Return the centre of mass (3,) [m] and its formal covariance from still rows (K, 3) (eq. 14-16).
 
@@ -79,11 +88,7 @@ def mass_and_com(gravity: Array, wrench: Array) -> MassAndCom:
     Raises CannotAnswer where the mass comes out negative (a sign is wrong) or gravity has one direction only.
     """
     found, mass_std = mass(gravity, wrench[:, 3:])
-    if not found > 0:
-        raise CannotAnswer(
-            f"the still forces must hold the payload up; they add up to a mass of {found:.3g} kg. Check the sign of "
-            "the forces (what the robot applies to the payload) and gravity in the home frames."
-        )
+    require_lift(found, "the still forces")
     place, covariance = com(gravity, wrench[:, :3], found)
     unit = gravity / np.linalg.norm(gravity, axis=1, keepdims=True)
     tilt = float(np.sqrt(np.linalg.eigvalsh(np.cov(unit.T, bias=True))[2])) if len(unit) > 1 else 0.0

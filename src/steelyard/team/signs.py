@@ -11,8 +11,8 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
+from steelyard.team.mass_and_com import require_lift
 from steelyard.team.payload_model import Group
 
 # What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
@@ -28,26 +28,28 @@ def with_one_sign(groups: Sequence[Group], D: Array, names: Sequence[str]) -> tu
     forces = D[3:].reshape(3, -1, 6)
     lifted = np.sum([np.einsum("aix,ixa->i", forces, S[12:-1, 3:6].reshape(-1, 6, 3)) for S in total], axis=0)
     each = np.sum([_beside_one_another(S, forces) for S in total], axis=0)
-    turned = each.sum() - 4 * (each.sum(1) - np.diag(each))
-    asking = np.flatnonzero(turned < each.sum() / FALLS)
-    found = []
-    if len(asking):
-        # Of two robots each asks for it: it is the one that pulls down.
-        wrong = int(asking[np.argmin(lifted[asking])])
+    wrong, found = odd_one_out(each, lifted, names)
+    if wrong is not None:
         D, lifted = D.copy(), lifted.copy()
         D[:, 6 * wrong : 6 * wrong + 6] *= -1
         lifted[wrong] *= -1
-        text = (
-            f"What '{names[wrong]}' and the others push against one another cancels only with its sign turned; it was."
-        )
-        found.append(Finding.of("wrench-sign-flipped", text))
-    mass = float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total))
-    if not mass > 0:
-        raise CannotAnswer(
-            f"the forces must hold the payload up; they add up to a mass of {mass:.3g} kg. Check the sign of the "
-            "forces (what the robot applies to the payload) and gravity in the home frames."
-        )
-    return D, tuple(found)
+    require_lift(float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total)), "the forces")
+    return D, found
+
+
+def odd_one_out(each: Array, lifted: Array, names: Sequence[str]) -> tuple[int | None, tuple[Finding, ...]]:
+    """Return the robot whose sign must be turned, and why; None where all are right.
+
+    each  (N, N) products of what the motion leaves of the robots' forces     lifted  (N,) how far each pushes up
+    """
+    turned = each.sum() - 4 * (each.sum(1) - np.diag(each))
+    asking = np.flatnonzero(turned < each.sum() / FALLS)
+    if not len(asking):
+        return None, ()
+    # Of two robots each asks for it: it is the one that pulls down.
+    wrong = int(asking[np.argmin(lifted[asking])])
+    text = f"What '{names[wrong]}' and the others push against one another cancels only with its sign turned; it was."
+    return wrong, (Finding.of("wrench-sign-flipped", text),)
 
 
 def _beside_one_another(S: Array, forces: Array) -> Array:

@@ -21,6 +21,8 @@ from steelyard.team.twist_statistic import TwistScatter
 # Clocks are moved where their step is above this [s] and so many standard deviations.
 PUNCTUAL, DOUBTED = 2e-4, 4.0
 CLOCK_ROUNDS = 6
+# Noise above this share of the motion: robots disagree.
+LOUD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,6 +45,14 @@ class TwistTeam:
                 break
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
         return cls(parts, fit, late)
+
+    @property
+    def rough(self) -> bool:
+        """Whether twists err by a good part of what they are."""
+        square = sum((part.twist**2 * part.seen[..., None]).sum((0, 1)) for part in self.parts)
+        rows = sum(int(part.seen.sum()) for part in self.parts)
+        size = np.sqrt(square.reshape(2, 3).sum(1) / (3 * rows))
+        return bool((self.fit.noise > LOUD * size).any())
 
     def down(self) -> Array | None:
         """Return the mean direction of gravity (3,) in R, None where nobody can tell it."""

@@ -1,0 +1,88 @@
+"""Clocks that are late by more than a joint fit finds by itself, and logs in which nothing is late."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from steelyard.logs.team_log import TeamLog
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import CASES, Hinge, TeamNoise, TeamScene
+from steelyard.team.clock_search import far_lags, searched
+from steelyard.team.joint import JointTeam
+from steelyard.team.pose_team import PoseTeam
+
+NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
+
+
+def trial(sensing: str, seed: int = 100, **changes: Any) -> TeamTrial:
+    scene: dict[str, Any] = {"robots": 3, "kinds": ("still", "motion"), "motion_samples": 1500, "still_samples": 300}
+    moving = sensing == "twists"
+    return simulate_team(TeamScene(NOISY, sensing=sensing, bases_move=moving, **(scene | changes)), seed)  # type: ignore[arg-type]
+
+
+def late(log: TeamLog, **seconds: float) -> TeamLog:
+    return log.with_recordings(
+        *(replace(r, tracks={n: t.shifted(seconds.get(n, 0.0)) for n, t in r.tracks.items()}) for r in log.recordings)
+    )
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+@pytest.mark.parametrize("seconds", [0.5, -0.8, 1.7])
+def test_a_clock_far_beyond_what_a_fit_finds_is_found_and_put_right(sensing: str, seconds: float) -> None:
+    made = trial(sensing)
+    right, found = JointTeam().identify(made.log), JointTeam().identify(late(made.log, robot1=seconds))
+    assert found.clock_offsets_s["robot1"] == pytest.approx(seconds, abs=2e-3)
+    assert found.codes() == {"clock-offset"}
+    (said,) = found.findings
+    assert f"'robot1' are {abs(1e3 * seconds):.0f}" in said.message
+    assert found.mass == pytest.approx(right.mass, abs=0.05)
+
+
+def test_a_late_reference_makes_all_others_early() -> None:
+    found = JointTeam().identify(late(trial("poses").log, robot0=0.7))
+    assert found.clock_offsets_s["robot0"] == 0.0
+    for name in ("robot1", "robot2"):
+        assert found.clock_offsets_s[name] == pytest.approx(-0.7, abs=2e-3)
+
+
+def test_several_late_clocks_and_missing_rows() -> None:
+    made = trial("poses", robots=4, gaps={2: ((5.0, 7.0),)}, dropout=0.02)
+    found = JointTeam().identify(late(made.log, robot1=1.1, robot3=-0.6))
+    for name, seconds in (("robot1", 1.1), ("robot2", 0.0), ("robot3", -0.6)):
+        assert found.clock_offsets_s[name] == pytest.approx(seconds, abs=2e-3)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_good_logs_are_never_searched(case: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    def refused(*_: object) -> None:
+        raise AssertionError
+
+    monkeypatch.setattr("steelyard.team.joint.searched", refused)
+    JointTeam().identify(simulate_team(TeamScene(CASES[case], motion_samples=1500), 7).log)
+    JointTeam(clocks=False).identify(late(trial("poses").log, robot1=0.7))
+
+
+def test_robots_in_step_have_no_far_lag_and_clocks_stay_where_that_would_not_help() -> None:
+    made = trial("poses")
+    assert far_lags(made.log) == {}
+    team = PoseTeam.of(made.log, True)
+    assert searched(made.log, team, lambda _: team) == (made.log, team, {})
+    moved = late(made.log, robot1=0.6)
+    assert far_lags(moved)["robot1"] == pytest.approx(0.6, abs=0.05)
+    # What comes of it is no better: the log and its fit stay.
+    assert searched(moved, team, lambda _: team)[0] is moved
+    assert not far_lags(made.log.with_recordings(*made.log.recordings[:-1]))
+
+
+def test_a_hinge_is_searched_and_stays_what_it_is() -> None:
+    held = Hinge(
+        frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
+        np.array([-0.6, 0.0, 0.0]),
+    )  # fmt: skip
+    made = trial("poses", robots=4, hinge=held)
+    assert far_lags(made.log) == {}
+    assert "payload-jointed" in JointTeam().identify(made.log).codes()
