@@ -30,10 +30,9 @@ _BLURRED = 0.41
 _SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
-_OPEN = 0.07  # length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface
-# Spacings that a face must span to close a hole, and the least area of all such, as a vector over the sum of all sizes:
-# areas of points alone err by as much as _OPEN where the two sides of a thin object have unlike patterns of points.
-_WIDE, _LID = 6.0, 0.05
+# Length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface. Above this a side is
+# missing (0.12 and more without an underside); patterns of points that are unlike on two sides alone leave up to 0.10.
+_OPEN = 0.11
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
 _STD, _UNSURE, _THIN, _HOLE = 0.025, 0.1, 0.5, 1.0
@@ -164,22 +163,13 @@ def _against(surface: Oriented, solid: TetMesh) -> float:
     return float(((out * surface.normals).sum(1) < _AGAINST * np.linalg.norm(out, axis=1)).mean())
 
 
-def _lid(surface: Oriented, solid: TetMesh) -> float:
-    """Return how much of the solid's surface closes holes: faces with a long edge, areas added as vectors."""
-    corners = surface.xyz[solid.surface]
-    edges = corners - np.roll(corners, 1, axis=1)
-    areas = np.cross(edges[:, 0], edges[:, 1])
-    wide = (edges**2).sum(2).max(1) > (_WIDE * surface.spacing) ** 2
-    return float(np.linalg.norm(areas[wide].sum(0)) / np.linalg.norm(areas, axis=1).sum())
-
-
 def _solid(
     cloud: Cloud, surface: Oriented, solid: TetMesh, score: Array, doubt: float, findings: tuple[Finding, ...]
 ) -> Solid:
     sure = np.minimum(2 * score, 1.0)
     total = float(surface.area.sum())
     gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
-    thin, hole = doubt > _BLURRED, gap > _OPEN  # areas that do not close leave doubt, whether or not a side is missing
+    thin, hole = doubt > _BLURRED, gap > _OPEN
     if thin:
         apart = surface.spacing * cloud.diagonal * 1e3
         text = (
@@ -187,7 +177,7 @@ def _solid(
             f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
         )
         findings += (Finding.of("thin-thickened", text),)
-    if hole and _lid(surface, solid) > _LID:
+    if hole:
         text = (
             f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
         )
