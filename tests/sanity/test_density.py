@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
+from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.parts.parts import Parts
@@ -82,3 +83,10 @@ def test_the_right_shape_is_not_named(made: hammer.Example, answer: Estimate) ->
     assert named(answer) == []
     moved = replace(made.recording, object_pose_std=(0.001, 0.01))
     assert named(sy.identify(moved, parts=made.tool.parts)) == []
+
+
+def test_a_shape_so_far_off_that_its_parts_weigh_nothing_is_refused(made: hammer.Example) -> None:
+    tenth = Parts(made.tool.parts.label, made.tool.parts.moments * np.repeat([1e-3, 1e-4, 1e-5], [1, 3, 6]))
+    away = tenth.in_frame(sy.Pose(sy.Rotation.identity(), np.array([0.5, 0, 0])))
+    with pytest.raises(CannotAnswer, match=r"No masses of these parts explain the wrench, that of 0\.62"):
+        sy.identify(made.recording, parts=away)

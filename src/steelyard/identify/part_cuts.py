@@ -9,12 +9,13 @@ Source: the choice of parts by the identification is the paper's future work (se
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
 from steelyard.identify.part_masses import PartMasses
@@ -56,14 +57,12 @@ class PartCuts:
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        weight = self._weights(moments)
-        return self._averaged(weight, [self._of(k).solve(moments) for k in _kept(weight)])
+        return self._answered(self._weights(moments), lambda cut: cut.solve(moments))[0]
 
     def weighed(self, log: MotionLog) -> tuple[Estimate, Array]:
         """Return the estimate and the weight (K,) of every cut."""
         steady = PartMasses.with_noise(log, self.bias)
-        weight = self._weights(Moments.of_log(steady))
-        return self._averaged(weight, [self._of(k).identify(steady) for k in _kept(weight)]), weight
+        return self._answered(self._weights(Moments.of_log(steady)), lambda cut: cut.identify(steady))
 
     def _of(self, cut: int) -> PartMasses:
         return PartMasses(self.cuts[cut], self.bias, materials=self.materials, shape_error=self.shape_error)
@@ -81,6 +80,19 @@ class PartCuts:
         weight = (weight / weight.sum(0)).mean(1)
         weight[weight < LEAST_WEIGHT] = 0.0
         return np.asarray(weight / weight.sum())
+
+    def _answered(self, weight: Array, answer: Callable[[PartMasses], Estimate]) -> tuple[Estimate, Array]:
+        """Return the mean of the answers and the weights (K,); cuts whose parts explain nothing count no more."""
+        estimates, refused = [], None
+        for k in np.flatnonzero(weight):
+            try:
+                estimates.append(answer(self._of(int(k))))
+            except CannotAnswer as error:
+                weight[k], refused = 0.0, error
+        if not estimates and refused is not None:
+            raise refused
+        weight = weight / weight.sum()
+        return self._averaged(weight, estimates), weight
 
     def _averaged(self, weight: Array, estimates: list[Estimate]) -> Estimate:
         """Return the mean of the estimates with the spread between them; the rest is the best one's."""
@@ -104,7 +116,3 @@ class PartCuts:
         order = np.argsort(-weight, kind="stable")
         shares = ", ".join(f"{len(self.cuts[k])} parts {100 * weight[k]:.0f} %" for k in order if weight[k] > 0)
         return f"averaged over cuts of the shape by what the log says of them: {shares}"
-
-
-def _kept(weight: Array) -> list[int]:
-    return [int(k) for k in np.flatnonzero(weight)]

@@ -12,7 +12,6 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
-from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
@@ -23,6 +22,7 @@ from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias
 from steelyard.identify.linear import reweighted
+from steelyard.identify.nearest_body import nearest_body
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import (
@@ -49,8 +49,7 @@ from steelyard.spatial import Pose, Rotation
 RENEWALS = 2
 # A shape that is wrong by more than this many doublings of its error says nothing.
 DOUBLINGS = 12
-# A loosened answer keeps at least this share of the shape's second moment in every direction.
-LEAST_SHARE = 0.3
+LEAST_MASS = 0.1  # of what the log weighs; a shape that allows less has nothing to do with it
 
 
 @dataclass(frozen=True)
@@ -127,9 +126,10 @@ class PartMasses:
         for _ in range(RENEWALS - 1):
             free = self.density == "free" and not self.materials
             mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
-            body = self.parts.whole(mean)
+            body = _with_mass(self.parts, mean, data)
             data = Effective.of(problem, data.linear_at(body.vector), score)
         masses = self._masses(data, body, self.parts)
+        _with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
         seen = data.blurred(self.shape_error.with_grasp(first.parameters))
         findings = part_findings(first, self.parts, seen, masses.choices, self.materials)
@@ -167,6 +167,7 @@ class PartMasses:
             body = self.parts.whole(masses.mean)
             if seen.misfit(body.vector) < limit:
                 break
+        _with_mass(self.parts, masses.mean, data, LEAST_MASS)
         gain = error @ seen.information
         rest = np.eye(10) - gain
         B = self.parts.per_mass
@@ -176,8 +177,9 @@ class PartMasses:
             masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
         covariance = rest @ spread @ rest.T + error - gain @ error
         follows = _follows(data, error, spread, error)
-        made = self._built(problem, data, masses, _nearest_body(body.vector, moved), covariance, follows)
-        note = f"the shape was trusted {2**doubling} times less than given, so that the wrench fits"
+        made = self._built(problem, data, masses, nearest_body(body.vector, moved), covariance, follows)
+        so = "so that the wrench fits" if seen.misfit(body.vector) < limit else "and the wrench does not fit even so"
+        note = f"the shape was trusted {2**doubling} times less than given, {so}"
         return replace(made, notes=(*made.notes, note))
 
     def _sane(self, body: InertialParameters) -> InertialParameters:
@@ -317,23 +319,11 @@ def _start(problem: Problem) -> Array:
     return linear
 
 
-def _nearest_body(inside: Array, target: Array) -> InertialParameters:
-    """Return the mass and centre of `target` (10,) with as much of its inertia as stays well inside the bodies.
-
-    Between the inertia of `inside` (10,), scaled to the mass, and that of `target` the farthest point counts where no
-    principal second moment falls below a share of the former's.
-    """
-    shape, aim = InertialParameters(inside), InertialParameters(target)
-    if not aim.mass > 0:
-        return shape
-    central = shape.inertia_com * (aim.mass / shape.mass)
-    for step in np.linspace(1.0, 0.0, 21):
-        body = InertialParameters.from_com(aim.mass, aim.com, central + step * (aim.inertia_com - central))
-        if step == 0.0 or _least_share(body, InertialParameters.from_com(aim.mass, aim.com, central)) > LEAST_SHARE:
-            break
-    return body
-
-
-def _least_share(body: InertialParameters, other: InertialParameters) -> float:
-    """Return the least ratio of second moments of two bodies in any direction."""
-    return float(eigh(body.pseudo_inertia, other.pseudo_inertia, eigvals_only=True)[0])
+def _with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) -> InertialParameters:
+    """Return the body of the parts; raise CannotAnswer where it has only the `least` share of what the log weighs."""
+    if (body := parts.whole(mean)).mass > least * data.best[0]:
+        return body
+    raise CannotAnswer(
+        f"No masses of these parts explain the wrench, that of {data.best[0]:.3g} kg: the shape, of "
+        f"{1e6 * parts.volume.sum():.3g} cm^3, has another size or place. Check the unit of its points, pose_in_sensor."
+    )
