@@ -54,3 +54,12 @@ def test_an_impossible_cell_is_named(tmp_path: Path) -> None:
     rows[7, 2] = 1e300
     with pytest.raises(BadInput, match=r"force: 1 of 60 rows hold impossible numbers, up to 1e\+300: row 8\."):
         read_recording(write(tmp_path, STREAM, rows))
+
+
+def test_angles_in_degrees_called_radians_are_named_with_the_key_to_set(tmp_path: Path) -> None:
+    rows = ROWS.copy()
+    rows[:, 7] = np.linspace(0, 90, 60)
+    text = STREAM.replace('["qw", "qx", "qy", "qz"], form = "quaternion-wxyz"', '["qw", "qx", "qy"], form = "rpy"')
+    with pytest.raises(BadInput, match=r'rotation: roll, pitch or yaw reaches 90 rad, .* degrees\. Set unit = "deg"\.'):
+        read_recording(write(tmp_path, text, rows))
+    read_recording(write(tmp_path, text.replace('form = "rpy"', 'form = "rpy", unit = "deg"'), rows))

@@ -280,6 +280,16 @@ def test_joints_in_another_order_are_no_matter_of_units(files: Path) -> None:
         read_team(files)
 
 
+def test_a_spring_torque_that_is_always_zero_is_refused(files: Path) -> None:
+    table = files.with_suffix("") / "robot1-motion-5.csv"
+    head, *rows = table.read_text().splitlines()
+    numbers = np.array([row.split(",") for row in rows], float)
+    numbers[:, head.split(",").index("tau2")] = 0
+    np.savetxt(table, numbers, delimiter=",", header=head, comments="")
+    with pytest.raises(BadInput, match=r'\("robot1"\), recording 6: torque 2 of 3 is exactly 0 in all'):
+        read_team(files)
+
+
 def test_an_arm_parked_below_where_it_works_is_read(files: Path) -> None:
     rewritten(files, "robot1-still-2.csv", lambda q: 0.05 * q + np.deg2rad([2.0, 2.0, 2.0, 0.0, 0.0, 0.0]))
     assert read_team(files).names == ("robot0", "robot1", "robot2")

@@ -90,3 +90,13 @@ def test_a_shape_so_far_off_that_its_parts_weigh_nothing_is_refused(made: hammer
     away = tenth.in_frame(sy.Pose(sy.Rotation.identity(), np.array([0.5, 0, 0])))
     with pytest.raises(CannotAnswer, match=r"No masses of these parts explain the wrench, that of 0\.62"):
         sy.identify(made.recording, parts=away)
+
+
+def test_a_shape_alone_weighs_nothing(made: hammer.Example) -> None:
+    streams = made.recording.streams
+    i = next(k for k, stream in enumerate(streams) if "rotation" in stream.channels)
+    mixed = np.random.default_rng(0).permutation(len(streams[i].channels["rotation"]))
+    channels = {**streams[i].channels, "rotation": streams[i].channels["rotation"][mixed]}
+    lost = replace(made.recording, streams=(*streams[:i], replace(streams[i], channels=channels), *streams[i + 1 :]))
+    with pytest.raises(CannotAnswer):
+        sy.identify(lost, parts=made.tool.parts)

@@ -15,6 +15,7 @@ FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4
 ROUNDING = 5e-3  # how far R^T R may be from 1: a matrix written with three digits after the point
 NORM = 0.05  # how far the length of a quaternion may be from 1
 _ZERO = 1e-12
+_TURNS = 4 * np.pi  # [rad] two turns: more than a wrist makes, less than degrees of a log for identification are
 
 
 def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
@@ -24,6 +25,7 @@ def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
     Raises BadValue naming the worst row.
     """
     if form == "rpy":
+        _check_angles(values * angle)
         return Rotation.from_rpy(values * angle)
     if form == "matrix":
         return _of_matrix(values.reshape(*values.shape[:-1], 3, 3))
@@ -70,6 +72,16 @@ def _check_norm(quaternion: Array) -> None:
         raise BadValue(
             f"the quaternion must have norm 1: {_count(error > NORM)} are off, the worst is row {worst + 1} "
             f"with norm {float(norm.flat[worst]):.4g}. Check the four columns."
+        )
+
+
+def _check_angles(rpy: Array) -> None:
+    """Raise BadValue where a wrist would have turned round more often than any does: degrees read as radians."""
+    most = float(np.nanmax(np.abs(rpy), initial=0.0))
+    if most > _TURNS:
+        raise BadValue(
+            f"roll, pitch or yaw reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "
+            'degrees. Set unit = "deg".'
         )
 
 

@@ -24,6 +24,8 @@ from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
 from steelyard.logs.team_track import Track
 from steelyard.robots.omnid import Omnid
 
+_FEWEST = 50  # rows in which a torque shows
+
 
 def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
     """Read the log of a team.
@@ -192,7 +194,18 @@ def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
     out["rotation"], out["position"] = np.full((len(joints), 3, 3), np.nan), np.full((len(joints), 3), np.nan)
     out["rotation"][good], out["position"][good] = pose.rotation.matrix, pose.position
     if "joint_torque" in channels:
+        _require_live(channels["joint_torque"])
         both = good & np.isfinite(channels["joint_torque"]).all(1)
         out["force"] = np.full((len(joints), 3), np.nan)
         out["force"][both] = robot.wrench(joints[both], channels["joint_torque"][both]).force
     return out
+
+
+def _require_live(torques: Array) -> None:
+    """Raise BadValue where one of the spring torques (T, 3) [N m] is exactly 0 throughout and others are not."""
+    dead = ~np.nan_to_num(torques).any(0)
+    if len(torques) >= _FEWEST and dead.any() and not dead.all():
+        raise BadValue(
+            f"torque {int(dead.argmax()) + 1} of 3 is exactly 0 in all {len(torques)} rows and the others are not: its "
+            "channel is dead. Repair it, or leave the torques of this recording out."
+        )

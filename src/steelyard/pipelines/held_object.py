@@ -102,6 +102,11 @@ def identify(
     shape = None if parts is None else _shape(parts, recording)
     estimator, notes = _estimator(options, log, bias, shape)
     estimate = estimator.identify(log)
+    if shape is not None and not estimate.evidence.rank:
+        raise CannotAnswer(
+            "The data fix nothing of the body, not even its mass: the wrench does not follow the orientations. Check "
+            "their unit, form and clock; the shape alone weighs nothing."
+        )
     late = after(log, estimate, aligned, recording)
     if bias.free and any(f.code == "bias-drift" for f in late):
         bias = replace(bias, drift=True)
