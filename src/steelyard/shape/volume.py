@@ -31,7 +31,8 @@ _SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridg
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
 # Length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface. Above this a side is
-# missing (0.12 and more without an underside); patterns of points that are unlike on two sides alone leave up to 0.10.
+# missing (0.12 and more without an underside). Patterns of points that are unlike on two sides leave up to 0.10, or
+# 0.135 where one is five times as dense.
 _OPEN = 0.11
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
