@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.part_masses import PartMasses
 from steelyard.logs.log import MotionLog
@@ -71,6 +72,21 @@ def test_a_prior_tips_the_scale_between_cuts_alike(rod: Parts) -> None:
     _, plain = PartCuts((right, fine), bias="none").weighed(log)
     _, tipped = PartCuts((right, fine), np.array([0.0, 2.0]), bias="none").weighed(log)
     assert tipped[1] > plain[1]
+
+
+def test_a_cut_that_explains_nothing_is_left_out_with_a_word(rod: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
+    right, fine = cuts(rod)[2:]
+    log, whole = log_of(rod, 2), PartMasses.identify
+
+    def refusing(self: PartMasses, log: MotionLog) -> Estimate:
+        if len(self.parts) == len(fine):
+            raise CannotAnswer("no masses")
+        return whole(self, log)
+
+    monkeypatch.setattr(PartMasses, "identify", refusing)
+    answer, weight = PartCuts((right, fine), bias="none").weighed(log)
+    assert weight.tolist() == [1.0, 0.0]
+    assert answer.notes[-1] == "the cut into 6 parts explains nothing and was left out"
 
 
 def test_wrong_options_are_named(rod: Parts) -> None:

@@ -27,7 +27,7 @@ SEED = 0
 @click.argument("story", type=click.Choice(["held-object", "team"]), default="held-object")
 @click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the made noise.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), default=Path("report.html"), show_default=True,
+    "-o", "--output", type=click.Path(path_type=Path), show_default="report.html, of the team team.html",
     help="The page to write.",
 )  # fmt: skip
 @click.option(
@@ -36,7 +36,7 @@ SEED = 0
     "steelyard[images]).",
 )  # fmt: skip
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
-def demo(story: str, seed: int, output: Path, keep: Path | None, as_json: bool) -> None:
+def demo(story: str, seed: int, output: Path | None, keep: Path | None, as_json: bool) -> None:
     """A whole story on made data, against the truth.
 
     held-object: scan a hammer, cut the scan into parts, identify it from a log. team: three robots carry one payload;
@@ -45,9 +45,9 @@ def demo(story: str, seed: int, output: Path, keep: Path | None, as_json: bool) 
     if story == "team":
         from steelyard.cli.demo_team import demo_team
 
-        demo_team(seed, output, keep, as_json)
+        demo_team(seed, output or Path("team.html"), keep, as_json)
     else:
-        _held_object(seed, output, keep, as_json)
+        _held_object(seed, output or Path("report.html"), keep, as_json)
 
 
 def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> None:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -61,6 +60,8 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
 
 
 def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str:
+    from steelyard.cli.table import finding_lines
+
     cloud, n = fused.cloud, fused.table.normal
     size = " x ".join(f"{1e3 * length:.0f}" for length in cloud.xyz.max(0) - cloud.xyz.min(0))
     moved = "as reported" if fused.moved_m is None else f"moved by {1e3 * fused.moved_m:.1f} mm (rms) until they agree"
@@ -76,6 +77,4 @@ def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str
     lines = [f"{views}: the object on the table", ""] + [f"  {name:12s} {text}" for name, text in rows]
     if output is not None:
         lines += ["", f"Cloud written to {output}."]
-    for finding in fused.findings:
-        lines += ["", *textwrap.wrap(f"{finding.code}: {finding.message} {finding.remedy}", 100)]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", *finding_lines(fused.findings)])

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import textwrap
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -70,6 +69,8 @@ def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
 
 
 def _table(shape: Shape, scan: Path, output: Path | None) -> str:
+    from steelyard.cli.table import finding_lines
+
     made, parts, volume = shape.segmentation, shape.parts, shape.solid.mesh.volume
     count = f"{len(made)} part{'s' * (len(made) != 1)}"
     lines = [
@@ -90,6 +91,4 @@ def _table(shape: Shape, scan: Path, output: Path | None) -> str:
         lines += ["", f"  How many parts, by shape and colour: {said}. A log of forces can decide further."]
     if output is not None:
         lines += ["", f"Parts written to {output}. Look at them: steelyard report RESULT --parts {output}"]
-    for finding in shape.findings:
-        lines += ["", *textwrap.wrap(f"{finding.code}: {finding.message} {finding.remedy}", 100)]
-    return "\n".join(lines)
+    return "\n".join([*lines, "", *finding_lines(shape.findings)])

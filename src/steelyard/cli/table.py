@@ -8,6 +8,7 @@ import click
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 
 LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
@@ -49,7 +50,7 @@ def estimate_table(
         "",
         *_evidence_lines(estimate),
         "",
-        *_finding_lines(estimate),
+        *finding_lines(estimate.findings),
     ]
     return "\n".join(blocks)
 
@@ -142,12 +143,12 @@ def _vector(values: Array) -> str:
     return "(" + ", ".join(f"{v:.4g}" for v in values) + ")"
 
 
-def _finding_lines(estimate: Estimate) -> list[str]:
+def finding_lines(findings: Sequence[Finding]) -> list[str]:
     """Return the findings, each with its remedy."""
-    if not estimate.findings:
+    if not findings:
         return ["  no findings"]
     lines = []
-    for finding in estimate.findings:
+    for finding in findings:
         lines.append(f"  {click.style(finding.code, fg='yellow', bold=True)}: {finding.message}")
         lines.append(f"      -> {finding.remedy}")
     return lines

@@ -83,16 +83,18 @@ class PartCuts:
 
     def _answered(self, weight: Array, answer: Callable[[PartMasses], Estimate]) -> tuple[Estimate, Array]:
         """Return the mean of the answers and the weights (K,); cuts whose parts explain nothing count no more."""
-        estimates, refused = [], None
+        estimates, refused, left_out = [], None, []
         for k in np.flatnonzero(weight):
             try:
                 estimates.append(answer(self._of(int(k))))
             except CannotAnswer as error:
                 weight[k], refused = 0.0, error
+                left_out.append(f"the cut into {len(self.cuts[k])} parts explains nothing and was left out")
         if not estimates and refused is not None:
             raise refused
         weight = weight / weight.sum()
-        return self._averaged(weight, estimates), weight
+        mean = self._averaged(weight, estimates)
+        return replace(mean, notes=(*mean.notes, *left_out)), weight
 
     def _averaged(self, weight: Array, estimates: list[Estimate]) -> Estimate:
         """Return the mean of the estimates with the spread between them; the rest is the best one's."""

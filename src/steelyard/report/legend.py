@@ -62,13 +62,15 @@ def _controls(report: Report, scene: Scene, known: bool) -> Html:
             shows["ellipsoid"] = "Inertia ellipsoid"
     if scene.points is not None:
         shows["points"] = "Points"
-    pull = _slider("explode", "Pull apart") if len(scene.bodies) > 1 else ""
+    solid = not isinstance(seen, TeamEstimate)  # of a team's payload only its inertia is drawn
+    pull = _slider("explode", "Pull apart") if solid and len(scene.bodies) > 1 else ""
+    cut = _slider("cut", "Cut open") if solid else ""
     reset = tag("button", "Reset", type="button", data_do="reset")
     return tag(
         "div",
         _buttons("Colour by", "data_mode", modes) if len(modes) > 1 or not isinstance(seen, TeamEstimate) else "",
         _buttons("Show", "data_show", shows),
-        tag("div", pull, _slider("cut", "Cut open"), reset, class_="group sliders"),
+        tag("div", pull, cut, reset, class_="group sliders"),
         tag("p", _HOW, id="how", class_="how"),
         class_="controls",
         hidden=True,

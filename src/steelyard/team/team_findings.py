@@ -81,7 +81,7 @@ def late_clocks(late: Mapping[str, float], std: Mapping[str, float]) -> Iterator
         doubt = std.get(name, 0.0)
         if abs(seconds) > max(LATE_S, LATE_STD * doubt):
             way = "late" if seconds > 0 else "early"
-            text = f"The stamps of '{name}' are {1e3 * abs(seconds):.1f} +- {1e3 * doubt:.1f} ms {way}"
+            text = f"The stamps of '{name}' are {1e3 * abs(seconds):.1f} ± {1e3 * doubt:.1f} ms {way}"
             yield Finding.of("clock-offset", f"{text} against the reference; they were put right.")
 
 
