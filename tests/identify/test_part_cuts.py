@@ -84,7 +84,7 @@ def test_a_cut_that_explains_nothing_is_left_out_with_a_word(rod: Parts, monkeyp
         return whole(self, log)
 
     monkeypatch.setattr(PartMasses, "identify", refusing)
-    answer, weight = PartCuts((right, fine), bias="none").weighed(log)
+    answer, weight = PartCuts((right, fine), np.array([0.0, 9.0]), bias="none").weighed(log)
     assert weight.tolist() == [1.0, 0.0]
     assert answer.notes[-1] == "the cut into 6 parts explains nothing and was left out"
 
