@@ -138,7 +138,9 @@ def test_one_g_is_standard_gravity_where_the_log_is_not_on_earth(tmp_path: Path)
     np.testing.assert_allclose(stream.channels["specific_force"][0], np.multiply(FORCE, STANDARD_GRAVITY))
 
 
-@pytest.mark.parametrize("form", ["matrix", "quaternion-wxyz", "quaternion-xyzw", "rpy", "rpy-deg"])
+@pytest.mark.parametrize(
+    "form", ["matrix", "quaternion-wxyz", "quaternion-xyzw", "rpy", "rpy-deg", "rotation-vector", "rotation-vector-deg"]
+)
 def test_forms_of_rotation(tmp_path: Path, form: str) -> None:
     angles = np.random.default_rng(1).uniform(-1, 1, (4, 3))
     truth = Rotation.from_rpy(angles)
@@ -152,6 +154,8 @@ def test_forms_of_rotation(tmp_path: Path, form: str) -> None:
         "quaternion-xyzw": (np.roll(wxyz, -1, -1), ""),
         "rpy": (angles, ""),
         "rpy-deg": (np.degrees(angles), ', unit = "deg"'),
+        "rotation-vector": (truth.log(), ""),
+        "rotation-vector-deg": (np.degrees(truth.log()), ', unit = "deg"'),
     }[form]
     names = [f"r{i}" for i in range(values.shape[1])]
     csv = table([*COLUMNS[:7], *names], np.hstack([ROWS[:, :7], values]))

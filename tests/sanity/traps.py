@@ -8,7 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.glance import rolled
+from steelyard.sanity.misread import rolled
 from steelyard.spatial import Rotation
 
 Edit = Callable[[Recording], Recording]
@@ -67,6 +67,11 @@ def clipped(recording: Recording) -> Recording:
     return edited(recording, force=cut)
 
 
+def reread(recording: Recording, misread: Callable[[Rotation], Rotation]) -> Recording:
+    """Return the recording with its rotations as somebody misreads them."""
+    return edited(recording, rotation=lambda v: misread(Rotation.nearest(v)).matrix)
+
+
 TRAPS: dict[str, tuple[Edit, str]] = {
     "sign": (lambda r: replace(r, wrench_sign=-r.wrench_sign), "wrench-sign-flipped"),
     "gravity up": (lambda r: replace(r, gravity=-r.gravity), "gravity-frame"),
@@ -76,6 +81,10 @@ TRAPS: dict[str, tuple[Edit, str]] = {
     "gravity in g": (lambda r: replace(r, gravity=r.gravity / 9.82), "gravity-in-g"),
     "w first": (lambda r: edited(r, rotation=lambda v: rolled(v, 1)), "quaternion-order"),
     "w last": (lambda r: edited(r, rotation=lambda v: rolled(v, -1)), "quaternion-order"),
+    "radians as degrees": (lambda r: reread(r, lambda R: Rotation.from_rpy(np.radians(R.rpy()))), "gravity-frame"),
+    "rotation vector as rpy": (lambda r: reread(r, lambda R: Rotation.from_rpy(R.log())), "gravity-frame"),
+    "yaw, pitch, roll": (lambda r: reread(r, lambda R: Rotation.from_rpy(R.rpy()[..., ::-1])), "gravity-frame"),
+    "moving axes": (lambda r: reread(r, lambda R: Rotation.from_rpy(-R.inverse().rpy())), "gravity-frame"),
     "torque in N mm": (lambda r: edited(r, torque=lambda v: 1000 * v), "length-in-mm"),
     "force in kN": (lambda r: edited(r, force=lambda v: v / 1000), "force-unit"),
     "rows twice, same stamps": (lambda r: repeated(r, False), "rows-duplicated"),

@@ -109,6 +109,7 @@ def test_rpy_is_extrinsic_xyz(batch: tuple[int, ...], data: st.DataObject) -> No
     rpy = data.draw(numbers((*batch, 3), 3.2))
     expected = scipy_transform.Rotation.from_euler("xyz", rpy.reshape(-1, 3)).as_matrix()
     assert_allclose(Rotation.from_rpy(rpy).matrix.reshape(-1, 3, 3), expected, atol=TIGHT)
+    assert_allclose(Rotation.from_rpy(Rotation.from_rpy(rpy).rpy()).matrix.reshape(-1, 3, 3), expected, atol=1e-12)
 
 
 @pytest.mark.parametrize("batch", BATCHES)

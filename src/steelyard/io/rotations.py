@@ -1,4 +1,4 @@
-"""Rotations as files write them: matrices row by row, quaternions in both orders, roll pitch yaw."""
+"""Rotations as files write them: matrices row by row, quaternions in both orders, roll pitch yaw, rotation vectors."""
 
 from __future__ import annotations
 
@@ -10,7 +10,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.spatial import Rotation
 
-FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4, "rpy": 3}
+FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4, "rpy": 3, "rotation-vector": 3}
+ANGULAR = ("rpy", "rotation-vector")  # forms whose numbers have a unit
 
 ROUNDING = 5e-3  # how far R^T R may be from 1: a matrix written with three digits after the point
 NORM = 0.05  # how far the length of a quaternion may be from 1
@@ -19,14 +20,14 @@ _TURNS = 4 * np.pi  # [rad] two turns: more than a wrist makes, less than degree
 
 
 def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
-    """Return the rotations (...) that `values` (..., k) write in `form`; `angle` turns rpy into rad.
+    """Return the rotations (...) that `values` (..., k) write in `form`; `angle` turns those of angles into rad.
 
     Written digits are rounded, so a matrix within `ROUNDING` of a rotation becomes the nearest one.
     Raises BadValue naming the worst row.
     """
-    if form == "rpy":
-        _check_angles(values * angle)
-        return Rotation.from_rpy(values * angle)
+    if form in ANGULAR:
+        _check_angles(values * angle, form)
+        return Rotation.from_rpy(values * angle) if form == "rpy" else Rotation.exp(values * angle)
     if form == "matrix":
         return _of_matrix(values.reshape(*values.shape[:-1], 3, 3))
     _check_norm(values)
@@ -75,12 +76,13 @@ def _check_norm(quaternion: Array) -> None:
         )
 
 
-def _check_angles(rpy: Array) -> None:
+def _check_angles(angles: Array, form: str) -> None:
     """Raise BadValue where a wrist would have turned round more often than any does: degrees read as radians."""
-    most = float(np.nanmax(np.abs(rpy), initial=0.0))
+    most = float(np.nanmax(np.abs(angles), initial=0.0))
     if most > _TURNS:
+        what = "roll, pitch or yaw" if form == "rpy" else "the rotation vector"
         raise BadValue(
-            f"roll, pitch or yaw reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "
+            f"{what} reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "
             'degrees. Set unit = "deg".'
         )
 

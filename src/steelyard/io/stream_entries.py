@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry
-from steelyard.io.rotations import FORMS, rotation_of
+from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
 from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS
 from steelyard.logs.recording import QUANTITIES, Mount
 from steelyard.spatial import Rotation
@@ -138,8 +138,8 @@ def _rotation(entry: Entry) -> QuantitySpec:
     entry.require("columns", 'rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }')
     entry.require("form", f'form = "matrix"; one of {", ".join(FORMS)}')
     form = entry.choice("form", list(FORMS), "")
-    if form != "rpy" and "unit" in entry:
-        raise entry.error(f'"unit" belongs to form = "rpy"; a {form} has none.')
+    if form not in ANGULAR and "unit" in entry:
+        raise entry.error(f'"unit" belongs to form = "rpy" and "rotation-vector"; a {form} has none.')
     unit = entry.choice("unit", list(ANGLE), "rad")
     return QuantitySpec("rotation", _columns(entry, FORMS[form]), unit, entry.where, form=form)
 
@@ -193,7 +193,7 @@ def _mount(stream: Entry) -> Mount | None:
 def parse_pose(entry: Entry, *more: str) -> tuple[Rotation | None, Array | None]:
     """Return rotation and position [m] of a pose table, None where left out.
 
-    `unit` is that of the position, `angle_unit` that of rotation where form = "rpy". Raises BadDescription.
+    `unit` is that of the position, `angle_unit` that of a rotation by angles. Raises BadDescription.
     """
     entry.only("rotation", "form", "angle_unit", "position", "unit", *more)
     position = None

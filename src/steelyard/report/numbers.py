@@ -65,10 +65,7 @@ def people(body: InertialParameters) -> Array:
 
 def rpy_deg(rotation: Rotation) -> Array:
     """Return roll, pitch, yaw (3,) [deg] of one rotation: R = Rz(yaw) Ry(pitch) Rx(roll)."""
-    m = rotation.matrix
-    return np.rad2deg(
-        [np.arctan2(m[2, 1], m[2, 2]), np.arctan2(-m[2, 0], np.hypot(m[2, 1], m[2, 2])), np.arctan2(m[1, 0], m[0, 0])]
-    )
+    return np.rad2deg(rotation.rpy())
 
 
 def principal(estimate: Estimate) -> tuple[Array, Array, Array]:

@@ -22,7 +22,8 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
-from steelyard.sanity.glance import Glance, glance, rolled
+from steelyard.sanity.glance import Glance, glance
+from steelyard.sanity.misread import MISREAD, Misread
 from steelyard.sanity.static_fit import StaticFit, beside, fit, solve
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
 from steelyard.sanity.units import scaled
@@ -44,15 +45,16 @@ SENSOR_TURN = np.radians(10.0)
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """One way to read the recording: the code and words of what would be wrong, gravity, rotations, and its fit."""
+    """One way to read the recording: words for what would be wrong, gravity, rotations, its fit, how they were misread.
 
-    code: str
+    `misread` is None where the rotations are as given.
+    """
+
     words: str
     gravity: Array
     rotation: Array | None
     fit: StaticFit
-    quaternion_shift: int = 0
-    transposed: bool = False
+    misread: Misread | None = None
 
 
 def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -61,14 +63,14 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     if view is None:
         return recording, ()
     found: list[Finding] = []
-    reading = _reading(view, "", "", recording.gravity, view.rotation)
+    reading = _reading(view, "", recording.gravity, view.rotation)
     best = _best_rival(view, reading)
     if best is not None:
         found.append(_rival_finding(best, reading))
         recording, reading = _as_read(recording, best), best
     flipped, findings = _signs(recording, view, reading)
     if findings:
-        reading = _reading(view, "", "", flipped.gravity, reading.rotation)
+        reading = _reading(view, "", flipped.gravity, reading.rotation)
     recording = flipped
     found.extend(findings)
     recording, findings = _lengths(recording, reading.fit)
@@ -83,20 +85,14 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
 
 
 def _reading(
-    view: Glance,
-    code: str,
-    words: str,
-    gravity: Array,
-    rotation: Array | None,
-    shift: int = 0,
-    transposed: bool = False,
+    view: Glance, words: str, gravity: Array, rotation: Array | None, misread: Misread | None = None
 ) -> Reading:
     """Return a reading with the better of two fits: with the measured acceleration and without."""
     found = fit(view.seen(gravity, rotation), view.block)
     if view.acceleration is not None:
         still = fit(replace(view, acceleration=None).seen(gravity, rotation), view.block)
         found = min(found, still, key=lambda f: f.force_share)
-    return Reading(code, words, gravity, rotation, found, shift, transposed)
+    return Reading(words, gravity, rotation, found, misread)
 
 
 def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
@@ -104,17 +100,16 @@ def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
     R = view.rotation
     if R is None:
         return
-    words = "rotation turns W into S, not S into W"
-    yield _reading(view, "gravity-frame", words, gravity, np.swapaxes(R, 1, 2), transposed=True)
-    for shift, order in ((-1, "w first where it is last"), (1, "w last where it is first")):
-        words = f"the four numbers of each quaternion were read with {order}"
-        yield _reading(view, "quaternion-order", words, gravity, rolled(R, shift), shift=shift)
+    for misread in MISREAD:
+        meant = misread.right(R)
+        if meant is not None:
+            yield _reading(view, misread.words, gravity, meant, misread)
     size = float(np.linalg.norm(gravity))
     for axis in range(3):
         if abs(gravity[axis]) < 0.8 * size:
             for sign in (-1, 1):
                 words = f"gravity points along {'+' if sign > 0 else '-'}{'xyz'[axis]} of W"
-                yield _reading(view, "gravity-frame", words, sign * size * np.eye(3)[axis], R)
+                yield _reading(view, words, sign * size * np.eye(3)[axis], R)
 
 
 def _best_rival(view: Glance, given: Reading) -> Reading | None:
@@ -130,10 +125,7 @@ def _best_rival(view: Glance, given: Reading) -> Reading | None:
         and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
         and r.fit.sign != 0
         and _varies(view, r)
-        and (
-            r.code != "gravity-frame" or r.transposed or free is None or r.fit.force_share < 2 * free.force_share + 1e-3
-        )
-        and (not (r.transposed or r.quaternion_shift) or free is None or r.fit.force_share < 0.5 * free.force_share)
+        and _beats_tilt(r, free)
     ]
     # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
     return min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
@@ -143,7 +135,7 @@ def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
     """Tell whether a freely tilted gravity explains no more (an axis: much more) than the rival does."""
     if free is None:
         return True
-    if rival.transposed or rival.quaternion_shift:
+    if rival.misread is not None:
         return rival.fit.force_share < 0.5 * free.force_share
     return rival.fit.force_share < 2 * free.force_share + 1e-3
 
@@ -159,22 +151,19 @@ def _rival_finding(best: Reading, given: Reading) -> Finding:
         f"{best.words[0].upper()}{best.words[1:]}; so read, {_percent(best.fit.force_share)} of the force variance is "
         f"left unexplained instead of {_percent(given.fit.force_share)}. The answer assumes this."
     )
-    return Finding.of(best.code, message)
+    return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
 
 
 def _as_read(recording: Recording, best: Reading) -> Recording:
     """Return the recording with its rotations and gravity as the reading has them."""
-
-    def corrected(values: Array) -> Array:
-        return np.swapaxes(values, 1, 2) if best.transposed else rolled(values, best.quaternion_shift)
-
-    if not (best.transposed or best.quaternion_shift):
+    if best.misread is None:
         return replace(recording, gravity=best.gravity)
-    streams = tuple(
-        replace(s, channels={q: corrected(v) if q == "rotation" else v for q, v in s.channels.items()})
-        for s in recording.streams
-    )
-    return replace(recording, streams=streams)
+    streams = []
+    for stream in recording.streams:
+        if (read := stream.channels.get("rotation")) is not None and (meant := best.misread.right(read)) is not None:
+            stream = replace(stream, channels={**stream.channels, "rotation": meant})
+        streams.append(stream)
+    return replace(recording, streams=tuple(streams))
 
 
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:

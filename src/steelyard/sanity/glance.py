@@ -16,7 +16,7 @@ from steelyard.check import Array
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.imu import first_mount
 from steelyard.logs.recording import Recording, Stream
-from steelyard.spatial import Rotation, cross_matrix
+from steelyard.spatial import cross_matrix
 
 CUTOFF_HZ = 3.0
 _RATE_HZ = 60.0
@@ -244,9 +244,3 @@ def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, ra
             smooth = np.gradient(smooth, 1 / rate, axis=0)
         return np.asarray(smooth)
     return None
-
-
-def rolled(rotation: Array, places: int) -> Array:
-    """Return rotations (N, 3, 3) whose quaternions had their four numbers read `places` further on."""
-    quaternion = Rotation.nearest(rotation).quaternion_wxyz()
-    return Rotation.from_quaternion_wxyz(np.roll(quaternion, places, -1)).matrix

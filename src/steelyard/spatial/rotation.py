@@ -111,6 +111,13 @@ class Rotation:
         scale = np.where(small, 2.0, 2 * np.arctan2(sine, w) / np.where(small, 1.0, sine))
         return np.asarray(scale[..., None] * v)
 
+    def rpy(self) -> Array:
+        """Return roll, pitch, yaw (..., 3) [rad], pitch within a quarter turn: R = Rz(yaw) Ry(pitch) Rx(roll)."""
+        m = self.matrix
+        level = np.hypot(m[..., 2, 1], m[..., 2, 2])
+        roll, yaw = np.arctan2(m[..., 2, 1], m[..., 2, 2]), np.arctan2(m[..., 1, 0], m[..., 0, 0])
+        return np.stack([roll, np.arctan2(-m[..., 2, 0], level), yaw], -1)
+
     def quaternion_wxyz(self) -> Array:
         """Return unit quaternions (..., 4), scalar first and never negative."""
         diagonal = np.einsum("...ii->...i", self.matrix)
