@@ -9,8 +9,6 @@ from typing import TYPE_CHECKING
 
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias
-from steelyard.identify.noise_aware import NoiseAware
 from steelyard.io import read_recording, read_result
 from steelyard.io.object_pose import ObjectPose, read_object_pose
 from steelyard.io.ply_files import read_mesh
@@ -46,7 +44,7 @@ def identify(
     """Return mass, centre of mass and inertia of what the robot holds, with covariance, evidence and findings.
 
     log      a log description (.toml), a bare data file, a Recording, or a MotionLog made by the caller (which is
-             fitted as it is, without alignment and sanity checks)
+             fitted as it is, without alignment and sanity checks; its object's frame is S unless pose_in_sensor says)
     options  method, bias and prior size
     tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared
     parts    the object's homogeneous parts in its own frame; or a mesh (.ply) whose faces carry part numbers, or parts
@@ -59,14 +57,18 @@ def identify(
 
     Raises BadInput where the files make no sense, CannotAnswer where they do not determine mass and centre of mass.
     """
-    if isinstance(log, MotionLog):
-        return NoiseAware(bias=Bias(options.bias, drift=options.drift)).identify(log)
-    recording = log if isinstance(log, Recording) else read_recording(log, data)
-    if pose_in_sensor is not None:
-        recording = _placed(recording, pose_in_sensor)
-    known = _tool(recording.tool if tool is None else tool, data)
     if parts is not None and scan is not None:
         raise BadValue("parts and a scan both say what the object looks like; give one of them.")
+    place = None if pose_in_sensor is None else _place(pose_in_sensor)
+    if isinstance(log, MotionLog):
+        known = _tool(tool, data)
+        known = held_object.identify(known, options) if isinstance(known, Recording) else known
+        seen = _parts(parts) if scan is None else shape_of(scan)
+        return held_object.identify_rows(log, options, known, seen, *(() if place is None else (place.pose, place.std)))
+    recording = log if isinstance(log, Recording) else read_recording(log, data)
+    if place is not None:
+        recording = replace(recording, object_pose=place.pose, object_pose_std=place.std)
+    known = _tool(recording.tool if tool is None else tool, data)
     return held_object.identify(recording, options, known, _parts(parts) if scan is None else shape_of(scan))
 
 
@@ -134,10 +136,9 @@ def _seen(path: Path) -> Cloud | Views:
     return read_cloud(path)
 
 
-def _placed(recording: Recording, place: str | Pose) -> Recording:
-    """Return the recording with the object at `place`."""
-    found = ObjectPose(place) if isinstance(place, Pose) else read_object_pose(place)
-    return replace(recording, object_pose=found.pose, object_pose_std=found.std)
+def _place(given: str | Pose) -> ObjectPose:
+    """Return where the object sits, read where it is given as TOML."""
+    return ObjectPose(given) if isinstance(given, Pose) else read_object_pose(given)
 
 
 def _tool(tool: str | Path | Recording | Estimate | None, data: str | Path | None) -> Recording | Estimate | None:

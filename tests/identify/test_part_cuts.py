@@ -9,6 +9,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.problem import Problem
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log
@@ -76,14 +77,14 @@ def test_a_prior_tips_the_scale_between_cuts_alike(rod: Parts) -> None:
 
 def test_a_cut_that_explains_nothing_is_left_out_with_a_word(rod: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
     right, fine = cuts(rod)[2:]
-    log, whole = log_of(rod, 2), PartMasses.identify
+    log, whole = log_of(rod, 2), PartMasses.answered
 
-    def refusing(self: PartMasses, log: MotionLog) -> Estimate:
+    def refusing(self: PartMasses, log: MotionLog, problem: Problem) -> Estimate:
         if len(self.parts) == len(fine):
             raise CannotAnswer("no masses")
-        return whole(self, log)
+        return whole(self, log, problem)
 
-    monkeypatch.setattr(PartMasses, "identify", refusing)
+    monkeypatch.setattr(PartMasses, "answered", refusing)
     answer, weight = PartCuts((right, fine), np.array([0.0, 9.0]), bias="none").weighed(log)
     assert weight.tolist() == [1.0, 0.0]
     assert answer.notes[-1] == "the cut into 6 parts explains nothing and was left out"

@@ -200,3 +200,11 @@ def test_real_motion_with_a_late_accelerometer(examples_dir: Path, data_dir: Pat
 def test_real_logs_carry_what_is_true(name: str, expected: set[str], examples_dir: Path, data_dir: Path) -> None:
     estimate = held_object.identify(real(name, examples_dir, data_dir))
     assert estimate.codes() - {"inertia-not-identified"} == expected
+
+
+def test_a_drift_that_was_put_right_leaves_the_declared_noise_alone(tmp_path: Path) -> None:
+    kind = Kind("box_tool", 1.0, 2, drift=0.2)
+    declared = held_object.identify(made(tmp_path, kind, declared_force=0.06))
+    assert "bias-drift" in declared.codes()
+    assert "noise-level-off" not in declared.codes()
+    assert 0.2 < (declared.evidence.chi2_per_dof or 0.0) < 1.5

@@ -58,6 +58,23 @@ class Effective:
         information = 0.5 * (found[:, :10] + found[:, :10].T)
         return replace(self, information=information, pull=found[:, 10].copy())
 
+    def beside(self, known: Array, covariance: Array) -> Effective:
+        """Return what is said about the rest of a body, of which a part `known` (10,) up to `covariance` is taken away.
+
+        phi_hat - known is the rest's, with the error of both.
+        """
+        shrink: Array = np.eye(10) + self.information @ covariance
+        columns = [self.information, self.pull - self.information @ known, self.score_weight]
+        found = np.asarray(np.linalg.solve(shrink, np.column_stack(columns)), np.float64)
+        information = 0.5 * (found[:, :10] + found[:, :10].T)
+        return replace(
+            self,
+            information=information,
+            pull=found[:, 10].copy(),
+            score_weight=found[:, 11:].copy(),
+            bias_at=self.bias_at - self.bias_slope @ known,
+        )
+
     def response(self, follows: Array) -> Array:
         """Return how [phi, bias] (p,) follows the score (p,), where phi follows F phi_hat by `follows` (10, 10)."""
         body, slope = follows @ self.score_weight, self.bias_slope

@@ -126,6 +126,10 @@ class Estimate:
         seen = {(f.code, f.message): f for f in (*self.findings, *findings)}
         return replace(self, findings=tuple(seen.values()))
 
+    def noted(self, *notes: str) -> Estimate:
+        """Return the estimate with more notes."""
+        return replace(self, notes=(*self.notes, *notes))
+
     def codes(self) -> set[str]:
         """Return the codes of all findings."""
         return {f.code for f in self.findings}

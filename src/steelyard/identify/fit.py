@@ -82,17 +82,31 @@ def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest
     `verify_rest` fuses the acceleration of resting rows with zero where the wrench agrees. Raises CannotAnswer where
     the data do not fix mass and centre of mass.
     """
+
+    def rested(steady: MotionLog) -> MotionLog:
+        first = solver(_problem(steady, replace(bias, drift=False), by_block=False))
+        return at_rest(steady, first.linear[:10], first.bias)
+
+    log, problem = prepared(log, bias, rested if verify_rest and log.still.any() else None)
+    solution = solver(problem)
+    return conclude(problem, solution, method, score_variance(log, problem, solution))
+
+
+def prepared(
+    log: MotionLog, bias: Bias, settled: Callable[[MotionLog], MotionLog] | None = None
+) -> tuple[MotionLog, Problem]:
+    """Return the log with the noise that it does not declare estimated, and the problem of it.
+
+    Noise is judged with a drift taken out; `settled` may change such a log before the drift is given back.
+    """
     require_rows(len(log))
     steady = without_drift(log) if bias.drift else log
     lost = log.wrench - steady.wrench
     steady = with_noise(steady, bias.free)
-    if verify_rest and log.still.any():
-        first = solver(_problem(steady, replace(bias, drift=False), by_block=False))
-        steady = at_rest(steady, first.linear[:10], first.bias)
+    if settled is not None:
+        steady = settled(steady)
     log = _drifting(steady, log, lost) if bias.drift else steady
-    problem = _problem(log, bias, by_block=True)
-    solution = solver(problem)
-    return conclude(problem, solution, method, score_variance(log, problem, solution))
+    return log, _problem(log, bias, by_block=True)
 
 
 def _drifting(steady: MotionLog, log: MotionLog, lost: Array) -> MotionLog:

@@ -17,8 +17,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias
+from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.problem import Problem
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -44,6 +45,7 @@ class PartCuts:
     bias: Bias | str = "free"
     materials: tuple[Material, ...] = ()
     shape_error: ShapeError = MEASURED
+    tool: Estimate | None = None
 
     def __post_init__(self) -> None:
         if not self.cuts:
@@ -57,22 +59,25 @@ class PartCuts:
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        return self._answered(self._weights(moments), lambda cut: cut.solve(moments))[0]
+        weight = self._weights(self._of(0).problem(moments))
+        return self._answered(weight, lambda cut: cut.solve(moments))[0]
 
     def weighed(self, log: MotionLog) -> tuple[Estimate, Array]:
         """Return the estimate and the weight (K,) of every cut."""
-        steady = PartMasses.with_noise(log, self.bias)
-        return self._answered(self._weights(Moments.of_log(steady)), lambda cut: cut.identify(steady))
+        log, problem = prepared(log, Bias.of(self.bias))
+        return self._answered(self._weights(problem), lambda cut: cut.answered(log, problem))
 
     def _of(self, cut: int) -> PartMasses:
-        return PartMasses(self.cuts[cut], self.bias, materials=self.materials, shape_error=self.shape_error)
+        return PartMasses(
+            self.cuts[cut], self.bias, materials=self.materials, shape_error=self.shape_error, tool=self.tool
+        )
 
-    def _weights(self, moments: Moments) -> Array:
+    def _weights(self, problem: Problem) -> Array:
         """Return the weight (K,) of every cut by prior and evidence; small ones are zero."""
         if len(self.cuts) == 1:
             return np.ones(1)
         finest = max(range(len(self.cuts)), key=lambda k: len(self.cuts[k]))
-        data = self._of(finest).seen(moments)
+        data = self._of(finest).seen(problem)
         evidence = np.stack([self._of(k).log_evidence(data) for k in range(len(self.cuts))])
         if self.prior is not None:
             evidence = evidence + np.asarray(self.prior)[:, None]

@@ -20,10 +20,9 @@ from steelyard.identify.conclude import conclude, widened
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
-from steelyard.identify.fit import Bias
+from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.linear import reweighted
 from steelyard.identify.nearest_body import nearest_body
-from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import (
     Masses,
@@ -62,6 +61,7 @@ class PartMasses:
                  its own mass, not below zero
     materials    densities to choose from, one per part; they take the place of `density`
     shape_error  how wrong shape and grasp may be
+    tool         what of the load is no part: a gripper weighed by itself
     """
 
     parts: Parts
@@ -69,6 +69,7 @@ class PartMasses:
     density: Literal["averaged", "free"] = "averaged"
     materials: tuple[Material, ...] = ()
     shape_error: ShapeError = MEASURED
+    tool: Estimate | None = None
 
     def __post_init__(self) -> None:
         if self.density not in ("averaged", "free"):
@@ -79,40 +80,57 @@ class PartMasses:
 
         Raises CannotAnswer where the log shows no weight.
         """
-        log = self.with_noise(log, self.bias)
-        problem = self._problem(Moments.of_log(log))
-        first = self._conclude(problem, _start(problem), None)
+        return self.answered(*prepared(log, Bias.of(self.bias)))
+
+    def answered(self, log: MotionLog, problem: Problem) -> Estimate:
+        """Return the estimate of a log that carries its noise, and of its `problem`."""
+        start = self._start(problem)
+        first = self._conclude(problem, start, None)
         if log.time is None:
             return first
-        bias = first.wrench_bias[: len(problem.T) - 10]
-        linear = np.concatenate([first.parameters.vector, bias])
-        return self._conclude(problem, linear, score_variance(log, problem, Solution.unconstrained(linear)))
+        bias = len(problem.T) - 10
+        linear = np.concatenate([first.parameters.vector, first.wrench_bias[:bias]])
+        if bias > 6:  # an Estimate has no place for the drift
+            linear = self._data(problem, start, None).linear_at(first.parameters.vector)
+        score = score_variance(log, problem, Solution.unconstrained(self._loaded(linear)))
+        return self._conclude(problem, linear, score)
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
-        problem = self._problem(moments)
-        return self._conclude(problem, _start(problem), None)
+        problem = self.problem(moments)
+        return self._conclude(problem, self._start(problem), None)
 
-    @staticmethod
-    def with_noise(log: MotionLog, bias: Bias | str) -> MotionLog:
-        """Return the log with the noise that it does not declare estimated."""
-        return with_noise(log, Bias.of(bias).free)
-
-    def seen(self, moments: Moments) -> Effective:
+    def seen(self, problem: Problem) -> Effective:
         """Return what a statistic says of the whole body, the error of the shape taken into account."""
-        problem = self._problem(moments)
-        data = Effective.of(problem, _start(problem), None)
+        data = self._data(problem, self._start(problem), None)
         body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), self.parts).mean)
-        data = Effective.of(problem, data.linear_at(body.vector), None)
+        data = self._data(problem, data.linear_at(body.vector), None)
         return data.blurred(self.shape_error.with_grasp(body))
 
     def log_evidence(self, data: Effective) -> Array:
         """Return the log evidence (F,) of these parts per family of density models, up to what all cuts share."""
         return log_evidence(data, self.parts)
 
-    def _problem(self, moments: Moments) -> Problem:
+    def problem(self, moments: Moments) -> Problem:
+        """Return the problem of a statistic that carries its noise."""
         bias = Bias.of(self.bias)
         return replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
+
+    def _start(self, problem: Problem) -> Array:
+        """Return the linear parameters (p,) of ten free numbers: the first weights come from them."""
+        linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
+        if not linear[0] > 0:
+            raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
+        return linear if self.tool is None else linear - _padded(self.tool.parameters.vector, len(linear))
+
+    def _loaded(self, linear: Array) -> Array:
+        """Return the linear parameters (p,) of the load, tool and object, from those with the object's."""
+        return linear if self.tool is None else linear + _padded(self.tool.parameters.vector, len(linear))
+
+    def _data(self, problem: Problem, linear: Array, score: Array | None) -> Effective:
+        """Return what the log says of the object, with the weights at `linear` (p,): the object's phi and the bias."""
+        data = Effective.of(problem, self._loaded(linear), score)
+        return data if self.tool is None else data.beside(self.tool.parameters.vector, self.tool.covariance)
 
     def _conclude(self, problem: Problem, linear: Array, score: Array | None) -> Estimate:
         """Return the Estimate after a few rounds: weights depend on the answer.
@@ -121,13 +139,13 @@ class PartMasses:
         either, the shape is trusted less, step by step, until it can: the answer then moves off the shape as far as
         the log says.
         """
-        data = Effective.of(problem, linear, score)
+        data = self._data(problem, linear, score)
         body = InertialParameters(linear[:10])
         for _ in range(RENEWALS - 1):
             free = self.density == "free" and not self.materials
             mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
             body = _with_mass(self.parts, mean, data)
-            data = Effective.of(problem, data.linear_at(body.vector), score)
+            data = self._data(problem, data.linear_at(body.vector), score)
         masses = self._masses(data, body, self.parts)
         _with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
@@ -268,7 +286,9 @@ class PartMasses:
 
         follows  (10, 10) how it follows the log: without a block it would lie elsewhere by this times the block's score
         """
-        solution = Solution.unconstrained(data.linear_at(body.vector))
+        solution = Solution.unconstrained(self._loaded(data.linear_at(body.vector)))
+        if self.tool is not None:
+            solution = replace(solution, known=self.tool.parameters.vector)
         estimate = conclude(problem, solution, "part-masses", response=data.response(follows))
         found = replace(
             estimate,
@@ -311,12 +331,9 @@ def _follows(data: Effective, error: Array, spread: Array, moving: Array) -> Arr
     return np.asarray(masses + moving @ (blur - data.blurred(error).information @ masses))
 
 
-def _start(problem: Problem) -> Array:
-    """Return the linear parameters (p,) of ten free numbers: the first weights come from them."""
-    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
-    if not linear[0] > 0:
-        raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
-    return linear
+def _padded(phi: Array, size: int) -> Array:
+    """Return phi (10,) followed by zeros (size,)."""
+    return np.concatenate([phi, np.zeros(size - 10)])
 
 
 def _with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) -> InertialParameters:

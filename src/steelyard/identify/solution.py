@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -15,12 +15,14 @@ class Solution:
 
     weights  (C, 6, 6) fixed weights of the rows of each class; None = the inverse of their noise, that in the regressor
              included and taken out of the scatter
+    known    (10,) what of phi was known beforehand, a tool, and is not asked for
     """
 
     linear: Array
     jacobian: Array
     prior: Array
     weights: Array | None = None
+    known: Array = field(default_factory=lambda: np.zeros(10))
 
     @classmethod
     def unconstrained(cls, linear: Array, weights: Array | None = None) -> Solution:

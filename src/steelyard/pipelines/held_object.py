@@ -38,6 +38,7 @@ from steelyard.sanity import (
     levelled,
     untouched,
 )
+from steelyard.spatial import Pose
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -93,47 +94,97 @@ def identify(
     Raises CannotAnswer where the data do not fix mass and centre of mass, BadInput where they make no sense.
     """
     known = identify(tool, options) if isinstance(tool, Recording) else tool
+    known = None if known is None else _in_log_sign(known, recording)
     recording, before = examine(recording)
     aligned, level = _levelled(align(recording), recording, options)
-    bias = Bias(options.bias, drift=options.drift)
     log, unmeasured = _with_known_acceleration(aligned.log, aligned)
-    keep, touched = (slice(None), ()) if unmeasured else untouched(log, bias.free)
+    keep, touched = (slice(None), ()) if unmeasured else untouched(log, options.bias == "free")
     log = without_dead(with_declared(log.rows(keep), recording.noise), dead_channels(recording))
-    shape = None if parts is None else _shape(parts, recording)
-    estimator, notes = _estimator(options, log, bias, shape)
-    estimate = estimator.identify(log)
-    if shape is not None and not estimate.evidence.rank:
-        raise CannotAnswer(
-            "The data fix nothing of the body, not even its mass: the wrench does not follow the orientations. Check "
-            "their unit, form and clock; the shape alone weighs nothing."
-        )
+    shape = None if parts is None else _shape(parts, recording.object_pose, recording.object_pose_std)
+    load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
+    estimate = load.estimate()
     late = after(log, estimate, aligned, recording)
-    if bias.free and any(f.code == "bias-drift" for f in late):
-        bias = replace(bias, drift=True)
-        estimate = _estimator(options, log, bias, shape)[0].identify(log)
-        notes = (*notes, "the fit was repeated with a bias that drifts")
-    if known is not None:
-        estimate, shared = _with_tool(options, log, bias, estimate, _in_log_sign(known, recording))
-        notes = (*notes, *shared)
-    notes = (*notes, *level, *unmeasured)
+    if load.bias.free and not load.bias.drift and any(f.code == "bias-drift" for f in late):
+        load = replace(load, bias=replace(load.bias, drift=True))
+        estimate = load.estimate().noted("the fit was repeated with a bias that drifts")
+        late = after(log, estimate, aligned, recording)
+    estimate = load.without_tool(estimate).noted(*level, *unmeasured)
     if unmeasured:
         estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())
-    if shape is not None:
-        dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts if known is None else ())
-        estimate = replace(estimate, findings=(*dense, *estimate.findings))
-    if parts is not None and not isinstance(parts, Parts):
-        before = (*before, *parts.findings)
-    if parts is not None and not any(recording.object_pose_std or ()):
-        notes = (*notes, "pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
-    return _in_recording_sign(
-        replace(
-            _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late),
-            delays_s=dict(aligned.delays_s),
-            notes=(*notes, *aligned.notes, *estimate.notes),
-        ),
-        recording,
-    )
+    if parts is not None and shape is not None:
+        estimate = _looked_at(estimate, parts, shape)
+        before = before if isinstance(parts, Parts) else (*before, *parts.findings)
+        if not any(recording.object_pose_std or ()):
+            estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
+    estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late)
+    return _in_recording_sign(replace(estimate, delays_s=dict(aligned.delays_s)).noted(*aligned.notes), recording)
+
+
+@within_numbers()
+def identify_rows(
+    log: MotionLog,
+    options: Options = Options(),
+    tool: Estimate | None = None,
+    parts: Parts | Shape | None = None,
+    pose: Pose | None = None,
+    pose_std: tuple[float, float] | None = None,
+) -> Estimate:
+    """Return what the robot holds, from rows made by the caller: fitted as they are, neither aligned nor checked.
+
+    tool, parts as in `identify`; `pose` is X_SO, where the object's frame sits in S (there, if None), and `pose_std`
+    its standard deviations [m], [rad].
+    """
+    if options.gravity == "unknown":
+        raise BadValue('gravity "unknown" needs a recording with rotations: rows know gravity in the sensor only.')
+    shape = None if parts is None else _shape(parts, pose or Pose.identity(), pose_std)
+    load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, tool)
+    estimate = load.without_tool(load.estimate())
+    return estimate if parts is None or shape is None else _looked_at(estimate, parts, shape)
+
+
+@dataclass(frozen=True)
+class _Load:
+    """Rows to fit, and all that is known beforehand of what they weigh: tool, object, or both."""
+
+    log: MotionLog
+    bias: Bias
+    options: Options
+    shape: Placed | None
+    tool: Estimate | None
+
+    def estimate(self) -> Estimate:
+        """Return what was held: the tool still in it unless there is a shape."""
+        estimator, notes = _estimator(self.options, self.log, self.bias, self.shape, self.tool)
+        estimate = estimator.identify(self.log)
+        if self.shape is not None and not estimate.evidence.rank:
+            raise CannotAnswer(
+                "The data fix nothing of the body, not even its mass: the wrench does not follow the orientations. "
+                "Check their unit, form and clock; the shape alone weighs nothing."
+            )
+        return replace(estimate, notes=(*notes, *estimate.notes))
+
+    def without_tool(self, estimate: Estimate) -> Estimate:
+        """Return the object alone."""
+        if self.tool is None:
+            return estimate
+        if self.shape is not None:
+            return estimate.noted(f"a tool of {self.tool.mass:.4g} kg was taken away; each run had a bias of its own")
+        prior = bias_prior(self.tool) if self.bias.free else None
+        if prior is None:
+            return without_tool(estimate, self.tool, shared=False).noted("the tool's run tells nothing about the bias")
+        same, p = shares_bias(self.tool, estimate)
+        if not same:
+            return without_tool(estimate, self.tool, shared=False).with_findings(different_bias(p))
+        again = replace(self, bias=replace(self.bias, prior=prior)).estimate()
+        shared = without_tool(again, self.tool, shared=True)
+        return shared.noted(f"one sensor bias is shared with the tool's run (p = {p:.2g})")
+
+
+def _looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed) -> Estimate:
+    """Return the estimate with what its densities give away, first of all findings."""
+    dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts)
+    return replace(estimate, findings=(*dense, *estimate.findings))
 
 
 def _levelled(aligned: Aligned, recording: Recording, options: Options) -> tuple[Aligned, tuple[str, ...]]:
@@ -186,26 +237,26 @@ def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
     return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))
 
 
-def _shape(parts: Parts | Shape, recording: Recording) -> Placed:
+def _shape(parts: Parts | Shape, pose: Pose | None, std: tuple[float, float] | None) -> Placed:
     """Return cuts into parts in the sensor's frame, the weight that each has beforehand, and how wrong they may be."""
-    if recording.object_pose is None:
+    if pose is None:
         raise BadValue(
             "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
         )
-    grasp_m, grasp_rad = recording.object_pose_std or (0.0, 0.0)
+    grasp_m, grasp_rad = std or (0.0, 0.0)
     grasp = {"grasp_m": grasp_m, "grasp_rad": grasp_rad}
     if isinstance(parts, Parts):
         _require_metres(parts)
         error = MEASURED.at_least(parts.com_std, parts.stretch)
-        return (parts.in_frame(recording.object_pose),), None, replace(error, **grasp)
+        return (parts.in_frame(pose),), None, replace(error, **grasp)
     cuts = parts.cuts()
-    placed = tuple(cut.in_frame(recording.object_pose) for cut in cuts.parts)
+    placed = tuple(cut.in_frame(pose) for cut in cuts.parts)
     return placed, cuts.prior, replace(parts.error, **grasp)
 
 
-def _volume(parts: Parts | Shape | None, placed: Placed) -> tuple[float, float]:
+def _volume(parts: Parts | Shape, placed: Placed) -> tuple[float, float]:
     """Return the volume of a shape [m^3] and its standard deviation, as a share of it."""
-    std = placed[2].stretch if parts is None or isinstance(parts, Parts) else parts.solid.volume_std
+    std = placed[2].stretch if isinstance(parts, Parts) else parts.solid.volume_std
     return float(placed[0][0].volume.sum()), std
 
 
@@ -223,14 +274,17 @@ def _estimator(
     options: Options,
     log: MotionLog,
     bias: Bias,
-    shape: tuple[tuple[Parts, ...], Array | None, ShapeError] | None = None,
+    shape: Placed | None,
+    tool: Estimate | None,
 ) -> tuple[NoiseAware | LeastSquares | Geodesic | PartCuts, tuple[str, ...]]:
     """Return the estimator and what there is to say about the choice."""
-    if shape is not None and options.method == "auto":
+    if shape is not None and options.method != "auto":
+        raise BadValue(f'method "{options.method}" knows no shape: leave it "auto", or leave parts and scan out.')
+    if shape is not None:
         cuts, weights, error = shape
         given = f"was scanned, in {len(cuts)} cuts" if len(cuts) > 1 else f"is given in {_counted(len(cuts[0]))}"
         why = f"method: auto chose part-masses, because the shape {given}"
-        return PartCuts(cuts, weights, bias, shape_error=error), (why,)
+        return PartCuts(cuts, weights, bias, shape_error=error, tool=tool), (why,)
     if options.method == "least-squares":
         return LeastSquares(bias=bias), ()
     if options.method == "geodesic":
@@ -254,21 +308,6 @@ def _estimator(
 def _counted(parts: int) -> str:
     """Return how many parts, in words that say what one part means."""
     return f"{parts} parts" if parts > 1 else "one part, taken to be of one density"
-
-
-def _with_tool(
-    options: Options, log: MotionLog, bias: Bias, load: Estimate, tool: Estimate
-) -> tuple[Estimate, tuple[str, ...]]:
-    """Return the object alone, and a note on whether the two runs share one bias."""
-    prior = bias_prior(tool) if bias.free else None
-    if prior is None:
-        return without_tool(load, tool, shared=False), ("the tool's run tells nothing about the bias",)
-    same, p = shares_bias(tool, load)
-    if not same:
-        return without_tool(load, tool, shared=False).with_findings(different_bias(p)), ()
-    estimator, _ = _estimator(options, log, replace(bias, prior=prior))
-    shared = without_tool(estimator.identify(log), tool, shared=True)
-    return shared, (f"one sensor bias is shared with the tool's run (p = {p:.2g})",)
 
 
 def _in_recording_sign(estimate: Estimate, recording: Recording) -> Estimate:

@@ -1,0 +1,118 @@
+"""Rows given by the caller, a tool, parts and a drifting bias: each is honoured beside every other, or refused."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard import api
+from steelyard.errors import BadFile, BadValue
+from steelyard.inertia import InertialParameters
+from steelyard.logs.log import MotionLog
+from steelyard.parts.parts import Parts
+from steelyard.pipelines.held_object import Options
+from steelyard.simulate.handling import handling_log
+from steelyard.spatial import Pose, Rotation
+
+DENSITY = np.array([7800.0, 7800, 1000, 1000])
+GRIPPER = InertialParameters.from_com(0.9, [0.001, 0.002, 0.06], np.diag([1.5e-3, 1.6e-3, 8e-4]))
+
+
+@pytest.fixture(scope="module")
+def bar() -> Parts:
+    """Four boxes in a bent row."""
+    half = np.array([0.02, 0.01, 0.015])
+    rows = []
+    for k in range(4):
+        volume, c = 8 * half.prod(), np.array([0.04 * k + 0.05, 0.02 * (k % 2), 0.01 * (k % 3)])
+        second = volume * (np.diag(half**2 / 3) + np.outer(c, c))
+        rows.append([volume, *(volume * c), *(np.trace(second) * np.eye(3) - second)[np.triu_indices(3)]])
+    return Parts(np.arange(4), np.array(rows))
+
+
+@pytest.fixture(scope="module")
+def held(bar: Parts) -> InertialParameters:
+    return bar.whole(DENSITY * bar.volume)
+
+
+def with_gripper(held: InertialParameters, seed: int) -> MotionLog:
+    return handling_log(InertialParameters(held.vector + GRIPPER.vector), noise="low", seed=seed)
+
+
+def drifting(log: MotionLog, end: float) -> MotionLog:
+    """Return the log with a force bias that grows to `end` N on every axis."""
+    time = np.linspace(0, 1, len(log))
+    return replace(log, wrench=log.wrench + end * time[:, None] * np.array([0, 0, 0, 1, 1, 1]))
+
+
+def test_rows_of_the_caller_are_fitted_with_parts(bar: Parts, held: InertialParameters) -> None:
+    log = handling_log(held, noise="low", seed=0)
+    found = api.identify(log, parts=bar)
+    assert len(found.parts) == 4
+    assert (np.abs(found.parameters.vector - held.vector) < 4 * np.sqrt(np.diag(found.covariance))).all()
+    plain = api.identify(log)
+    assert np.trace(found.people_covariance[4:, 4:]) < 0.1 * np.trace(plain.people_covariance[4:, 4:])
+
+
+def test_rows_of_the_caller_heed_the_pose_of_the_object(bar: Parts, held: InertialParameters) -> None:
+    X_SO = Pose(Rotation.from_rpy([0.3, -0.2, 0.5]), np.array([0.02, 0.0, -0.03]))
+    log = handling_log(held.in_frame(X_SO), noise="low", seed=0)
+    found = api.identify(log, parts=bar, pose_in_sensor=X_SO)
+    np.testing.assert_allclose(found.mass, float(held.mass), rtol=5e-3)
+    assert "part-not-homogeneous" not in found.codes()
+    assert "part-not-homogeneous" in api.identify(log, parts=bar).codes()
+
+
+def test_rows_of_the_caller_heed_the_method(held: InertialParameters) -> None:
+    log = handling_log(held, noise="low", seed=0)
+    assert api.identify(log, Options(method="least-squares")).method == "least-squares"
+    with pytest.raises(BadFile):
+        api.identify(log, tool="nowhere.json")
+    with pytest.raises(BadFile):
+        api.identify(log, scan="nothing.ply")
+    with pytest.raises(BadValue, match="needs a recording"):
+        api.identify(log, Options(gravity="unknown"))
+
+
+def test_a_method_without_a_shape_refuses_parts(bar: Parts, held: InertialParameters) -> None:
+    with pytest.raises(BadValue, match='"least-squares" knows no shape'):
+        api.identify(handling_log(held, noise="low", seed=0), Options(method="least-squares"), parts=bar)
+
+
+@pytest.mark.parametrize("parts_given", [False, True])
+def test_the_tool_is_taken_away_with_parts_and_without(bar: Parts, held: InertialParameters, parts_given: bool) -> None:
+    off, inertia = [], []
+    for seed in range(4):
+        tool = api.identify(handling_log(GRIPPER, noise="low", seed=seed))
+        found = api.identify(with_gripper(held, 50 + seed), tool=tool, parts=bar if parts_given else None)
+        gap = found.parameters.vector - held.vector
+        off.append(gap / np.sqrt(np.diag(found.covariance)))
+        inertia.append(np.abs(gap[4:]).max())
+        assert "part-not-homogeneous" not in found.codes()
+        assert len(found.parts) == (4 if parts_given else 0)
+        if parts_given:
+            np.testing.assert_allclose(sum(p.mass for p in found.parts), found.mass, rtol=1e-6)
+    assert np.sqrt(np.mean(np.square(off))) < 1.6
+    assert (max(inertia) < 5e-5) == parts_given
+
+
+def test_the_tool_may_be_known_exactly(bar: Parts, held: InertialParameters) -> None:
+    tool = replace(api.identify(handling_log(GRIPPER, noise="low", seed=0)), parameters=GRIPPER)
+    exact = replace(tool, covariance=np.zeros((10, 10)))
+    log = with_gripper(held, 7)
+    sharp, blunt = (api.identify(log, tool=known, parts=bar) for known in (exact, tool))
+    alone = api.identify(handling_log(held, noise="low", seed=7), parts=bar)
+    assert sharp.std[0] < blunt.std[0]
+    np.testing.assert_allclose(sharp.std[:4], alone.std[:4], rtol=0.3)
+    assert (np.abs(sharp.parameters.vector - held.vector) < 4 * np.sqrt(np.diag(sharp.covariance))).all()
+
+
+@pytest.mark.parametrize("parts_given", [False, True])
+def test_a_drift_is_taken_out_with_parts_and_without(bar: Parts, held: InertialParameters, parts_given: bool) -> None:
+    log = drifting(replace(handling_log(held, noise="low", seed=0), noise=None), 2.0)
+    parts = bar if parts_given else None
+    steady, moving = (api.identify(log, Options(drift=drift), parts=parts) for drift in (False, True))
+    assert abs(moving.mass - float(held.mass)) < 4 * moving.std[0] < 0.2 * steady.std[0]
+    assert abs(moving.mass - float(held.mass)) < 2e-3
