@@ -249,7 +249,15 @@ def test_a_wrong_option(arguments: list[str]) -> None:
 def test_an_output_folder_that_is_not_there(made: Path, tmp_path: Path) -> None:
     path = tmp_path / "no" / "out.json"
     text = steelyard("identify", made, "-o", path, "--json").failed(2)
-    assert text == f"{path}: cannot be written (No such file or directory)."
+    assert text == f"{path}: cannot be written: there is no folder {path.parent}. Make it first."
+
+
+def test_what_is_read_is_not_written_over(made: Path, tool: tuple[Path, Path]) -> None:
+    before = made.read_bytes()
+    assert steelyard("identify", made, "-o", made).failed(2) == f"{made}: a result is written as .json."
+    text = steelyard("identify", made, "--tool", tool[1], "-o", tool[1]).failed(2)
+    assert text == f"{tool[1]} is what is read; give a result another name."
+    assert made.read_bytes() == before
 
 
 # Sound data that do not answer: exit status 3.

@@ -131,7 +131,7 @@ def test_parts_of_another_object_are_refused(capsys: pytest.CaptureFixture[str],
         (("@result.json", "--rival", "ols.json"), "--rival needs NAME=FILE, as in --rival OLS=ols.json; got 'ols.json'."),
         (("@result.json", "--scan", "@c.ply"), "--scan colours the parts that --parts gives: give both, or leave --scan out."),
         (("@result.json", "--parts", "@result.json"), "@result.json: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."),
-        (("@result.json", "-o", "@no/r.html"), "@no/r.html: cannot be written (No such file or directory)."),
+        (("@result.json", "-o", "@no/r.html"), "@no/r.html: cannot be written: there is no folder @no. Make it first."),
     ],
 )  # fmt: skip
 def test_wrong_calls(capsys: pytest.CaptureFixture[str], folder: Path, arguments: tuple[str, ...], error: str) -> None:

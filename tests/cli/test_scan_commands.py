@@ -71,7 +71,7 @@ def test_tables_for_people_say_what_was_written(capsys: pytest.CaptureFixture[st
         (("scan", "@", "-o", "@/cloud.obj"), "a cloud is written as .ply or .npz"),
         (("scan", "@/nothing"), "nothing"),
         (("segment", "@/cloud.xyz"), "no such file"),
-        (("segment", "@", "-o", "@/parts.json"), "parts are written as .npz"),
+        (("segment", "@", "-o", "@/parts.json"), "a solid in parts is written as .npz"),
     ],
 )
 def test_wrong_calls_write_nothing(

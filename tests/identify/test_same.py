@@ -94,3 +94,21 @@ def test_nothing_to_compare(runs: list[Estimate]) -> None:
         compare(one.parameters, one.covariance, other.parameters, other.covariance, ~ALL)
     text = "Neither mass nor inertia is identified in both results; there is nothing to compare."
     assert str(caught.value) == text
+
+
+def test_exact_results_are_the_same_only_if_they_are(runs: list[Estimate]) -> None:
+    body, nothing = runs[0].parameters, np.zeros((10, 10))
+    assert compare(body, nothing, body, nothing, ALL).p_value == 1
+    heavier = type(body)(body.vector * 1.01)
+    verdict = compare(body, nothing, heavier, nothing, ALL)
+    assert verdict.p_value == 0
+    assert dict((name, gap) for name, gap, _ in verdict.compared)["mass"] == pytest.approx(0.01 * float(body.mass))
+
+
+def test_a_gap_in_a_direction_that_both_know_exactly_counts(runs: list[Estimate]) -> None:
+    """As of two answers with one shape: the mass is free, and all else follows it."""
+    body = runs[0].parameters
+    sharp = np.outer(body.vector, body.vector) * 1e-4
+    assert compare(body, sharp, type(body)(1.005 * body.vector), sharp, ALL).p_value > 0.5
+    moved = body.in_frame(Pose(Rotation.identity(), np.array([0.002, 0, 0])))
+    assert compare(body, sharp, moved, sharp, ALL).p_value < 1e-6

@@ -8,6 +8,7 @@ from pathlib import Path
 import click
 
 from steelyard.cli.console import print_json
+from steelyard.errors import BadValue
 
 
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
@@ -22,14 +23,21 @@ def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
     from steelyard.io import read_result
 
     a, b = read_result(first), read_result(second)
+    if a.frame != b.frame and not any_grasp:
+        raise BadValue(
+            f'{first} is in frame "{a.frame}" and {second} in "{b.frame}": places in them cannot be compared. '
+            "Give --any-grasp to compare mass and principal moments."
+        )
     found = same.compare(a.parameters, a.covariance, b.parameters, b.covariance, a.identified & b.identified, any_grasp)
     if as_json:
         print_json(asdict(found) | {"same": found.same})
         return
     verdict = "the same object" if found.same else "not the same object"
     p = f"{found.p_value:.3g}" if found.p_value > 0 else "0 to rounding"
-    click.echo(f"{verdict}: p = {p} (chi² {found.chi2:.1f}, {found.dof} degrees of freedom)")
+    chi2 = f"{found.chi2:.1f}" if found.chi2 < 1e6 else f"{found.chi2:.1e}"
+    click.echo(f"{verdict}: p = {p} (chi² {chi2}, {found.dof} degrees of freedom)")
     for name, gap, std in found.compared:
         factor, unit = (1.0, "kg") if name == "mass" else (1e3, "mm") if name.startswith("com") else (1e6, "kg mm²")
-        far = f"   {abs(gap) / std:.0f} standard deviations" if abs(gap) > 3 * std > 0 else ""
+        times = abs(gap) / std
+        far = "" if times <= 3 else f"   {times:.0f} standard deviations" if times < 1e4 else "   far beyond both bars"
         click.echo(f"  {name:20s} {plus_minus(factor * gap, factor * std, unit)}{far}")

@@ -4,10 +4,13 @@ from __future__ import annotations
 
 import json
 import sys
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from pathlib import Path
 from typing import Any
 
 import click
+
+from steelyard.errors import BadFile, BadValue
 
 
 def print_json(value: Any) -> None:
@@ -20,10 +23,24 @@ def say(text: str) -> None:
     click.echo(text, err=True)
 
 
+def require_output(output: Path | None, what: str, suffixes: Sequence[str], *inputs: Path | None) -> None:
+    """Raise BadValue or BadFile, before any work is done, where `output` is no place to write `what` to.
+
+    suffixes  what its name must end in; inputs  what is read, and must not be written over
+    """
+    if output is None:
+        return
+    if output.suffix.lower() not in suffixes:
+        raise BadValue(f"{output}: {what} is written as {' or '.join(suffixes)}.")
+    for given in inputs:
+        if given is not None and given.resolve() == output.resolve():
+            raise BadValue(f"{output} is what is read; give {what} another name.")
+    if not output.parent.is_dir():
+        raise BadFile(f"{output}: cannot be written: there is no folder {output.parent}. Make it first.")
+
+
 def say_if_compiling() -> None:
     """Say once that kernels are compiled when no compiled ones are cached yet."""
-    from pathlib import Path
-
     import steelyard
 
     root = Path(steelyard.__file__).parent

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from steelyard.cli.console import print_json, say, say_if_compiling
+from steelyard.cli.console import print_json, require_output, say, say_if_compiling
 
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
@@ -42,12 +42,14 @@ def demo(story: str, seed: int, output: Path | None, keep: Path | None, as_json:
     held-object: scan a hammer, cut the scan into parts, identify it from a log. team: three robots carry one payload;
     from their joint angles and spring torques, where do they hold it and what is it?
     """
+    page = output or Path("team.html" if story == "team" else "report.html")
+    require_output(page, "a page", [".html", ".htm"])
     if story == "team":
         from steelyard.cli.demo_team import demo_team
 
-        demo_team(seed, output or Path("team.html"), keep, as_json)
+        demo_team(seed, page, keep, as_json)
     else:
-        _held_object(seed, output or Path("report.html"), keep, as_json)
+        _held_object(seed, page, keep, as_json)
 
 
 def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> None:

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import click
 
-from steelyard.cli.console import print_json, say, say_if_compiling
+from steelyard.cli.console import print_json, require_output, say, say_if_compiling
 from steelyard.errors import BadValue
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
@@ -72,6 +72,8 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
     if pendant == (log is not None):
         raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
+    place = None if pose_in_sensor is None or "{" in pose_in_sensor else Path(pose_in_sensor)
+    require_output(output, "a result", [".json"], log, tool, parts, scan, place)
     say_if_compiling()
     from steelyard import api
     from steelyard.cli.table import estimate_table

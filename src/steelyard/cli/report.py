@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from steelyard.cli.console import print_json, say
+from steelyard.cli.console import print_json, require_output, say
 from steelyard.errors import BadValue
 
 if TYPE_CHECKING:
@@ -46,6 +46,7 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
     from steelyard.report import Report, write_report
     from steelyard.team.estimate import TeamEstimate
 
+    require_output(output, "a page", [".html", ".htm"], result, parts, scan, log, truth)
     if scan is not None and parts is None:
         raise BadValue("--scan colours the parts that --parts gives: give both, or leave --scan out.")
     estimate = read_result(result)

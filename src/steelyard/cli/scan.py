@@ -8,8 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, progress_bar
-from steelyard.errors import BadValue
+from steelyard.cli.console import print_json, progress_bar, require_output
 
 if TYPE_CHECKING:
     from steelyard.shape.scan import Scan
@@ -28,8 +27,7 @@ def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     from steelyard.io.view_folders import read_views
     from steelyard.shape.scan import fuse
 
-    if output is not None and output.suffix.lower() not in (".ply", ".npz"):
-        raise BadValue(f"{output}: a cloud is written as .ply or .npz.")
+    require_output(output, "a cloud", [".ply", ".npz"], views)
     read = read_views(views, progress_bar("reading views"))
     begun = time.process_time()
     fused = fuse(read, points)

@@ -7,8 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, say_if_compiling
-from steelyard.errors import BadValue
+from steelyard.cli.console import print_json, require_output, say_if_compiling
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -28,10 +27,7 @@ if TYPE_CHECKING:
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_json: bool) -> None:
     """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""
-    if output is not None and output.suffix.lower() != ".npz":
-        raise BadValue(f"{output}: parts are written as .npz.")
-    if output is not None and output.resolve() == scan.resolve():
-        raise BadValue(f"{output} is the scan itself; give the parts another name, such as parts.npz.")
+    require_output(output, "a solid in parts", [".npz"], scan)
     say_if_compiling()
     from steelyard.api import save_parts, shape_of
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from steelyard.cli.console import print_json, say_if_compiling
+from steelyard.cli.console import print_json, require_output, say_if_compiling
 
 METHODS = ("joint", "paper")
 
@@ -24,6 +24,7 @@ METHODS = ("joint", "paper")
 @click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
 def team(team: Path, data: Path | None, method: str, output: Path | None, as_json: bool) -> None:
     """Find where every robot of TEAM (.toml) holds one payload, and its mass, centre of mass and inertia."""
+    require_output(output, "a result", [".json"], team)
     say_if_compiling()
     from steelyard import api
     from steelyard.cli.team_table import team_table

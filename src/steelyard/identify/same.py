@@ -9,8 +9,13 @@ from scipy.special import gammaincc
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.identify.conclude import natural_sizes
 from steelyard.inertia import InertialParameters, forms
 
+# A result is exact to this share of mass, radius of gyration and inertia: what is typed from a data sheet is rounded.
+EXACT = 1e-6
+# No direction is known better than this beside the best known quantities in it, as a variance.
+SHARPEST = 1e-8
 NAMES = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
@@ -52,9 +57,9 @@ def compare(
         raise CannotAnswer("Neither mass nor inertia is identified in both results; there is nothing to compare.")
     gap = (second - first)[chosen]
     covariance = (first_cov + second_cov)[np.ix_(chosen, chosen)]
-    scale = 1 / np.sqrt(np.maximum(np.diag(covariance), 1e-300))
-    whitened = np.linalg.pinv(covariance * np.outer(scale, scale), hermitian=True, rcond=1e-10)
-    chi2 = float((scale * gap) @ whitened @ (scale * gap))
+    scale = 1 / np.sqrt(np.diag(covariance))
+    values, axes = np.linalg.eigh(covariance * np.outer(scale, scale))
+    chi2 = float(((axes.T @ (scale * gap)) ** 2 / np.maximum(values, SHARPEST)).sum())
     shown = tuple((n, float(g), float(s)) for n, g, s in zip(np.array(names)[chosen], gap, 1 / scale, strict=True))
     return Comparison(float(gammaincc(len(gap) / 2, chi2 / 2)), chi2, len(gap), shown)
 
@@ -64,7 +69,7 @@ def _quantities(body: InertialParameters, covariance: Array, any_grasp: bool) ->
     J = np.zeros((10, 10))
     J[0, 0], J[1:] = 1, forms.com_jacobian(body.vector)
     values = np.concatenate([[body.mass], body.com, forms.upper(body.inertia_com)])
-    people = J @ covariance @ J.T
+    people = J @ covariance @ J.T + np.diag(np.square(EXACT * natural_sizes(body.vector.copy())))
     if not any_grasp:
         return values, people, NAMES
     moments, axes = np.linalg.eigh(body.inertia_com)
