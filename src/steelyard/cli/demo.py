@@ -15,6 +15,7 @@ from steelyard.cli.console import print_json, require_output, say, say_if_compil
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
     from steelyard.logs.log import MotionLog
+    from steelyard.logs.recording import Recording
     from steelyard.pipelines.shape_in_parts import Shape
     from steelyard.report import Report
     from steelyard.simulate.hammer import Seen
@@ -80,7 +81,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         chosen = shape.segmentation.cut(len(best.parts)).named(names)
         api.save_parts(replace(shape, segmentation=chosen), folder / "parts.npz")
         views = keep and _kept_views(seen, keep / "views")
-    write_report(_page(answers, shape, rows, seen, seed), output)
+    write_report(_page(answers, shape, recording, seen, seed), output)
     if as_json:
         keys = ("without_scan", "ols", "geo")
         others = {key: summary(rival, seen.truth) for key, rival in zip(keys, list(answers.values())[1:], strict=True)}
@@ -145,13 +146,14 @@ def _names(best: Estimate, shape: Shape, seen: Seen) -> dict[int, tuple[str, flo
     return {k: (seen.tool.part_names[int(volumes[:, k].argmax())], float(masses[k])) for k in range(len(made))}
 
 
-def _page(answers: Mapping[str, Estimate], shape: Shape, rows: MotionLog, seen: Seen, seed: int) -> Report:
+def _page(answers: Mapping[str, Estimate], shape: Shape, recording: Recording, seen: Seen, seed: int) -> Report:
     """Return the page: the parts of the cut that the log chose, in the colours they were seen in."""
+    from steelyard.pipelines.left_over import left_over
     from steelyard.report import Report, Residuals, Truth, scene_of_solid
 
     (_, best), *rivals = answers.items()
     made = shape.segmentation.cut(len(best.parts))
-    left = rows.wrench - rows.predicted(best.parameters.vector) + best.wrench_bias
+    rows, left = left_over(recording, best)
     names = {k: name for k, (name, _) in _names(best, shape, seen).items()}
     return Report(
         "A hammer, scanned and weighed",

@@ -32,6 +32,7 @@ _SAME_VOLUME = 0.02
 @click.option("--scan", type=_FILE, help="Cloud of the object (PLY, PCD or NPZ): points, and colours of the surface.")
 @click.option("--log", type=_FILE, help="The log of the result: residuals over time, and where the object sits.")
 @click.option("--data", type=_FILE, help="Folder that relative paths in the log's description start from.")
+@click.option("--tool", type=_FILE, help="Result (.json) of the gripper that was taken away: the log weighs it too.")
 @click.option("--pose-in-sensor", metavar="POSE", help="Where the object sits in the sensor, as for identify.")
 @click.option("--truth", type=_FILE, help="truth.json of an object folder: the true object beside the answer.")
 @click.option("--rival", "rivals", multiple=True, metavar="NAME=FILE", help="Another method's result; may be repeated.")
@@ -39,26 +40,28 @@ _SAME_VOLUME = 0.02
 @click.option("-o", "--output", type=_FILE, default=Path("report.html"), show_default=True, help="The page to write.")
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None, data: Path | None,
-           pose_in_sensor: str | None, truth: Path | None, rivals: tuple[str, ...], title: str | None, output: Path,
-           as_json: bool) -> None:  # fmt: skip
+           tool: Path | None, pose_in_sensor: str | None, truth: Path | None, rivals: tuple[str, ...],
+           title: str | None, output: Path, as_json: bool) -> None:  # fmt: skip
     """Write one self-contained page about RESULT (.json): numbers, parts in 3D, residuals, findings."""
     from steelyard.io import read_result
     from steelyard.report import Report, write_report
     from steelyard.team.estimate import TeamEstimate
 
-    require_output(output, "a page", [".html", ".htm"], result, parts, scan, log, truth)
+    require_output(output, "a page", [".html", ".htm"], result, parts, scan, log, tool, truth)
     if scan is not None and parts is None:
         raise BadValue("--scan colours the parts that --parts gives: give both, or leave --scan out.")
     estimate = read_result(result)
     others = {name: read_result(path) for name, path in map(_rival, rivals)}
     said = {"command": "steelyard " + " ".join(sys.argv[1:])}
     if isinstance(estimate, TeamEstimate):
-        if parts is not None or truth is not None or pose_in_sensor is not None:
-            raise BadValue("A team's result has no parts to draw: leave --parts, --truth and --pose-in-sensor out.")
+        if any(given is not None for given in (parts, truth, tool, pose_in_sensor)):
+            raise BadValue(
+                "A team's result has no parts to draw: leave --parts, --truth, --tool and --pose-in-sensor out."
+            )
         page = _of_team(title or f"{result.stem}: what the team carries", estimate, log, data, others, said)
     else:
         facts = None if truth is None else _Facts.read(truth, estimate)
-        of_log, residuals = (None, None) if log is None else _from_log(log, data, estimate)
+        of_log, residuals = (None, None) if log is None else _from_log(log, data, tool, estimate)
         placed = _given_pose(pose_in_sensor) or of_log or (None if facts is None else facts.X_SO)
         drawing, names = (None, {}) if parts is None else _scene(parts, scan, placed, estimate)
         known = None if facts is None else facts.truth
@@ -142,15 +145,21 @@ def _rival(said: str) -> tuple[str, str]:
     return name, path
 
 
-def _from_log(log: Path, data: Path | None, estimate: Estimate) -> tuple[Pose | None, Residuals | None]:
+def _from_log(
+    log: Path, data: Path | None, tool: Path | None, estimate: Estimate
+) -> tuple[Pose | None, Residuals | None]:
     """Return where the log says the object sits, and what the answer leaves over of its rows, where they have times."""
-    from steelyard.io import read_recording
-    from steelyard.logs.alignment import align
+    from steelyard.io import read_recording, read_result
+    from steelyard.pipelines.left_over import left_over, of_another_fit
     from steelyard.report import Residuals
 
     recording = read_recording(log, data)
-    rows = align(recording).log
-    left = rows.wrench - rows.predicted(estimate.parameters.vector) - recording.wrench_sign * estimate.wrench_bias
+    rows, left = left_over(recording, estimate, None if tool is None else read_result(tool))
+    if of_another_fit(estimate, left):
+        say(
+            f"{log} leaves much more than the result says: was it made of another log, or a tool taken away? "
+            "Give its result with --tool."
+        )
     residuals = None if rows.time is None else Residuals(rows.time, left[:, 3:], left[:, :3], rows.still)
     return recording.object_pose, residuals
 

@@ -84,7 +84,7 @@ class Problem:
 
         Time is scaled to -1..1 over the log, so that the drift's unit is half the change from start to end.
         """
-        z = np.column_stack([features(log), _scaled_time(log)])
+        z = np.column_stack([features(log), scaled_time(log)])
         key = np.stack([log.noise_class, log.still.astype(np.int64), log.pose], 1)
         groups, label = np.unique(key, axis=0, return_inverse=True)
         blocks = np.stack([z[label == g].T @ z[label == g] for g in range(len(groups))])
@@ -145,7 +145,7 @@ class Problem:
     def features(self, log: MotionLog) -> Array:
         """Return z (N, Z) of the rows of a log, as wide as this problem's statistic."""
         z = features(log)
-        return np.column_stack([z, _scaled_time(log)]) if self.T.shape[2] == 20 else z
+        return np.column_stack([z, scaled_time(log)]) if self.T.shape[2] == 20 else z
 
 
 def require_rows(rows: int) -> None:
@@ -161,10 +161,10 @@ def without_drift(log: MotionLog) -> MotionLog:
     loud = replace(log, noise_class=np.zeros(len(log), np.int64), noise=(Noise(np.zeros(6), EVERYDAY),))
     problem = Problem.of(Moments.of_log(loud, by_block=False), True).with_drift(loud)
     linear = solve_scaled(*problem.normal_equations(np.diag(1 / EVERYDAY)[None]))
-    return replace(log, wrench=log.wrench - np.outer(_scaled_time(log), linear[16:]))
+    return replace(log, wrench=log.wrench - np.outer(scaled_time(log), linear[16:]))
 
 
-def _scaled_time(log: MotionLog) -> Array:
+def scaled_time(log: MotionLog) -> Array:
     """Return time scaled to -1..1 over the log."""
     if log.time is None:
         raise CannotAnswer("A drifting bias needs a clock; the log has none. Record a time column.")

@@ -50,6 +50,8 @@ Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
 LARGEST = 2.0
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
+# How the note begins that says which direction of gravity was used.
+GRAVITY_FOUND = "gravity was estimated"
 # Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
 FEWEST_POSES = 4
 
@@ -96,7 +98,7 @@ def identify(
     known = identify(tool, options) if isinstance(tool, Recording) else tool
     known = None if known is None else _in_log_sign(known, recording)
     recording, before = examine(recording)
-    aligned, level = _levelled(align(recording), recording, options)
+    aligned, level = levelled_as(options.gravity, align(recording), recording)
     log, unmeasured = _with_known_acceleration(aligned.log, aligned)
     keep, touched = (slice(None), ()) if unmeasured else untouched(log, options.bias == "free")
     log = without_dead(with_declared(log.rows(keep), recording.noise), dead_channels(recording))
@@ -187,9 +189,11 @@ def _looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed) -> Estim
     return replace(estimate, findings=(*dense, *estimate.findings))
 
 
-def _levelled(aligned: Aligned, recording: Recording, options: Options) -> tuple[Aligned, tuple[str, ...]]:
-    """Return the log for the direction of gravity that it shows itself, where that was asked for."""
-    if options.gravity == "given":
+def levelled_as(
+    gravity: Literal["given", "unknown"], aligned: Aligned, recording: Recording
+) -> tuple[Aligned, tuple[str, ...]]:
+    """Return the log for the direction of gravity that it shows itself, and a note, where that was asked for."""
+    if gravity == "given":
         return aligned, ()
     if aligned.rotation is None:
         raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
@@ -198,7 +202,7 @@ def _levelled(aligned: Aligned, recording: Recording, options: Options) -> tuple
     if found is None:
         raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
     log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
-    return replace(aligned, log=log), (f"gravity was estimated {found.words} off the direction given",)
+    return replace(aligned, log=log), (f"{GRAVITY_FOUND} {found.words} off the direction given",)
 
 
 def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLog, tuple[str, ...]]:

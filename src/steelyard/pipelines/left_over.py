@@ -1,0 +1,51 @@
+"""What an answer leaves unexplained of its log, row by row: the rows as fitted, less what they should read."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.problem import scaled_time
+from steelyard.logs.alignment import align
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording
+from steelyard.pipelines.held_object import GRAVITY_FOUND, levelled_as
+from steelyard.sanity import examine
+
+# Residuals this many times those of the answer are not what it was made from.
+OTHER = 2.0
+# A median of sizes is this share of the root mean square, for normal noise.
+MEDIAN = 0.6745
+
+
+def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = None) -> tuple[MotionLog, Array]:
+    """Return the rows of the recording, put right as `identify` does, and what is left (N, 6) of their wrenches.
+
+    tool  what was taken away from the answer, and is in the log
+    """
+    recording, _ = examine(recording)
+    found = any(note.startswith(GRAVITY_FOUND) for note in estimate.notes)
+    aligned, _ = levelled_as("unknown" if found else "given", align(recording), recording)
+    log = aligned.log
+    vector = estimate.parameters.vector + (0.0 if tool is None else tool.parameters.vector)
+    left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
+    if "bias-drift" in estimate.codes() and log.time is not None:
+        left = left - _line(scaled_time(log), left)
+    return log, left
+
+
+def of_another_fit(estimate: Estimate, left: Array) -> bool:
+    """Tell whether residuals (N, 6) are so much larger than the answer's that it was made from something else.
+
+    Rows that the fit left out, touched ones, do not count: the median does not see them.
+    """
+    seen = estimate.evidence
+    typical = np.median(np.abs(left.reshape(-1, 2, 3)), axis=(0, 2)) / MEDIAN
+    said = np.array([seen.residual_torque_Nm, seen.residual_force_N])
+    return bool((typical > OTHER * said + 1e-6).any())
+
+
+def _line(time: Array, left: Array) -> Array:
+    """Return the line (N, 6) in time that fits residuals best: the drift that the fit took out."""
+    return np.outer(time, time @ left / max(float(time @ time), 1e-300))

@@ -1,0 +1,61 @@
+"""Residuals of an answer are those of the log as it was put right, with its tool and its drift."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+from steelyard.logs.recording import Recording, Stream
+from steelyard.pipelines.left_over import left_over, of_another_fit
+from steelyard.simulate import hammer
+
+
+@pytest.fixture(scope="module")
+def made() -> Recording:
+    return hammer.recording(0).recording
+
+
+def changed(recording: Recording, quantity: str, change: np.ndarray) -> Recording:
+    """Return the recording with what is added to one quantity, a row of which is as long as time goes from 0 to 1."""
+
+    def of(stream: Stream) -> Stream:
+        if quantity not in stream.channels:
+            return stream
+        added = np.linspace(0, 1, len(stream))[:, None] * change
+        return replace(stream, channels={**stream.channels, quantity: stream.channels[quantity] + added})
+
+    return replace(recording, streams=tuple(map(of, recording.streams)))
+
+
+def rms(left: np.ndarray) -> tuple[float, float]:
+    return float(np.sqrt((left[:, 3:] ** 2).mean())), float(np.sqrt((left[:, :3] ** 2).mean()))
+
+
+@pytest.mark.parametrize("mistake", ["none", "sign", "gravity", "drift"])
+def test_residuals_are_those_of_the_answer(made: Recording, mistake: str) -> None:
+    recording, options = made, sy.Options()
+    if mistake == "sign":
+        recording = replace(made, wrench_sign=-made.wrench_sign)
+    if mistake == "gravity":
+        turn = sy.Rotation.from_rpy([0.05, -0.08, 0])
+        recording, options = replace(made, gravity=turn.apply(made.gravity)), sy.Options(gravity="unknown")
+    if mistake == "drift":
+        recording = changed(made, "force", np.array([2.0, -1.5, 1.0]))
+    estimate = sy.identify(recording, options)
+    assert ("bias-drift" in estimate.codes()) == (mistake == "drift")
+    _, left = left_over(recording, estimate)
+    force, torque = rms(left)
+    assert force == pytest.approx(estimate.evidence.residual_force_N, rel=0.05)
+    assert torque == pytest.approx(estimate.evidence.residual_torque_Nm, rel=0.05)
+    assert not of_another_fit(estimate, left)
+
+
+def test_a_tool_that_was_taken_away_is_asked_for(made: Recording) -> None:
+    tool = sy.identify(made)
+    both = replace(tool, parameters=sy.InertialParameters(0.3 * tool.parameters.vector))
+    rest = replace(tool, parameters=sy.InertialParameters(0.7 * tool.parameters.vector))
+    assert of_another_fit(rest, left_over(made, rest)[1])
+    assert not of_another_fit(rest, left_over(made, rest, both)[1])
