@@ -10,7 +10,7 @@ from bench_logs import BIAS, ESTIMATORS, bench_log, declared
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from steelyard.errors import CannotAnswer, SteelyardError
+from steelyard.errors import BadValue, CannotAnswer, SteelyardError
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.logs.log import MotionLog, Noise
@@ -164,3 +164,12 @@ def test_a_noise_of_zero_is_refused() -> None:
     log = declared(bench_log("hammer", "stop_go"), 0.0, 0.0, 0.0, 0.0)
     found = NoiseAware().identify(log)  # zero means "not known" in a log, and is estimated
     assert found.mass == pytest.approx(0.945888, rel=1e-4)
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [({"prior": -1.0}, "prior"), ({"size": 0.0}, "size"), ({"size_spread": np.nan}, "size"), ({"iterations": 0}, "it")],
+)
+def test_options_without_sense_are_refused(options: dict[str, float], said: str) -> None:
+    with pytest.raises(BadValue, match=f"^{said}"):
+        NoiseAware(**options)  # type: ignore[arg-type]

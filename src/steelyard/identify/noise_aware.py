@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify import newton
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
@@ -46,6 +46,14 @@ class NoiseAware:
     size: float = float(NEUTRAL)
     size_spread: float = 1.0
     iterations: int = 60
+
+    def __post_init__(self) -> None:
+        if not 0 <= self.prior < np.inf:
+            raise BadValue(f"prior must be a weight of zero or more; got {self.prior}.")
+        if not (0 < self.size < np.inf and 0 < self.size_spread < np.inf):
+            raise BadValue(f"size [m] and size_spread must be above zero; got {self.size} and {self.size_spread}.")
+        if self.iterations < 1:
+            raise BadValue(f"iterations must be 1 or more; got {self.iterations}.")
 
     def identify(self, log: MotionLog) -> Estimate:
         """Return the estimate of a log; see `fit.fit_log`."""
