@@ -160,9 +160,10 @@ def residuals(report: Report) -> Html:
     seen = report.residuals
     if seen is None:
         return Html("")
+    shown = ", below 3 Hz, of all robots together" if isinstance(report.estimate, TeamEstimate) else ""
     lead = (
-        "Measured less predicted. The band holds every sample, the line is a running mean; shaded stretches are at "
-        "rest. A good answer leaves only noise about zero."
+        f"Measured less predicted{shown}. The band holds every sample, the line is a running mean; shaded stretches "
+        "are at rest. A good answer leaves only noise about zero."
     )
     plots = (residual_plot(seen, seen.force, "N", "Force"), residual_plot(seen, seen.torque, "N m", "Torque"))
     return section("What is left over", *plots, name="residuals", lead=lead)
@@ -216,13 +217,14 @@ def evidence(report: Report) -> Html:
     """Return what the data had to say: rows, rank, condition, residuals, hold-out, bias, delays, notes."""
     seen = report.estimate.evidence
     rows: list[tuple[str, object, str]] = [("method", report.estimate.method, "")]
+    of_what = ", of all robots together, unsmoothed" if isinstance(report.estimate, TeamEstimate) else ""
     if seen.samples:
         rows += [
             ("samples", f"{seen.samples}, of which {seen.still_samples} at rest", ""),
             ("rank", *_rank(report.estimate)),
             ("condition", general(seen.condition), "1 would be the best motion possible"),
             ("residual", f"{general(seen.residual_force_N)} N, {general(seen.residual_torque_Nm)} N m",
-             "root mean square per axis"),
+             "root mean square per axis" + of_what),
         ]  # fmt: skip
     if seen.chi2_per_dof is not None:
         rows.append(("chi² per degree of freedom", general(seen.chi2_per_dof), "1 where noise explains what is left"))
