@@ -29,7 +29,7 @@ from steelyard.team.hinged_poses import GUESS, Hinged, HingedFit, finished, fit_
 from steelyard.team.hinged_rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame
 from steelyard.team.hinged_signs import robot_of_other_sign
 from steelyard.team.hinged_start import first_hinged
-from steelyard.team.mass_and_com import require_lift
+from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.motion_noise import shares_of
 from steelyard.team.payload_doubt import turned_by_step
 from steelyard.team.pose_statistic import OWN
@@ -87,8 +87,9 @@ def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
 def _places(before: tuple[Stretch, ...], after: tuple[Stretch, ...]) -> Integers:
     """Return which row of `before` is nearest to each of `after`, recording by recording."""
     starts = np.cumsum([0, *(len(part) for part in before)])
-    each = zip(before, after, starts, strict=False)
-    return np.concatenate([start + np.minimum(np.arange(len(now)), len(was) - 1) for was, now, start in each])
+    middles = [(part.time[1:] + part.time[:-1]) / 2 for part in before]
+    each = zip(middles, after, starts[:-1], strict=True)
+    return np.concatenate([start + np.searchsorted(middle, now.time) for middle, now, start in each])
 
 
 def identify_two_bodies(
@@ -108,6 +109,7 @@ def identify_two_bodies(
     require_lift(float(payload.parameters[0]), "the forces")
     doubt, frame = _Doubt.of(payload, fit, force), hinge_frame(team)
     seventeen = payload.parameters - _wrists(log, team, wrists)
+    require_lift(float(seventeen[0]), WITHOUT_WRISTS)
     units, whole = payload.scale[:WHOLE], slice(0, WHOLE)
     vector = consistent(seventeen[whole], payload.covariance[whole, whole], units)
     body = InertialParameters(vector).in_frame(frame)

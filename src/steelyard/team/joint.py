@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
@@ -26,6 +27,7 @@ from steelyard.team.hinge import Split, find_split, rigidity_findings
 from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
 from steelyard.team.hinged_team import identify_two_bodies
+from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
@@ -131,19 +133,23 @@ class JointTeam:
         return replace(team, findings=tuple(found))
 
     def _require_wrists(self, log: TeamLog) -> None:
-        """Raise BadValue where the wrist of a robot that is not there is given a mass."""
+        """Raise BadValue where a wrist's mass is none, or that of a robot that is not there."""
         unknown = sorted(set(self.wrists) - set(log.names))
         if unknown:
             raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
+        for name, mass in self.wrists.items():
+            check.not_negative(f"the mass of the wrist of '{name}'", mass)
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:
-    """Return the estimate less a point mass at every grasp named."""
+    """Return the estimate less a point mass at every grasp named; raises CannotAnswer where nothing is left."""
     if not wrists:
         return team
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
-    return replace(team, parameters=team.parameters - points)
+    left = team.parameters - points
+    require_lift(float(left.mass), WITHOUT_WRISTS)
+    return replace(team, parameters=left)
 
 
 def _require_one_clock(chi2: float) -> None:
