@@ -13,7 +13,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.team_log import TeamRecording
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
@@ -326,6 +326,25 @@ def test_clocks_that_are_not_done_are_told_as_they_were_used(rounds: int, monkey
     used = twist_stretches(made.log, team.late)
     for part, again in zip(team.parts, used, strict=True):
         np.testing.assert_array_equal(part.twist, again.twist)
+
+
+@pytest.mark.parametrize(("sensing", "fit"), [("poses", "pose_fit"), ("twists", "twist_fit")])
+def test_a_fit_that_ends_too_early_is_told(sensing: str, fit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = trial(sensing=sensing, bases_move=sensing == "twists")
+    assert not JointTeam().identify(made.log).notes
+    monkeypatch.setattr(f"steelyard.team.{fit}.STEPS", 1)
+    (note,) = JointTeam().identify(made.log).notes
+    assert "The fit of the grasps ended before it settled" in note
+
+
+def test_two_robots_weigh_until_the_noise_has_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = simulate_team(TeamScene(CASES["A"], 2, six_axis=frozenset({0})), 100)
+    found = JointTeam().identify(made.log)
+    monkeypatch.setattr("steelyard.team.payload_fit.SETTLED", 1e-5)
+    monkeypatch.setattr("steelyard.team.payload_fit.ROUNDS", 60)
+    last = JointTeam().identify(made.log)
+    assert np.abs((found.mass - last.mass) / last.std[0]) < 0.05
+    np.testing.assert_allclose(found.std, last.std, rtol=0.05)
 
 
 def test_forces_of_nobody() -> None:

@@ -19,7 +19,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.assembled import known
-from steelyard.team.body_rows import BodyRows, reach
+from steelyard.team.body_rows import BodyRows, reach, require_runs
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.hinge import Split
@@ -213,10 +213,7 @@ def _kinds(
             bands = tuple(gathered(one, two, team, sums, edges, highest_hz) for team, _, one, two in some)
             noise = _motion_noise(ones, [left for _, left, _, _ in some], fit, edges, highest_hz)
             out.append(Kind(bands, noise, np.ones(len(edges))))
-    if not out:
-        raise CannotAnswer(
-            "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
-        )
+    require_runs(out)
     return tuple(out), turned
 
 

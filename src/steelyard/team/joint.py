@@ -19,7 +19,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.balance import require_balance
-from steelyard.team.body_rows import BodyRows, balance_frame, summing
+from steelyard.team.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.clock_search import F, searched
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.exchanged import require_own_files
@@ -36,7 +36,15 @@ from steelyard.team.pose_team import PoseTeam
 from steelyard.team.published import require_wrenches
 from steelyard.team.signs import with_one_sign
 from steelyard.team.spectra import band_edges, gathered
-from steelyard.team.team_findings import bad_robots, gains, late_clocks, lost_directions, open_parameters, vertical
+from steelyard.team.team_findings import (
+    bad_robots,
+    gains,
+    late_clocks,
+    lost_directions,
+    open_parameters,
+    unsettled,
+    vertical,
+)
 from steelyard.team.twist_team import TwistTeam
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
@@ -66,12 +74,13 @@ class JointTeam:
         if needs_twists(log):
             log, moving, begun = self._fitted(log, TwistTeam.of)
             grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
+            left = moving.fit.left
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
             log, standing, begun = self._fitted(log, PoseTeam.of)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
-            late, order = _against(standing.late, log.reference), 2
+            late, order, left = _against(standing.late, log.reference), 2, standing.fit.left
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
             jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
             if jointed is not None:
@@ -98,7 +107,7 @@ class JointTeam:
             *gains(payload.gain),
             *open_parameters(team.identified, team.evidence.rank),
         ]
-        return replace(team, findings=tuple(found))
+        return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, dict[str, float]]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""
@@ -190,8 +199,5 @@ def _groups(made: list[tuple[BodyRows, Array]], noise: Array, highest_hz: float,
         spectra = tuple(gathered(r, edges, highest_hz) for r in rows)
         shaped = motion_noise(rows, residuals, noise, edges, highest_hz, order)
         out.append(Group(spectra, shaped, np.ones((len(edges), 6))))
-    if not out:
-        raise CannotAnswer(
-            "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
-        )
+    require_runs(out)
     return tuple(out)
