@@ -43,6 +43,8 @@ def test_no_rotations_at_all_are_fine() -> None:
             "force must be finite; 2 entries are not, the first at index (0, 1).",
         ),
         (lambda: check.positive("rate", [1, 2]), "rate must be a number; got [1, 2]."),
+        (lambda: check.not_negative("mass", "heavy"), "mass must be a number; got 'heavy'."),
+        (lambda: check.not_negative("mass", -3), "mass must be a finite number, zero or above; got -3."),
         (lambda: check.matrices("J", np.zeros((2, 3)), 4, 4), "J must have shape (..., 4, 4); got (2, 3)."),
     ],
 )

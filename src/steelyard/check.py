@@ -55,13 +55,25 @@ def matrices(name: str, values: ArrayLike, rows: int = 3, columns: int = 3) -> A
 
 def positive(name: str, value: float) -> float:
     """Return `value` as a float above zero."""
-    try:
-        number = float(value)
-    except (TypeError, ValueError):
-        raise BadValue(f"{name} must be a number; got {value!r}.") from None
+    number = _number(name, value)
     if not 0 < number < float("inf"):
         raise BadValue(f"{name} must be a finite number above zero; got {number:g}.")
     return number
+
+
+def not_negative(name: str, value: float) -> float:
+    """Return `value` as a float that is zero or above."""
+    number = _number(name, value)
+    if not 0 <= number < float("inf"):
+        raise BadValue(f"{name} must be a finite number, zero or above; got {number:g}.")
+    return number
+
+
+def _number(name: str, value: float) -> float:
+    try:
+        return float(value)
+    except (TypeError, ValueError):
+        raise BadValue(f"{name} must be a number; got {value!r}.") from None
 
 
 def rotations(name: str, values: ArrayLike, tolerance: float = 1e-6) -> Array:

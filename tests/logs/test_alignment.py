@@ -169,6 +169,32 @@ def test_world_frame_wrench_and_moved_sensor_are_brought_to_s():
     assert np.allclose(align(Recording((turned,), GRAVITY)).log.wrench, log.wrench, atol=1e-3)
 
 
+@pytest.mark.parametrize(
+    ("parts", "late", "sensors"),
+    [
+        (("force", "torque"), 0.1, {"imu": False, "position": True}),
+        (("force", "torque"), -0.06, {"imu_delay": 0.013, "mount": TURN}),
+        (("force",), 0.1, {"imu": False, "position": True}),
+        (("torque",), -0.06, {"imu": False, "position": True}),
+    ],
+)
+def test_a_late_pose_is_found_alike_whether_the_wrench_is_given_in_s_or_in_w(parts, late, sensors):
+    swing = Swing(1)
+    made = recording(swing, pose_delay=late, sign=-1, **sensors)
+    wrench = made.streams[0]
+    R, *_ = swing.at(wrench.time)
+    given = {q: np.einsum("nij,nj->ni", R, v) if q in parts else v for q, v in wrench.channels.items()}
+    turned = replace(wrench, channels=given, frames=dict.fromkeys(parts, "W"))
+    own, other = align(made), align(replace(made, streams=(turned, *made.streams[1:])))
+    assert other.delays_s["pose.csv"] == pytest.approx(late, abs=2e-4)
+    for name, seconds in own.delays_s.items():
+        assert other.delays_s[name] == pytest.approx(seconds, abs=3e-4), name
+    assert codes(other) == codes(own)
+    mine, found = fitted(own.log), fitted(other.log)
+    assert found[0] == pytest.approx(mine[0], rel=2e-4)
+    assert np.allclose(found[1:4] / found[0], mine[1:4] / mine[0], atol=2e-5)
+
+
 def test_tables_of_still_poses_match_by_row():
     rng = np.random.default_rng(0)
     R = Rotation.exp(rng.normal(size=(12, 3)))

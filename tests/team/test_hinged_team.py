@@ -12,7 +12,7 @@ import pytest
 
 from steelyard.check import Array
 from steelyard.cli.team_table import team_table
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile, BadValue, CannotAnswer
 from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters, forms
 from steelyard.io.result_files import result_dict, write_result
@@ -26,6 +26,7 @@ from steelyard.team import TeamEstimate
 from steelyard.team.hinge import find_split
 from steelyard.team.hinged_bodies import FROM_TEN, least_mass
 from steelyard.team.hinged_rows import COUNT, EXCHANGED, SEVEN, about_z, equations
+from steelyard.team.hinged_team import _places
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches
 from steelyard.team.team_findings import open_parameters
@@ -177,6 +178,23 @@ def test_the_length_of_a_lever_errs_no_more_than_all_its_axes_together(quiet: tu
     assert quiet[1].hinge is not None
     for body in quiet[1].hinge.bodies:
         assert body.first_moment_std.min() / 2 < body.lever_std < np.linalg.norm(body.first_moment_std)
+
+
+def test_wrists_that_weigh_more_than_both_bodies_are_refused(quiet: tuple[TeamTrial, TeamEstimate]) -> None:
+    with pytest.raises(CannotAnswer, match="without the wrists"):
+        JointTeam(wrists={"robot3": 500.0}).identify(quiet[0].log)
+
+
+def test_rows_of_clocks_put_right_begin_at_the_nearest_rows_of_before() -> None:
+    made = trial(100, late_s={1: 0.13, 2: -0.06})
+    before = stretches(made.log, {})
+    after = stretches(made.log, {"robot0": -0.02, "robot1": 0.13, "robot2": -0.06})
+    ends = np.cumsum([len(part) for part in after])
+    start = 0
+    for was, now, rows in zip(before, after, np.split(_places(before, after), ends[:-1]), strict=True):
+        nearest = np.abs(was.time[:, None] - now.time).min(0)
+        np.testing.assert_allclose(np.abs(was.time[rows - start] - now.time), nearest, atol=1e-9)
+        start += len(was)
 
 
 @pytest.mark.parametrize("failure", [BadValue("a rotation vector must be finite."), np.linalg.LinAlgError()])

@@ -13,7 +13,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.team_log import TeamRecording
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team import TeamEstimate
@@ -25,6 +25,7 @@ from steelyard.team.stacked import stretches
 from steelyard.team.twist_fit import fit_twists
 from steelyard.team.twist_rows import twist_stretches
 from steelyard.team.twist_statistic import TwistScatter
+from steelyard.team.twist_team import TwistTeam
 
 QUIET = TeamNoise(
     pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.2, torque_white_Nm=0.02
@@ -302,6 +303,48 @@ def test_known_wrists_are_taken_out_where_they_are() -> None:
     np.testing.assert_allclose(alone.mass * alone.com + moment, whole.mass * whole.com, atol=1e-9)
     with pytest.raises(BadValue, match="wrist of 'nobody'"):
         JointTeam(wrists={"nobody": 1.0}).identify(made.log)
+
+
+@pytest.mark.parametrize("mass", [-3.0, np.nan, np.inf, "heavy"])
+def test_a_wrist_weighs_something_or_nothing(mass: Any) -> None:
+    with pytest.raises(BadValue, match="mass of the wrist of 'robot1' must be a "):
+        JointTeam(wrists={"robot1": mass}).identify(trial(kinds=("still",)).log)
+
+
+def test_wrists_that_weigh_more_than_all_that_is_held_are_refused() -> None:
+    made = trial()
+    with pytest.raises(CannotAnswer, match=r"without the wrists' weight, .* a mass of -488 kg"):
+        JointTeam(wrists={"robot1": 500}).identify(made.log)
+    assert JointTeam(wrists={"robot1": 0.0}).identify(made.log).mass == JointTeam().identify(made.log).mass
+
+
+@pytest.mark.parametrize("rounds", [1, 2])
+def test_clocks_that_are_not_done_are_told_as_they_were_used(rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("steelyard.team.twist_team.CLOCK_ROUNDS", rounds)
+    made = trial(sensing="twists", bases_move=True, late_s={1: 0.1})
+    team = TwistTeam.of(made.log, True)
+    used = twist_stretches(made.log, team.late)
+    for part, again in zip(team.parts, used, strict=True):
+        np.testing.assert_array_equal(part.twist, again.twist)
+
+
+@pytest.mark.parametrize(("sensing", "fit"), [("poses", "pose_fit"), ("twists", "twist_fit")])
+def test_a_fit_that_ends_too_early_is_told(sensing: str, fit: str, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = trial(sensing=sensing, bases_move=sensing == "twists")
+    assert not JointTeam().identify(made.log).notes
+    monkeypatch.setattr(f"steelyard.team.{fit}.STEPS", 1)
+    (note,) = JointTeam().identify(made.log).notes
+    assert "The fit of the grasps ended before it settled" in note
+
+
+def test_two_robots_weigh_until_the_noise_has_settled(monkeypatch: pytest.MonkeyPatch) -> None:
+    made = simulate_team(TeamScene(CASES["A"], 2, six_axis=frozenset({0})), 100)
+    found = JointTeam().identify(made.log)
+    monkeypatch.setattr("steelyard.team.payload_fit.SETTLED", 1e-5)
+    monkeypatch.setattr("steelyard.team.payload_fit.ROUNDS", 60)
+    last = JointTeam().identify(made.log)
+    assert np.abs((found.mass - last.mass) / last.std[0]) < 0.05
+    np.testing.assert_allclose(found.std, last.std, rtol=0.05)
 
 
 def test_forces_of_nobody() -> None:

@@ -173,17 +173,6 @@ def test_loop_closure_ends_where_the_slope_is_zero() -> None:
             assert cost(moved) > best - 1e-6 * best
 
 
-def test_loops_of_exact_twists_are_closed() -> None:
-    trial = simulate_team(replace(NOISY, noise=TeamNoise()), 3)
-    tracks = [trial.log.recordings[0].tracks[name] for name in trial.log.names]
-    twists = np.array(
-        [np.concatenate([t.channels["angular_velocity"], t.channels["linear_velocity"]], 1) for t in tracks]
-    )
-    gaps = loop_closure.loop_gaps(trial.log.names, twists, np.ones(twists.shape[:2], bool))
-    assert len(gaps) == 4
-    assert max(max(gap) for gap in gaps.values()) < 1e-12
-
-
 def test_mass_and_com_of_a_known_body() -> None:
     gravity = 9.81 * Rotation.exp(0.1 * RNG.standard_normal((6, 3))).apply([0.0, 0.0, -1.0])
     com = np.array([0.2, -0.1, 0.4])

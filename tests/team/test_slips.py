@@ -8,7 +8,8 @@ from steelyard.check import Array
 from steelyard.simulate.team_sensing import autoregressive
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.slips import alone, find_slip, noise_alone
+from steelyard.team.slips import Slip, SlipAt, alone, find_slip, noise_alone
+from steelyard.team.stacked import Stretch
 
 ROWS, RATE = 1500, 100.0
 NOISE = np.array([1e-3, 1e-3, 1e-3, 3e-4, 3e-4, 3e-4])
@@ -54,3 +55,21 @@ def test_a_slip_is_found_where_it_is() -> None:
         assert slip is not None
         assert slip.robot == 1
         assert abs(slip.row - 700) < 30
+
+
+def held(name: str) -> Stretch:
+    """Return a recording of three robots whose clock starts at zero."""
+    all_of = np.ones((ROWS, 3), np.bool_)
+    poses = Pose(Rotation.identity(ROWS, 3), np.zeros((ROWS, 3, 3)))
+    return Stretch(name, "motion", np.arange(ROWS) / RATE, poses, all_of, np.zeros((ROWS, 3, 6)), all_of, all_of)
+
+
+def test_wrenches_near_the_time_of_a_slip_are_left_out_of_its_own_recording_alone() -> None:
+    slip = SlipAt(1, 7.0, Slip(2, 700, 0.005, 0.0, 1.0), np.array([0.0, 0.0, 0.0, 0.003, 0.0, 0.004]))
+    before, during, after = slip.applied((held("one"), held("two"), held("three")))
+    assert before.seen.all()
+    assert before.felt.all()
+    np.testing.assert_array_equal(during.felt[:, 2], np.abs(during.time - 7.0) >= 0.2)
+    np.testing.assert_array_equal(during.seen[:, 2], during.time <= 6.8)
+    assert after.felt.all()
+    assert not after.seen[:, 2].any()

@@ -54,7 +54,7 @@ def test_a_long_gap_spreads_and_a_short_one_does_not() -> None:
         rotation[slice(*missing)] = np.nan
         holed = Track.of(track.time, **{**track.channels, "rotation": rotation})
         made = replace(recording, tracks={**recording.tracks, "robot1": holed})
-        lost = np.flatnonzero(~condition(log, made, 3.0).has_pose[1])
+        lost = np.flatnonzero(~condition(log, made, 3.0).has_gravity[1])
         assert lost.min() == missing[0] - spread
         assert lost.max() == missing[1] - 1 + spread
 

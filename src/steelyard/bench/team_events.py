@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -103,7 +103,7 @@ def leaving_trial(seed: int) -> tuple[bool, Array]:
     return named, np.square(np.array(rows))
 
 
-def run(trials: int, slips: int, workers: int, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def run(trials: int, slips: int, workers: int) -> dict[str, Any]:
     """Return late_clock over `trials`, slips over `slips` with and as many without, leaving over `trials`."""
     seeds = [FIRST_SEED + k for k in range(trials)]
     late = np.array(list(spread(late_trial, seeds, workers)))

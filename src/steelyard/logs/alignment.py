@@ -13,6 +13,7 @@ from steelyard.findings import Finding
 from steelyard.logs import alignment_findings as say
 from steelyard.logs.conditioning import noise_std, sampling_rate, signal
 from steelyard.logs.delays import Clocks, Question, scan
+from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Imu, Mounting, imu
 from steelyard.logs.joint_fit import refine
 from steelyard.logs.kinematics import Kinematics, Motion, kinematics
@@ -21,7 +22,7 @@ from steelyard.logs.noise import classes, levels
 from steelyard.logs.outliers import bursts, inside, merged
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.stillness import Mask, pose_numbers, still_rows
-from steelyard.logs.tables import align_tables, wrench_in_sensor
+from steelyard.logs.tables import align_tables
 from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
@@ -95,7 +96,7 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
 class _Prepared:
     """A timed recording, each stream as a function of its own time.
 
-    clock, wrench   (N,), (N, 6) raw samples of the wrench in S, as applied to the object
+    clock, felt     (N,) raw samples of the wrench on the object
     known, unknown  delays that were given, and the streams whose delay is sought
     cutoff          [Hz] common low-pass, None where one stream tells everything on one clock
     """
@@ -103,7 +104,7 @@ class _Prepared:
     recording: Recording
     options: AlignOptions
     clock: Array
-    wrench: Array
+    felt: Felt
     cutoff: float | None
     kinematics: Kinematics
     imu: Imu | None
@@ -113,6 +114,11 @@ class _Prepared:
     @property
     def source(self) -> str:
         return "specific_force" if self.imu is not None else self.kinematics.source
+
+    def wrench(self, delays: Mapping[str, float]) -> Array:
+        """Return the raw wrench (N, 6) in S; a delay that is not known counts as none."""
+        turned = self.kinematics.at(self.clock, delays).rotation if self.felt.world else None
+        return self.felt.in_sensor(turned)
 
     def spans(self) -> dict[str, tuple[float, float]]:
         """Return the first and last stamp of every stream that is used."""
@@ -131,7 +137,7 @@ class _Prepared:
 
 
 def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
-    """Smooth the motion, low-pass the rest, and turn the wrench into S."""
+    """Smooth the motion and low-pass the rest."""
     source = _wrench_stream(recording)
     lag = source.delay or 0.0
     streams = tuple(replace(s, time=_time(s) - lag, delay=0.0) if s is source else s for s in recording.streams)
@@ -145,13 +151,10 @@ def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
     used = {*moving.streams, *([sensor.name] if sensor is not None else [])} - {wrench_stream.name}
     known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
     sought = [s.name for s in streams if s.name in used and s.delay is None] if options.estimate_delays else []
-    rotation = None
-    if any(wrench_stream.frames.get(q, "S") == "W" for q in ("force", "torque")):
-        rotation = moving.at(_time(wrench_stream), known).rotation
-    wrench = wrench_in_sensor(wrench_stream, recording.wrench_sign, rotation)
+    felt = Felt.of(wrench_stream, recording.wrench_sign)
     known = {n: d for n, d in known.items() if n not in sought}
     return _Prepared(
-        recording, options, _time(wrench_stream), wrench, cutoff, moving, sensor, known, tuple(sought)
+        recording, options, _time(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought)
     )  # fmt: skip
 
 
@@ -184,13 +187,13 @@ def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) 
 def _align_timed(given: _Prepared) -> Aligned:
     """Find clocks and mounts on rows without taps, then make the log."""
     taps = _taps(given) if given.options.leave_out_taps else np.zeros((0, 2))
-    time, wrench = _rows(given)
+    time, felt = _rows(given)
     touched = inside(time, taps)
-    clocks, delayed = _clocks(given, time[~touched], wrench[~touched])
+    clocks, delayed = _clocks(given, time[~touched], felt.rows(~touched))
     kept = ~touched & given.covered(time, clocks.delays_s)
     if kept.sum() < _FEWEST_ROWS:
         raise CannotAnswer(f"only {int(kept.sum())} rows are left after alignment; record a longer stretch.")
-    log, motion = _log(given, time[kept], wrench[kept], clocks)
+    log, motion = _log(given, time[kept], felt.rows(kept), clocks)
     findings = (
         *say.delay_findings(clocks, delayed),
         *say.mount_findings(given.imu, clocks.mounting),
@@ -214,7 +217,9 @@ def _align_timed(given: _Prepared) -> Aligned:
 def _taps(given: _Prepared) -> Array:
     """Return the intervals (K, 2) of taps on the wrench clock, as wide as the low-pass smears them."""
     margin = 0.03 if given.cutoff is None else max(0.03, 1.5 / given.cutoff)
-    found = [bursts(given.clock, part, margin) for part in (given.wrench[:, :3], given.wrench[:, 3:])]
+    # Delays are not known yet: a tap is far quicker than what they turn.
+    wrench = given.wrench(given.known)
+    found = [bursts(given.clock, part, margin) for part in (wrench[:, :3], wrench[:, 3:])]
     for stream in given.recording.streams:
         if "specific_force" in stream.channels and given.imu is not None:
             late = given.known.get(stream.name, 0.0)
@@ -222,8 +227,8 @@ def _taps(given: _Prepared) -> Array:
     return merged(*found)
 
 
-def _rows(given: _Prepared) -> tuple[Array, Array]:
-    """Return the common clock (M,) and the wrench there (M, 6): low-passed, thinned to what passes."""
+def _rows(given: _Prepared) -> tuple[Array, Felt]:
+    """Return the common clock (M,) and the wrench there: low-passed, thinned to what passes."""
     every = 1
     if given.cutoff is not None:
         every = max(int(sampling_rate(given.clock) / (2.5 * given.cutoff)), 1)
@@ -241,10 +246,11 @@ def _rows(given: _Prepared) -> tuple[Array, Array]:
             f"the others together from {start:.6g} to {end:.6g} s. "
             "Check the time units and that all are of one run."
         )
-    return time[shared], signal(given.clock, given.wrench, given.cutoff).at(time[shared])
+    values = signal(given.clock, given.felt.values, given.cutoff).at(time[shared])
+    return time[shared], replace(given.felt, values=values)
 
 
-def _clocks(given: _Prepared, time: Array, wrench: Array) -> tuple[Clocks, tuple[str, ...]]:
+def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
     reach = min(given.options.max_delay_s, 0.1 * float(time[-1] - time[0]))
     ok = given.covered(time, given.known)
@@ -256,7 +262,7 @@ def _clocks(given: _Prepared, time: Array, wrench: Array) -> tuple[Clocks, tuple
     if len(pick) < _FEWEST_ROWS:
         raise CannotAnswer(f"the streams share only {len(pick)} rows in time; record a longer stretch on all.")
     pick = pick[:: max(len(pick) // _FIT_ROWS, 1)]
-    question = Question(time[pick], wrench[pick], given.kinematics, given.imu, given.unknown, given.known, reach)
+    question = Question(time[pick], felt.rows(pick), given.kinematics, given.imu, given.unknown, given.known, reach)
     clocks = refine(question, {**given.known, **scan(question)})
     clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
     least = given.options.smallest_delay_s
@@ -279,9 +285,10 @@ def _with_interpolation(given: _Prepared, stds: Mapping[str, float]) -> dict[str
     return {n: float(np.hypot(v, _INTERPOLATION * steps[n])) if v > 0 else v for n, v in stds.items()}
 
 
-def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[MotionLog, Motion]:
+def _log(given: _Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[MotionLog, Motion]:
     """Return the log with its still rows, poses and noise."""
     motion = given.kinematics.at(time, clocks.delays_s)
+    wrench = felt.in_sensor(motion.rotation)
     gravity, acceleration, variance = motion.gravity, motion.acceleration, motion.acceleration_variance
     if given.imu is not None and clocks.mounting is not None:
         raw = given.imu.signal.at(time + clocks.delays_s.get(given.imu.name, 0.0))
@@ -300,7 +307,7 @@ def _log(given: _Prepared, time: Array, wrench: Array, clocks: Clocks) -> tuple[
     share = 1.0 if given.cutoff is None else min(1.0, 2 * given.cutoff / sampling_rate(given.clock))
     noise = levels(
         index, motion.alpha_variance, variance, residual - np.median(residual, 0), clocks.body,
-        noise_std(given.wrench) ** 2 * share, given.recording.noise,
+        noise_std(given.wrench(clocks.delays_s)) ** 2 * share, given.recording.noise,
     )  # fmt: skip
     log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
     return log, motion

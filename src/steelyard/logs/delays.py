@@ -14,6 +14,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Imu, Mounting
 from steelyard.logs.kinematics import Kinematics, Motion
 
@@ -40,21 +41,24 @@ class Question:
     """Everything the fit needs: rows on the wrench clock and the other streams as functions of their own
     time.
 
-    time (N,), wrench (N, 6) on-object in S; unknown = streams whose delay is sought; known = the other
+    time (N,), felt (N,) the wrench on the object; unknown = streams whose delay is sought; known = the other
     delays [s]
     """
 
     time: Array
-    wrench: Array
+    felt: Felt
     kinematics: Kinematics
     imu: Imu | None
     unknown: tuple[str, ...]
     known: Mapping[str, float]
     max_delay_s: float = 0.25
-    _cache: dict[tuple[float, ...], tuple[Motion, Array | None]] = field(default_factory=dict, repr=False)
+    _cache: dict[tuple[float, ...], tuple[Motion, Array, Array | None]] = field(default_factory=dict, repr=False)
 
-    def seen(self, delays: Mapping[str, float]) -> tuple[Motion, Array | None]:
-        """Return the motion and the raw specific force (N, 3) at the rows, for these delays."""
+    def seen(self, delays: Mapping[str, float]) -> tuple[Motion, Array, Array | None]:
+        """Return motion, wrench (N, 6) in S and raw specific force (N, 3) at the rows, for these delays.
+
+        What was given in W is turned by the rotation that the delays make of the rows.
+        """
         key = tuple(delays[n] for n in self.unknown)
         if key not in self._cache:
             if len(self._cache) > 64:
@@ -62,7 +66,8 @@ class Question:
             force = None
             if self.imu is not None:
                 force = self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
-            self._cache[key] = (self.kinematics.at(self.time, delays), force)
+            motion = self.kinematics.at(self.time, delays)
+            self._cache[key] = (motion, self.felt.in_sensor(motion.rotation), force)
         return self._cache[key]
 
 
@@ -95,10 +100,10 @@ def _best_lag(question: Question, delays: Mapping[str, float], name: str, by_wre
 
 def _scan_cost(question: Question, delays: Mapping[str, float], name: str, by_wrench: bool) -> float:
     """Return the profile likelihood cost of free linear fits of the six channels."""
-    motion, force = question.seen(delays)
+    motion, wrench, force = question.seen(delays)
     own = force is not None and question.imu is not None and name == question.imu.name
     chosen = [np.ones((len(force), 1)), force] if own and force is not None else features(motion, None)
-    cost = _log_share(question.wrench, chosen) if by_wrench else 0.0
+    cost = _log_share(wrench, chosen) if by_wrench else 0.0
     if force is not None and not own and motion.gravity is not None:
         # The accelerometer feels gravity turn as well, and no hand on the object disturbs it.
         cost += _log_share(force, chosen)
@@ -138,4 +143,4 @@ def free_residual(values: Array, features: list[Array]) -> Array:
 def _thinned(question: Question, rows: int) -> Question:
     """Return the question with at most `rows` rows, evenly taken."""
     pick = np.unique(np.linspace(0, len(question.time) - 1, min(rows, len(question.time))).astype(int))
-    return replace(question, time=question.time[pick], wrench=question.wrench[pick], _cache={})
+    return replace(question, time=question.time[pick], felt=question.felt.rows(pick), _cache={})

@@ -60,7 +60,7 @@ class _Layout:
             if centre:
                 add("centre", np.zeros(3), np.full(3, _PRIOR["centre"]))
         add("body", np.zeros(10), _PRIOR_BODY)
-        add("wrench_bias", question.wrench.mean(0), np.full(6, 1e3))
+        add("wrench_bias", question.seen(delays)[1].mean(0), np.full(6, 1e3))
         ends = np.cumsum([k for _, k in names])
         slices = {name: slice(int(e) - k, int(e)) for (name, k), e in zip(names, ends, strict=True)}
         return cls(slices, np.concatenate(start), np.concatenate(width), mount)
@@ -109,10 +109,10 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     turning where none is measured). Scales come from the residuals; rows far off count less; standard
     deviations from time blocks.
     """
-    motion, force = question.seen(delays)
+    motion, wrench, force = question.seen(delays)
     mount = None
     if question.imu is not None and force is not None:
-        mount = question.imu.rotation or first_mount(force, motion.gravity, question.wrench[:, 3:])
+        mount = question.imu.rotation or first_mount(force, motion.gravity, wrench[:, 3:])
     free_centre = motion.gravity is not None and not motion.measured
     layout = _Layout.of(question, delays, mount, centre=free_centre)
     layout = _mount_by_gravity(question, layout)
@@ -143,7 +143,7 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
 
 def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
     """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
-    motion, raw = question.seen(layout.delays(theta, question))
+    motion, wrench, raw = question.seen(layout.delays(theta, question))
     zero = np.zeros_like(motion.omega)
     gravity = motion.gravity
     pull = (gravity if gravity is not None else zero) - motion.acceleration
@@ -158,9 +158,9 @@ def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
             # one).
             extra = [(own - shift + pull) / mounting.scale]
         pull = -own
-    log = MotionLog(question.wrench, pull, zero, motion.omega, motion.alpha)
+    log = MotionLog(wrench, pull, zero, motion.omega, motion.alpha)
     body, bias = theta[layout.slices["body"]], theta[layout.slices["wrench_bias"]]
-    return np.concatenate([question.wrench - bias - log.predicted(body), *extra], 1)
+    return np.concatenate([wrench - bias - log.predicted(body), *extra], 1)
 
 
 def _jacobian(question: Question, layout: _Layout, theta: Array) -> tuple[Array, Array]:
@@ -258,13 +258,13 @@ def _memory(residual: Array) -> Array:
 
 def _first_scales(question: Question, layout: _Layout) -> Array:
     """Return starting scales (k,): what free linear fits of the channels leave over."""
-    motion, force = question.seen(layout.delays(layout.start, question))
-    residual = free_residual(question.wrench, features(motion, force))
+    motion, wrench, force = question.seen(layout.delays(layout.start, question))
+    residual = free_residual(wrench, features(motion, force))
     scales = 1.4826 * np.median(np.abs(residual), axis=0)
     if force is not None and motion.gravity is not None:
         steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
         scales = np.append(scales, 1.4826 * np.median(np.abs(free_residual(force, steady)), axis=0).mean() * np.ones(3))
-    sizes = question.wrench.std(0)
+    sizes = wrench.std(0)
     if len(scales) > 6 and force is not None:
         sizes = np.append(sizes, np.full(3, force.std()))
     return np.asarray(np.maximum(scales, _FINEST * sizes + 1e-12))

@@ -1,4 +1,4 @@
-"""Tables without time: still poses, and rows whose order means nothing; the wrench of a stream in S."""
+"""Tables without time: still poses, and rows whose order means nothing."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.findings import Finding
+from steelyard.logs.felt import Felt
 from steelyard.logs.imu import first_mount
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
@@ -33,7 +34,7 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     rotation = Rotation.nearest(found["rotation"][1]) if "rotation" in found else None
     force, torque = found["force"][0], found["torque"][0]
     merged = force if force is torque else Stream(force.name, {**force.channels, "torque": found["torque"][1]})
-    wrench = wrench_in_sensor(merged, recording.wrench_sign, rotation)
+    wrench = Felt.of(merged, recording.wrench_sign).in_sensor(rotation)
     gravity = _gravity(recording, rotation, wrench)
     if all(s.poses for s in streams):
         return MotionLog.of_poses(wrench, gravity), rotation, (), "none"
@@ -43,28 +44,6 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"
     finding = Finding.of("clock-missing", f"{names} has no clock: no delay or derivative can be found; {what}.")
     return log, rotation, (finding,), "linear_acceleration" if "linear_acceleration" in found else "none"
-
-
-def wrench_in_sensor(stream: Stream, sign: int, rotation: Rotation | None) -> Array:
-    """Return the wrench (N, 6) that the robot applies to the object, about the S origin in S.
-
-    `rotation` (N,) turns S into W; it is needed for channels given in W (moments there are about the S
-    origin too).
-    """
-    parts = []
-    for quantity in ("torque", "force"):
-        values = stream.channels[quantity]
-        if stream.frames.get(quantity, "S") == "W":
-            if rotation is None:
-                raise BadDescription(f"{quantity} of '{stream.name}' is given in W, but no stream gives the rotation.")
-            values = rotation.inverse().apply(values)
-        elif stream.mount is not None and stream.mount.rotation is not None:
-            values = stream.mount.rotation.apply(values)
-        parts.append(values)
-    torque, force = parts
-    if stream.mount is not None and stream.mount.position is not None:
-        torque = torque + np.cross(stream.mount.position, force)
-    return sign * np.concatenate([torque, force], 1)
 
 
 def _gravity(recording: Recording, rotation: Rotation | None, wrench: Array) -> Array:

@@ -20,7 +20,7 @@ from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose, Rotation, cross
 from steelyard.spatial.screws import log_pose
 
-_MEASURED = ("pose", "twist", "rate", "gravity", "wrench")
+_MEASURED = ("twist", "rate", "gravity", "wrench")
 _BRIDGED = 0.25  # of the cut-off's period: a shorter gap is filled as well as the filter sees
 _SPREAD = 0.5  # of the cut-off's period: how far the filter carries what was filled into a longer gap, or past an end
 
@@ -41,7 +41,7 @@ def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 
     columns = [_columns(log, name, time, smooth[name]) if name in smooth else empty for name in names]
     if cutoff_hz is not None:
         _forget_ends(columns, time, _SPREAD / cutoff_hz)
-    parts = ("rotation", "position", "twist", "twist_rate", "gravity", "wrench")
+    parts = ("twist", "twist_rate", "gravity", "wrench")
     stacked: dict[str, Any] = {part: np.stack([getattr(c, part) for c in columns]) for part in parts}
     masks: dict[str, Any] = {f"has_{part}": np.stack([c.has[part] for c in columns]) for part in _MEASURED}
     carries = np.stack([_carries(recording, name, time) for name in names])
@@ -88,7 +88,7 @@ class _Columns:
         self.twist_rate: Array = np.zeros((rows, 6))
         self.gravity: Array = np.zeros((rows, 3))
         self.wrench: Array = np.zeros((rows, 6))
-        self.has: dict[str, Mask] = {part: np.zeros(rows, np.bool_) for part in _MEASURED}
+        self.has: dict[str, Mask] = {part: np.zeros(rows, np.bool_) for part in ("pose", *_MEASURED)}
 
 
 def _columns(log: TeamLog, name: str, time: Array, smooth: _Channels) -> _Columns:

@@ -22,32 +22,28 @@ _BRIDGED = 2.5  # median steps: a value between two samples nearer than this is 
 class TeamRows:
     """Rows (T,) at one even clock for robots (N,), in the order of `names`.
 
-    rotation, position   poses X_HG (N, T, 3, 3), (N, T, 3) [m]
     twist                body twists (N, T, 6) [rad/s, m/s] of the grasp
     twist_rate           their derivative, component by component (N, T, 6) [rad/s^2, m/s^2]
     gravity              (N, T, 3) [m/s^2] in the grasp's axes
     wrench               (N, T, 6) [N m, N] applied to the payload at the grasp
     carries              (N, T) False where a robot is known to hold nothing
-    has_pose, has_twist, has_rate, has_gravity, has_wrench   (N, T) what was measured; values elsewhere mean nothing
+    has_twist, has_rate, has_gravity, has_wrench   (N, T) what was measured; values elsewhere mean nothing
     """
 
     names: tuple[str, ...]
     time: Array
-    rotation: Array
-    position: Array
     twist: Array
     twist_rate: Array
     gravity: Array
     wrench: Array
     carries: Mask
-    has_pose: Mask
     has_twist: Mask
     has_rate: Mask
     has_gravity: Mask
     has_wrench: Mask
 
     def __post_init__(self) -> None:
-        for name in ("time", "rotation", "position", "twist", "twist_rate", "gravity", "wrench"):
+        for name in ("time", "twist", "twist_rate", "gravity", "wrench"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
     def complete_wrench(self) -> Mask:

@@ -37,7 +37,6 @@ class TeamTruth:
     homes    X_WH (N,) of the robots' home frames; robots do not know them
     payload  X_RC of the frame that the simulated motion is given in, at rest W
     holds    (T, N) which robots hold the payload in the rows of the motion recording
-    shrunk   by how much the motions were made smaller to fit the workspaces
     """
 
     grasps: Pose
@@ -46,7 +45,6 @@ class TeamTruth:
     payload: Pose
     late_s: Array
     holds: Mask
-    shrunk: Mapping[str, float]
 
     @property
     def moments(self) -> Array:
@@ -72,7 +70,7 @@ def simulate_team(scene: TeamScene, seed: int, reference: int = 0) -> TeamTrial:
     geometry, moving, noisy = (np.random.default_rng([seed, share]) for share in _SHARES.values())
     payload = TeamPayload.draw(geometry, scene.robots)
     homes = _homes(geometry, payload)
-    plans, shrunk = _plans(moving, scene, payload, homes)
+    plans = _plans(moving, scene, payload, homes)
     squeeze = Squeeze.draw(moving, scene.squeeze_N, 3 * (scene.robots + len(scene.six_axis)))
     recordings, joints = [], []
     session = [draw_calibration(noisy, scene.noise) for _ in range(scene.robots)]
@@ -96,7 +94,7 @@ def simulate_team(scene: TeamScene, seed: int, reference: int = 0) -> TeamTrial:
         joints.append({name: logged for name, (_, logged) in made.items() if logged is not None})
         start += float(plan.time[-1] - plan.time[0]) + _PAUSE_S
     log = TeamLog(_robots(scene), tuple(recordings), f"robot{reference}")
-    return TeamTrial(log, _truth(scene, payload, homes, reference, holds, shrunk), tuple(joints))
+    return TeamTrial(log, _truth(scene, payload, homes, reference, holds), tuple(joints))
 
 
 def _robots(scene: TeamScene) -> tuple[TeamRobot, ...]:
@@ -105,16 +103,14 @@ def _robots(scene: TeamScene) -> tuple[TeamRobot, ...]:
     return tuple(TeamRobot(f"robot{i}", down, base) for i in range(scene.robots))
 
 
-def _truth(
-    scene: TeamScene, payload: TeamPayload, homes: Pose, reference: int, holds: Mask, shrunk: Mapping[str, float]
-) -> TeamTruth:
+def _truth(scene: TeamScene, payload: TeamPayload, homes: Pose, reference: int, holds: Mask) -> TeamTruth:
     back = payload.grasps[reference].inverse()
     body = payload.body
     if scene.hinge is not None:
         hinge = scene.hinge
         body = body + InertialParameters.from_com(hinge.mass, hinge.centre, np.diag(hinge.moments))
     late = np.array([scene.late_s.get(i, 0.0) for i in range(scene.robots)])
-    return TeamTruth(back @ payload.grasps, body.in_frame(back), homes, back, late, holds, shrunk)
+    return TeamTruth(back @ payload.grasps, body.in_frame(back), homes, back, late, holds)
 
 
 def _homes(rng: np.random.Generator, payload: TeamPayload) -> Pose:
@@ -123,11 +119,9 @@ def _homes(rng: np.random.Generator, payload: TeamPayload) -> Pose:
     return Pose(Rotation.exp(yaw[:, None] * [0.0, 0.0, 1.0]), payload.grasps.position)
 
 
-def _plans(
-    rng: np.random.Generator, scene: TeamScene, payload: TeamPayload, homes: Pose
-) -> tuple[list[Plan], dict[str, float]]:
-    """Return the recordings in order and by how much each kind of motion had to shrink."""
-    plans, shrunk = [], {}
+def _plans(rng: np.random.Generator, scene: TeamScene, payload: TeamPayload, homes: Pose) -> list[Plan]:
+    """Return the recordings in order."""
+    plans = []
     for kind in scene.kinds:
         if kind == "still":
             time = np.arange(scene.still_samples) / RATE_HZ
@@ -142,10 +136,8 @@ def _plans(
         time = np.arange(samples) / RATE_HZ
         motion = draw_motion(rng, time, band, ROTATION_MAX, TRANSLATION_MAX, scene.freedom)
         swing = _draw_swing(rng, scene, band, time)
-        motion, factor = _shrunk(scene, payload, homes, motion, time, swing)
-        shrunk[kind] = factor
-        plans.append(Plan(kind, time, motion, swing))
-    return plans, shrunk
+        plans.append(Plan(kind, time, _shrunk(scene, payload, homes, motion, time, swing), swing))
+    return plans
 
 
 def _draw_swing(rng: np.random.Generator, scene: TeamScene, band: tuple[float, float], time: Array) -> Array | None:
@@ -158,13 +150,14 @@ def _draw_swing(rng: np.random.Generator, scene: TeamScene, band: tuple[float, f
 
 def _shrunk(
     scene: TeamScene, payload: TeamPayload, homes: Pose, motion: SineMotion, time: Array, swing: Array | None
-) -> tuple[SineMotion, float]:
+) -> SineMotion:
+    """Return the motion, made smaller where it does not fit the workspaces."""
     factor = 1.0
     while not _fits(scene, payload, homes, motion.scaled(factor), time, swing):
         factor *= SHRINK
         if factor < LEAST:
             raise BadValue("these grasps leave the robots' workspaces even for small motions.")
-    return motion.scaled(factor), factor
+    return motion.scaled(factor)
 
 
 def _fits(

@@ -7,6 +7,7 @@ comes from positions over a baseline of a metre. Rows are cut into runs without 
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.fft import prev_fast_len
 
 from steelyard.check import Array
+from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.log import Mask
 from steelyard.spatial import Pose, Rotation, cross, cross_matrix
@@ -184,3 +186,11 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
             Run(motion[inside.start - rows.start : inside.stop - rows.start], pushed[inside], inside, part.rate)
         )
     return BodyRows(part.name, still, tuple(runs))
+
+
+def require_runs(kinds: Sequence[object]) -> None:
+    """Raise CannotAnswer where no kind of recording has rows to weigh the payload by."""
+    if not kinds:
+        raise CannotAnswer(
+            "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
+        )

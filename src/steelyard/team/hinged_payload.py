@@ -108,7 +108,8 @@ def fit_hinged_payload(
             _judged(kind, W, V, models, best, int(s)) for kind, W, s in zip(kinds, weights, starts[:-1], strict=True)
         )
         change = max(float(np.abs(np.log(n.force / k.force)).max()) for n, k in zip(renewed, kinds, strict=True))
-        if number > 1 and change < SETTLED:
+        # Weights and kinds that are told belong together, however it ends.
+        if (number > 1 and change < SETTLED) or number == ROUNDS - 1:
             break
         kinds = renewed
     off = models.phi - phi
@@ -144,15 +145,14 @@ def _weights(kind: Kind, V: Array, phi: Array, started: bool) -> Array:
 def _normal(part: Bands, kind: Kind, W: Array, sums: Sums, started: bool) -> Normal:
     """Return the normal equations of one recording in [parameters (17), bias (12)]."""
     wide = COUNT + BIAS
-    S, logdet = np.zeros((wide + 1, wide + 1)), float(part.rows @ np.linalg.slogdet(W)[1])
-    noise, N = np.zeros((COUNT, COUNT)), noisy()
+    S, noise, N = np.zeros((wide + 1, wide + 1)), np.zeros((COUNT, COUNT)), noisy()
     for z, weight, motion, rows in zip(part.z, W, kind.motion, part.rows, strict=True):
         flat = (np.linalg.cholesky(weight).T @ z).reshape(-1, wide + 1)
         S += flat.T @ flat
         if started:
             noise += rows * np.einsum("ijp,ik,jl,klq->pq", N, weight, motion, N, optimize=True)
     each = np.concatenate([sums.first, sums.second]) * (_forces(sums) * part.mean)
-    return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), logdet, each @ each.T)
+    return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each @ each.T)
 
 
 def _judged(kind: Kind, W: Array, V: Array, models: Models, best: int, start: int) -> Kind:

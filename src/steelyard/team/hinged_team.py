@@ -19,7 +19,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.assembled import known
-from steelyard.team.body_rows import BodyRows, reach
+from steelyard.team.body_rows import BodyRows, reach, require_runs
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.hinge import Split
@@ -29,7 +29,7 @@ from steelyard.team.hinged_poses import GUESS, Hinged, HingedFit, finished, fit_
 from steelyard.team.hinged_rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame
 from steelyard.team.hinged_signs import robot_of_other_sign
 from steelyard.team.hinged_start import first_hinged
-from steelyard.team.mass_and_com import require_lift
+from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.motion_noise import shares_of
 from steelyard.team.payload_doubt import turned_by_step
 from steelyard.team.pose_statistic import OWN
@@ -87,8 +87,9 @@ def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
 def _places(before: tuple[Stretch, ...], after: tuple[Stretch, ...]) -> Integers:
     """Return which row of `before` is nearest to each of `after`, recording by recording."""
     starts = np.cumsum([0, *(len(part) for part in before)])
-    each = zip(before, after, starts, strict=False)
-    return np.concatenate([start + np.minimum(np.arange(len(now)), len(was) - 1) for was, now, start in each])
+    middles = [(part.time[1:] + part.time[:-1]) / 2 for part in before]
+    each = zip(middles, after, starts[:-1], strict=True)
+    return np.concatenate([start + np.searchsorted(middle, now.time) for middle, now, start in each])
 
 
 def identify_two_bodies(
@@ -108,6 +109,7 @@ def identify_two_bodies(
     require_lift(float(payload.parameters[0]), "the forces")
     doubt, frame = _Doubt.of(payload, fit, force), hinge_frame(team)
     seventeen = payload.parameters - _wrists(log, team, wrists)
+    require_lift(float(seventeen[0]), WITHOUT_WRISTS)
     units, whole = payload.scale[:WHOLE], slice(0, WHOLE)
     vector = consistent(seventeen[whole], payload.covariance[whole, whole], units)
     body = InertialParameters(vector).in_frame(frame)
@@ -211,10 +213,7 @@ def _kinds(
             bands = tuple(gathered(one, two, team, sums, edges, highest_hz) for team, _, one, two in some)
             noise = _motion_noise(ones, [left for _, left, _, _ in some], fit, edges, highest_hz)
             out.append(Kind(bands, noise, np.ones(len(edges))))
-    if not out:
-        raise CannotAnswer(
-            "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
-        )
+    require_runs(out)
     return tuple(out), turned
 
 

@@ -11,6 +11,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
@@ -18,7 +19,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.balance import require_balance
-from steelyard.team.body_rows import BodyRows, balance_frame, summing
+from steelyard.team.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.clock_search import F, searched
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.exchanged import require_own_files
@@ -26,6 +27,7 @@ from steelyard.team.hinge import Split, find_split, rigidity_findings
 from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
 from steelyard.team.hinged_team import identify_two_bodies
+from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
@@ -34,7 +36,15 @@ from steelyard.team.pose_team import PoseTeam
 from steelyard.team.published import require_wrenches
 from steelyard.team.signs import with_one_sign
 from steelyard.team.spectra import band_edges, gathered
-from steelyard.team.team_findings import bad_robots, gains, late_clocks, lost_directions, open_parameters, vertical
+from steelyard.team.team_findings import (
+    bad_robots,
+    gains,
+    late_clocks,
+    lost_directions,
+    open_parameters,
+    unsettled,
+    vertical,
+)
 from steelyard.team.twist_team import TwistTeam
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
@@ -64,12 +74,13 @@ class JointTeam:
         if needs_twists(log):
             log, moving, begun = self._fitted(log, TwistTeam.of)
             grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
+            left = moving.fit.left
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
             log, standing, begun = self._fitted(log, PoseTeam.of)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
-            late, order = _against(standing.late, log.reference), 2
+            late, order, left = _against(standing.late, log.reference), 2, standing.fit.left
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
             jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
             if jointed is not None:
@@ -96,7 +107,7 @@ class JointTeam:
             *gains(payload.gain),
             *open_parameters(team.identified, team.evidence.rank),
         ]
-        return replace(team, findings=tuple(found))
+        return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, dict[str, float]]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""
@@ -131,19 +142,23 @@ class JointTeam:
         return replace(team, findings=tuple(found))
 
     def _require_wrists(self, log: TeamLog) -> None:
-        """Raise BadValue where the wrist of a robot that is not there is given a mass."""
+        """Raise BadValue where a wrist's mass is none, or that of a robot that is not there."""
         unknown = sorted(set(self.wrists) - set(log.names))
         if unknown:
             raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
+        for name, mass in self.wrists.items():
+            check.not_negative(f"the mass of the wrist of '{name}'", mass)
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:
-    """Return the estimate less a point mass at every grasp named."""
+    """Return the estimate less a point mass at every grasp named; raises CannotAnswer where nothing is left."""
     if not wrists:
         return team
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
-    return replace(team, parameters=team.parameters - points)
+    left = team.parameters - points
+    require_lift(float(left.mass), WITHOUT_WRISTS)
+    return replace(team, parameters=left)
 
 
 def _require_one_clock(chi2: float) -> None:
@@ -184,8 +199,5 @@ def _groups(made: list[tuple[BodyRows, Array]], noise: Array, highest_hz: float,
         spectra = tuple(gathered(r, edges, highest_hz) for r in rows)
         shaped = motion_noise(rows, residuals, noise, edges, highest_hz, order)
         out.append(Group(spectra, shaped, np.ones((len(edges), 6))))
-    if not out:
-        raise CannotAnswer(
-            "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
-        )
+    require_runs(out)
     return tuple(out)

@@ -10,9 +10,9 @@ counts as seen from both of its grasps, so that the answer does not depend on th
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass
-from itertools import combinations, permutations
+from itertools import permutations
 
 import numpy as np
 
@@ -21,7 +21,7 @@ from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import exp_pose
 from steelyard.team.adjoint import adjoint
-from steelyard.team.grasp_kinematics import Pair, pair
+from steelyard.team.grasp_kinematics import Pair
 from steelyard.team.grasps import Grasps
 
 _SERIES = 8  # terms of the right Jacobian: corrections are a few degrees at most
@@ -91,23 +91,6 @@ def refine(grasps: Grasps, pairs: Mapping[str, Pair], twists: Array, measured: M
     found = minimize(cost, np.zeros(6 * len(free)), jac=True, method="BFGS", options={"gtol": 1e-6})
     xi = np.einsum("nab,nb->na", factor, found.x.reshape(-1, 6))
     return Grasps(grasps.names, _moved(grasps.poses, free, xi), grasps.reference)
-
-
-def loop_gaps(names: Sequence[str], twists: Array, measured: Mask) -> dict[tuple[str, str, str], tuple[float, float]]:
-    """Return how far every loop of three separately estimated pairs is from closed: angle [rad] and distance [m].
-
-    Raises CannotAnswer where a pair does not tell its pose.
-    """
-    poses = {}
-    for i, j in combinations(range(len(names)), 2):
-        rows = measured[i] & measured[j]
-        poses[i, j] = pair(twists[i, rows], twists[j, rows]).pose
-    gaps = {}
-    for i, j, k in combinations(range(len(names)), 3):
-        round_trip = poses[i, j] @ poses[j, k] @ poses[i, k].inverse()
-        distance = float(np.linalg.norm(round_trip.position))
-        gaps[names[i], names[j], names[k]] = (float(round_trip.rotation.angle()), distance)
-    return gaps
 
 
 def _pair_cost(poses: Pose, moments: _Moments, weight: Array) -> tuple[float, Array]:

@@ -15,6 +15,8 @@ from steelyard.spatial import cross_matrix
 
 # Least spread of the directions of gravity [rad]: below it the height of the centre of mass is not fixed.
 LEAST_TILT = 1e-3
+# What must still hold the payload up when wrists of known mass are taken out.
+WITHOUT_WRISTS = "the forces, without the wrists' weight,"
 
 
 @dataclass(frozen=True, eq=False)

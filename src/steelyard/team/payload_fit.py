@@ -24,7 +24,8 @@ BIAS = np.geomspace(1e-3, 10.0, 13)
 # That gains have no error at all is beforehand as likely as so many other sizes together.
 NO_GAIN_ERROR = 3.0
 GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
-ROUNDS = 4
+# With two robots, whose moment is balanced through the payload alone, it takes up to nine.
+ROUNDS = 12
 # Noise has settled where it changes by less than this share.
 SETTLED = 0.03
 # What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
@@ -40,7 +41,7 @@ class PayloadFit:
     lost         (10, L) directions, in units of mass and size, that the rows do not show
     scale        (10,) those units
     information  (10, 10) F, so that a change of the rows that moves F phi by d moves phi by F^-1 d
-    bias_N, gain spread of force bias and gain per axis that the recordings show
+    gain         spread of the force axes' gains that the recordings show
     weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
     """
 
@@ -50,7 +51,6 @@ class PayloadFit:
     scale: Array
     information: Array
     condition: float
-    bias_N: float
     gain: float
     groups: tuple[Group, ...]
     weights: tuple[Array, ...]
@@ -68,7 +68,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     phi, groups = _start(groups, D, size)
     scale = _units(phi, size)
     starts = np.cumsum([0, *(len(group.parts) for group in groups)])
-    for _ in range(ROUNDS):
+    for left in reversed(range(ROUNDS)):
         weights = tuple(group.weights(phi) for group in groups)
         normals = [
             normal(part, D, W, group.motion_noise)
@@ -83,7 +83,8 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max())
             for new, old in zip(renewed, groups, strict=True)
         )
-        if change < SETTLED:
+        # Weights and groups that are told belong together, however it ends.
+        if not left or change < SETTLED:
             break
         groups = renewed
     off = models.phi - phi
@@ -92,7 +93,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     # in the noise already.
     last = groups[-1]
     covariance = covariance * (1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0))
-    bias, gain = np.sqrt(weight @ np.square(ladder))
+    gain = float(np.sqrt(weight @ np.square(ladder[:, 1])))
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
     blind = tuple(tuple(models.blind[best, a:b]) for a, b in pairwise(starts))
     noise = sum((n.noise for n in normals), np.zeros((10, 10)))
@@ -101,7 +102,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     shown = shown_of(values, vectors, noise * unit)
     condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
     return PayloadFit(
-        phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, float(bias), float(gain),
+        phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, gain,
         groups, weights, blind, _residual(groups), float(models.chi2[best]) / max(6 * rows - 10, 1.0),
     )  # fmt: skip
 

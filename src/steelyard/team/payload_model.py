@@ -46,14 +46,13 @@ class Normal:
     """Normal equations of one recording in [phi (10), bias (6)].
 
     H, g      of what was measured          noise  (10, 10) what the motion's noise adds to H on average
-    constant  the weighted square of the wrench     logdet  of all weights     pulled  (6, 6) bias per squared gain
+    constant  the weighted square of the wrench     pulled  (6, 6) bias per squared gain
     """
 
     H: Array
     g: Array
     noise: Array
     constant: float
-    logdet: float
     pulled: Array
 
 
@@ -89,13 +88,12 @@ def normal(part: Spectra, D: Array, W: Array, motion_noise: Array) -> Normal:
     g[:10] = np.einsum("kpix,kxi->p", WE, to_wrench[:, :12])
     g[10:] = np.einsum("kij,kj->i", W, to_wrench[:, -1])
     constant = float(np.einsum("kij,kji->", W, D @ to_wrench[:, 12:-1]))
-    logdet = float(part.rows @ np.linalg.slogdet(W)[1])
     first = E[:, :, :6].reshape(10, -1)
     noise = ((WE[..., :6] @ motion_noise[:, None]) * part.rows[:, None, None, None]).sum(0).reshape(10, -1) @ first.T
     force, unit = gain_columns(D)
     total = S.sum(0)
     mean = total[12 + force, -1] / max(float(total[-1, -1]), 1e-300)
-    return Normal(H, g, noise, constant, logdet, (unit * mean**2) @ unit.T)
+    return Normal(H, g, noise, constant, (unit * mean**2) @ unit.T)
 
 
 def residual_scatter(part: Spectra, D: Array, solution: Array, covariance: Array) -> Array:

@@ -153,13 +153,17 @@ class Known:
 
 @dataclass(frozen=True, eq=False)
 class PoseFit:
-    """The optimum: its rows, what they say, noise (N, 2) [rad, m], which parameters were unknown."""
+    """The optimum: its rows, what they say, noise (N, 2) [rad, m], which parameters were unknown.
+
+    left  how long another step would be, in standard deviations: next to nothing unless STEPS were too few
+    """
 
     reference: int
     rows: Rows
     known: Known
     noise: Array
     unknown: Integers
+    left: float
 
     @cached_property
     def solved(self) -> Shown:
@@ -219,7 +223,7 @@ def fit_poses(
         step = known.solver.step(pull)
         step_number += 1
         if step_number == STEPS or (quiet and float(step @ pull) < close.chi2):
-            return PoseFit(reference, here, known, noise, unknown)
+            return PoseFit(reference, here, known, noise, unknown, float(np.sqrt(max(step @ pull, 0.0))))
         full = np.zeros(OWN * count)
         full[unknown] = step
         team = here.team.moved(full.reshape(-1, OWN))

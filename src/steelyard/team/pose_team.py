@@ -114,7 +114,7 @@ class PoseTeam:
         """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were."""
         team, slips = self, list[SlipAt]()
         for _ in range(MOST_SLIPS):
-            found = team._slip(log)
+            found = team._slip()
             if found is None:
                 break
             # Once more without what follows the slip, which has bent the first fit.
@@ -125,7 +125,7 @@ class PoseTeam:
         team = self._fitted(log, clocks, raw, edited(edit, slips))
         return replace(team, findings=tuple(slip.finding(log) for slip in slips))
 
-    def _slip(self, log: TeamLog) -> SlipAt | None:
+    def _slip(self) -> SlipAt | None:
         best, start = None, 0
         apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
         for number, part in enumerate(self.parts):

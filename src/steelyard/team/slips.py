@@ -70,8 +70,10 @@ class SlipAt:
         out, robot = list(parts), self.slip.robot
         for number in range(self.recording, len(parts)):
             part = parts[number]
-            after = part.time > self.time if number == self.recording else np.ones(len(part), np.bool_)
-            near = np.abs(part.time - self.time) < CLEAR_S
+            after, near = np.ones(len(part), np.bool_), np.zeros(len(part), np.bool_)
+            if number == self.recording:
+                # Every recording has its own clock, and may begin at zero.
+                after, near = part.time > self.time, np.abs(part.time - self.time) < CLEAR_S
             seen, felt, wrench = part.seen.copy(), part.felt.copy(), part.wrench.copy()
             seen[after | near, robot] = False
             felt[near, robot] = False

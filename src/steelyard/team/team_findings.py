@@ -20,6 +20,8 @@ BAD = 20.0
 GAIN = 3e-3
 # A direction is called by an axis where it is within this cosine of it.
 ALONG = 0.9
+# Steps [standard deviations] that a fit may leave untaken without a word.
+UNSETTLED = 0.1
 AXES = ("x", "y", "z")
 
 
@@ -125,3 +127,10 @@ def vertical(gravity: Array | None, poses: Pose | None) -> Array | None:
         return None
     mean = poses.rotation.inverse().apply(gravity).mean(0)
     return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
+
+
+def unsettled(left: float) -> tuple[str, ...]:
+    """Return a note where the fit of grasps ended while its steps were still long [standard deviations]."""
+    if left <= UNSETTLED:
+        return ()
+    return (f"The fit of the grasps ended before it settled: its last step was {left:.2g} standard deviations long.",)

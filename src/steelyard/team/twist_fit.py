@@ -47,13 +47,17 @@ PLACES, SIGNS = np.argwhere(AD != 0).astype(np.int64), AD[AD != 0]
 
 @dataclass(frozen=True, eq=False)
 class TwistFit:
-    """The optimum: grasps (N,), noise (N, 2) [rad/s, m/s], spread, and delays (N,) [s] with standard deviations."""
+    """The optimum: grasps (N,), noise (N, 2) [rad/s, m/s], spread, and delays (N,) [s] with standard deviations.
+
+    left  how long the last step was, in standard deviations: next to nothing unless STEPS were too few
+    """
 
     grasps: Pose
     noise: Array
     spread: Spread
     delays: Array
     delay_std: Array
+    left: float
 
 
 def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> TwistFit:
@@ -68,7 +72,8 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Tw
         noise = new
         H, g, floor = _normal(merged, grasps, noise)
         step = _step(H, g, floor, unknown)
-        if quiet and float(step @ g[unknown]) < EXACT.chi2:
+        gained = max(float(step @ g[unknown]), 0.0)
+        if quiet and gained < EXACT.chi2:
             break
         full = np.zeros(6 * data.count)
         full[unknown] = step
@@ -84,7 +89,7 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Tw
     turn = adjoint(grasps)
     turn[:, 3:, :3] = 0.0
     delays, std = _delays(merged, grasps, noise, reference)
-    return TwistFit(grasps, noise, Spread(spread, blind, std, turn), delays, std)
+    return TwistFit(grasps, noise, Spread(spread, blind, std, turn), delays, std, float(np.sqrt(gained)))
 
 
 def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[Array, Array]:

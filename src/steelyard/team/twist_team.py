@@ -38,10 +38,12 @@ class TwistTeam:
         """Return the joint fit; raises CannotAnswer where twists or rows in common are missing."""
         reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
-        for _ in range(CLOCK_ROUNDS):
+        for left in reversed(range(CLOCK_ROUNDS)):
             parts = twist_stretches(log, late)
             fit = fit_twists(TwistScatter.of(parts), reference, log.names)
-            if not clocks or (np.abs(fit.delays) < np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)).all():
+            settled = bool((np.abs(fit.delays) < np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)).all())
+            # What is told of clocks is what the rows and the fit were made with.
+            if not (clocks and left) or settled:
                 break
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
         return cls(parts, fit, late)

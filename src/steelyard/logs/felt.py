@@ -1,0 +1,65 @@
+"""The wrench of a stream as it was given, and what it is in S once it is known how S stood."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription
+from steelyard.logs.log import Integers, Mask
+from steelyard.logs.recording import Stream
+from steelyard.spatial import Rotation
+
+_PARTS = ("torque", "force")
+
+
+@dataclass(frozen=True, eq=False)
+class Felt:
+    """The wrench (N, 6) that the robot applies to the object; a part may still be in W.
+
+    stream  name it is told by
+    values  moment and force, each in S or, where `world` names it, in W
+    world   which of "torque" and "force" are in W
+    arm     (3,) [m] from the S origin, in S, to where moments are about
+    """
+
+    stream: str
+    values: Array
+    world: frozenset[str]
+    arm: Array
+
+    @classmethod
+    def of(cls, stream: Stream, sign: int) -> Felt:
+        """Return the wrench of a stream; `sign` +1 where it is on the object, -1 on the sensor."""
+        world = frozenset(part for part in _PARTS if stream.frames.get(part, "S") == "W")
+        mounted = None if stream.mount is None else stream.mount.rotation
+        parts = [stream.channels[part] for part in _PARTS]
+        if mounted is not None:
+            parts = [v if part in world else mounted.apply(v) for part, v in zip(_PARTS, parts, strict=True)]
+        arm = np.zeros(3) if stream.mount is None or stream.mount.position is None else stream.mount.position
+        felt = cls(stream.name, sign * np.concatenate(parts, 1), world, arm)
+        # What is all in S is moved to the S origin once and for all.
+        return felt if world else replace(felt, values=felt.in_sensor(None), arm=np.zeros(3))
+
+    def rows(self, chosen: Mask | Integers) -> Felt:
+        """Return the wrench at some of the rows."""
+        return replace(self, values=self.values[chosen])
+
+    def in_sensor(self, rotation: Rotation | None) -> Array:
+        """Return the wrench (N, 6) about the S origin in S; `rotation` (N,) turns S into W.
+
+        Raises BadDescription where a part is in W and there is no rotation.
+        """
+        torque, force = self.values[:, :3], self.values[:, 3:]
+        if self.world:
+            if rotation is None:
+                part = next(p for p in _PARTS if p in self.world)
+                raise BadDescription(f"{part} of '{self.stream}' is given in W, but no stream gives the rotation.")
+            back = rotation.inverse()
+            torque = back.apply(torque) if "torque" in self.world else torque
+            force = back.apply(force) if "force" in self.world else force
+        elif not self.arm.any():
+            return self.values
+        return np.concatenate([torque + np.cross(self.arm, force), force], 1)
