@@ -87,14 +87,15 @@ def test_order_of_rows_is_irrelevant(seed: int) -> None:
     assert (np.abs(one.scatter - other.scatter) <= 1e-13 * sizes(one.sum)).all()
 
 
-def test_without_blocks_and_by_class_are_the_same() -> None:
+def test_without_blocks_there_is_one_group_per_class_and_stillness() -> None:
     log = random_log(800, run=5)
-    coarse, summed = Moments.of_log(log, by_block=False), Moments.of_log(log).by_class()
+    coarse, fine = Moments.of_log(log, by_block=False), Moments.of_log(log)
     assert (coarse.block == -1).all()
-    for name in ("noise_class", "block", "still"):
-        assert np.array_equal(getattr(coarse, name), getattr(summed, name))
-    np.testing.assert_allclose(summed.scatter, coarse.scatter, rtol=0, atol=1e-12 * np.abs(coarse.sum).max())
-    np.testing.assert_allclose(coarse.counts, summed.counts)
+    groups = list(zip(coarse.noise_class, coarse.still, strict=True))
+    assert len(set(groups)) == len(groups)
+    for scatter, (kind, still) in zip(coarse.scatter, groups, strict=True):
+        summed = fine.where((fine.noise_class == kind) & (fine.still == still)).sum
+        np.testing.assert_allclose(summed, scatter, rtol=0, atol=1e-12 * np.abs(coarse.sum).max())
     assert coarse.counts.sum() == 800
 
 

@@ -38,7 +38,7 @@ class Mounting:
     position      p (3,) [m] of the accelerometer in S
     bias          (3,) [m/s^2] in its own axes
     scale         what its numbers must be multiplied with to agree with gravity
-    rotation_std, position_std, bias_std   (3,) [rad, m, m/s^2]; zero where given
+    rotation_std, position_std   (3,) [rad, m]; zero where given
     scale_std     of the scale; zero where it was not sought
     """
 
@@ -48,7 +48,6 @@ class Mounting:
     scale: float = 1.0
     rotation_std: Array | None = None
     position_std: Array | None = None
-    bias_std: Array | None = None
     scale_std: float = 0.0
 
     def at_sensor(self, specific_force: Array, omega: Array, alpha: Array) -> Array:

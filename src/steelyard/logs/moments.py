@@ -137,14 +137,6 @@ class Moments:
         """Return the statistic of the groups where `keep` (G,) is true."""
         return Moments(self.scatter[keep], self.noise_class[keep], self.block[keep], self.still[keep], self.noise)
 
-    def by_class(self) -> Moments:
-        """Return the statistic with blocks added up: one group per noise class and stillness."""
-        keys = np.stack([self.noise_class, self.still.astype(np.int64)], 1)
-        groups, label = np.unique(keys, axis=0, return_inverse=True)
-        out = np.zeros((len(groups), SIZE, SIZE))
-        np.add.at(out, label, self.scatter)
-        return Moments(out, groups[:, 0], np.full(len(groups), -1), groups[:, 1].astype(np.bool_), self.noise)
-
     @cached_property
     def sum(self) -> Array:
         """The scatter matrix (19, 19) of all rows."""
