@@ -27,6 +27,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "errors": set(),
     "check": set(),
     "findings": set(),
+    "whole_files": set(),
     "spatial": set(),
     "inertia": {"spatial"},
     "logs": {"inertia", "spatial"},
@@ -41,13 +42,13 @@ MAY_IMPORT: dict[str, set[str]] = {
     "simulate": UPPER,
     "evaluate": UPPER,
     "live": UPPER,
-    "report": UPPER | {"evaluate"},
+    "report": UPPER | {"evaluate", "whole_files"},
     "pipelines": UPPER | {"simulate", "evaluate", "sanity"},
     "io": {
         "spatial", "inertia", "logs.log", "logs.recording", "logs.team_log", "logs.team_track",
         "logs.team_streams", "robots.omnid", "team.estimate", "shape.mesh", "shape.tets", "shape.nesting",
         "shape.cloud", "shape.views", "parts.parts", "parts.from_mesh", "parts.known", "parts.hierarchy",
-        "identify.estimate",
+        "identify.estimate", "whole_files",
     },
 }  # fmt: skip
 MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live"}
@@ -56,7 +57,7 @@ MAY_IMPORT["cli"] = MAY_IMPORT["bench"] | {"bench", ""}
 MAY_IMPORT[""] = MAY_IMPORT["cli"] | {"cli"}  # the package itself: `import steelyard as sy`
 MAY_IMPORT["__main__"] = {"cli"}
 
-FILES_ALLOWED = {"io", "report", "cli", "bench"}
+FILES_ALLOWED = {"whole_files", "io", "report", "cli", "bench"}
 FILE_CALLS = {
     "print", "open", "input", "write_text", "write_bytes", "read_text", "read_bytes", "mkdir", "unlink",
     "load", "save", "savez", "savez_compressed", "loadtxt", "savetxt", "genfromtxt", "fromfile", "tofile",

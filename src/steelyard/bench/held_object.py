@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -27,6 +24,7 @@ from steelyard.bench.held_object_cases import (
     noisy_rows,
 )
 from steelyard.bench.held_object_summary import SCORES, Row, bound_means, summary, table_iv
+from steelyard.bench.pool import spread
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
@@ -95,7 +93,7 @@ def run(
     found: list[list[Outcome]] = [[] for _ in plans]
     done = 0
     for which, plan in enumerate(plans):
-        for outcome in _outcomes(plan, folders, workers):
+        for outcome in spread(partial(_object, plan), folders, workers):
             found[which] += [outcome] if outcome is not None else []
             done += 1
             if progress is not None:
@@ -145,17 +143,6 @@ class Outcome:
     entry: Row
     rows: list[Row]
     bounds: dict[str, dict[str, dict[str, float]]]
-
-
-def _outcomes(plan: Plan, folders: list[Path], workers: int) -> Iterator[Outcome | None]:
-    """Yield the outcome of every object in order."""
-    with ExitStack() as stack:
-        if workers == 1:
-            yield from (_object(plan, folder) for folder in folders)
-        else:
-            # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
-            pool = stack.enter_context(ProcessPoolExecutor(workers, mp_context=get_context("spawn")))
-            yield from pool.map(_object, [plan] * len(folders), folders)
 
 
 def _object(plan: Plan, folder: Path) -> Outcome | None:

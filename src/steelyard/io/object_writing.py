@@ -15,8 +15,8 @@ from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recording_files import object_table
-from steelyard.io.whole_files import write_bytes
 from steelyard.parts.known import KnownObject
+from steelyard.whole_files import write_bytes
 
 PARTS_NOTE = (
     "Exact integrals over the closed solids of the mesh; material, density and mass are the truth from which the whole "

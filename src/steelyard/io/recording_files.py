@@ -8,9 +8,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
-from steelyard.io.whole_files import write_text
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Pose, Rotation
+from steelyard.whole_files import write_text
 
 _COLUMNS = {
     "force": (("fx", "fy", "fz"), 'unit = "N"'),

@@ -13,10 +13,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.whole_files import write_bytes, write_text
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
+from steelyard.whole_files import write_bytes, write_text
 
 # Quantity -> columns, what its description says beside them, digits after the point.
 _COLUMNS: dict[str, tuple[tuple[str, ...], str, int]] = {

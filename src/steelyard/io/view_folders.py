@@ -7,19 +7,19 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile
 from steelyard.io.images import read_colour, read_depth, require_images, write_image
-from steelyard.io.whole_files import write_bytes
+from steelyard.io.in_file import in_file
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
+from steelyard.whole_files import write_bytes
 
 _COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
 _CAMERA = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m")
-T = TypeVar("T")
 _UNIT = 1e-3  # how far from 1 the length of a quaternion may be
 
 
@@ -30,7 +30,7 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         raise BadFile(f"{folder}: no such folder. Views are a folder with camera.json, poses.csv and depth/.")
     camera = _camera(folder / "camera.json")
     names, X_WC = _poses(folder / "poses.csv")
-    intrinsics = _of(folder / "camera.json", lambda: _intrinsics(camera))
+    intrinsics = in_file(folder / "camera.json", lambda: _intrinsics(camera))
     size = (intrinsics.height, intrinsics.width)
     depth = np.zeros((len(names), *size), np.uint16)
     coloured = (folder / "color").is_dir()
@@ -42,15 +42,7 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         if progress:
             progress(k + 1, len(names))
     table = _table(folder / "table.json") if (folder / "table.json").exists() else None
-    return _of(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
-
-
-def _of(path: Path, make: Callable[[], T]) -> T:
-    """Return make(), with the path in front of what is wrong with the numbers."""
-    try:
-        return make()
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
+    return in_file(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
 
 
 def _object(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
@@ -152,7 +144,7 @@ def _table(path: Path) -> TablePlane:
     if not isinstance(normal, list) or len(normal) != 3:
         raise BadFile(f'{path}: "normal" must be three numbers; got {normal!r}.')
     axes = np.array([_number(path, "normal", value) for value in normal])
-    return _of(path, lambda: TablePlane(axes, _number(path, "offset_m", values["offset_m"])))
+    return in_file(path, lambda: TablePlane(axes, _number(path, "offset_m", values["offset_m"])))
 
 
 def write_views(views: Views, folder: Path | str) -> None:
