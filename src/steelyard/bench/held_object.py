@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard import evaluate
 from steelyard.bench import bound
+from steelyard.bench.conditions import condition_means, conditions
 from steelyard.bench.held_object_cases import (
     METHODS,
     PART_METHODS,
@@ -46,7 +47,8 @@ RULES = (
     "runs, a failure counting as inconsistent. com_pct_floored: the same error cut to whole percents per axis, as the "
     "published code does. bound: Cramer-Rao with the true parts and free masses, to first order; groups: parts of "
     "equal density known as such. zeroed: parts with over 0.1 % of the mass found with less than a hundredth of "
-    "their own."
+    "their own. condition: of the regressor of all rows, first seed, mean over the objects; properly (columns of "
+    "length 1) and as the paper counts it (entries scaled to 0..1, extremes over single rows), beside what it prints."
 )
 TIMING = (
     "CPU time of the calling thread, warm, median of the repeats, first seed: moments to Estimate; hps: rows to "
@@ -162,12 +164,15 @@ def _object(plan: Plan, folder: Path) -> Outcome | None:
     }
     if case.seen is not None:
         entry["segmentation"] = case.seen.scores
-    rows = []
+    rows, condition = [], {}
     for noise in plan.noises:
         for seed in range(plan.seeds if any(noise_std(noise)) else 1):
             log = noisy_rows(case, noise, seed)
             head = {"object": entry["object"], "half": entry["half"], "noise": noise, "seed": seed}
             rows += [head | _row(case, method, log, plan.repeats if seed == 0 else 0) for method in methods]
+            if seed == 0:
+                condition[noise] = conditions(log)
+    entry["condition"] = condition
     bounds = {noise: _bound(case, noise) for noise in plan.noises if all(noise_std(noise))}
     return Outcome(entry, rows, bounds)
 
@@ -230,6 +235,7 @@ def _result(plan: Plan, outcomes: list[Outcome]) -> dict[str, Any]:
         "methods": list(plan.methods),
         "mean": summary(rows, plan.noises, plan.methods, np.mean),
         "median": summary(rows, plan.noises, plan.methods, np.median),
+        "condition": condition_means([outcome.entry["condition"] for outcome in outcomes]),
         "bound": bound_means([(outcome.entry["half"], outcome.bounds) for outcome in outcomes]),
         **_correlations(outcomes, rows),
         "rows": rows,
