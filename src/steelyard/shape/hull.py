@@ -91,7 +91,7 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
             p = integer(face[f, FAR])
             faces, edges = look(xyz, plane, face, stack, rim, f, p, noise)
             loose, free = clear(point, face, stack, faces, p, free)
-            used, free = cone(xyz, point, plane, face, stack, rim, p, edges, used, free, tolerance, noise)
+            used, free = cone(xyz, point, plane, face, stack, rim, p, edges, used, free, tolerance)
             if used < 0:
                 face[:, QUEUED] = 0
                 return np.nan, -1
