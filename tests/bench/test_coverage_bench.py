@@ -7,7 +7,7 @@ import pytest
 from click.testing import CliRunner
 
 from steelyard.bench import coverage, tables, timing
-from steelyard.bench.coverage import HALF_WIDTH, Outcome, object_scale, people, summary
+from steelyard.bench.coverage import HALF_WIDTH, Outcome, object_scale, summary
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue
 from steelyard.simulate import scenarios
@@ -50,8 +50,8 @@ def test_what_is_not_identified_is_not_counted():
 
 def test_scales_and_readings_of_a_box():
     body = scenarios.body("bottle").parameters()
-    assert people(body)[0] == pytest.approx(body.mass)
-    np.testing.assert_allclose(people(body)[[4, 7, 9]], np.diag(body.inertia_com))
+    assert body.people[0] == pytest.approx(body.mass)
+    np.testing.assert_allclose(body.people[[4, 7, 9]], np.diag(body.inertia_com))
     scale = object_scale(body)
     assert scale[4] == pytest.approx(np.trace(body.inertia_com) / 2)
     assert scale[1] ** 2 * body.mass == pytest.approx(scale[4])

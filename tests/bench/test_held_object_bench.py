@@ -88,6 +88,11 @@ def test_split_and_merged_parts(folder):
 
 def test_table_has_every_method_and_table_iv_beside(result):
     text = held_object_table(result)
+    condition = result["condition"]["low"]
+    assert 1 < condition["properly"] < 5
+    assert condition["as_published"] > 10
+    assert condition["printed"] == 74
+    assert f"condition number, low: {condition['properly']:.3g}; as the paper counts it" in text
     for word in (*ON_TRUTH, "bound, parts known", "Table IV hps", "high, mixed: mean", "high, all: median"):
         assert word in text
 

@@ -42,6 +42,56 @@ def test_written_views_are_read_again(folder: Path) -> None:
     assert read.table.offset == 0.1
 
 
+def names(folder: Path) -> list[str]:
+    return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
+
+
+def test_what_other_views_left_goes_and_other_files_stay(folder: Path) -> None:
+    for name in ("notes.txt", "depth/notes.txt", "depth/0009.png"):
+        (folder / name).write_text("mine")
+    plain = Views(VIEWS.depth[:2], None, VIEWS.intrinsics, VIEWS.X_WC[:2], 0.001)
+    write_views(plain, folder)
+    mine = ["depth/0009.png", "depth/notes.txt", "notes.txt"]
+    assert names(folder) == sorted(["camera.json", "depth/0000.png", "depth/0001.png", "poses.csv", *mine])
+    read = read_views(folder)
+    assert read.rgb is None
+    assert read.table is None
+    assert np.array_equal(read.depth, plain.depth)
+
+
+@pytest.mark.parametrize(("name", "what"), [("color/mine.png", "colour"), ("table.json", "table")])
+def test_what_someone_else_left_does_not_pass_for_colour_or_table(folder: Path, name: str, what: str) -> None:
+    poses = (folder / "poses.csv").read_text()
+    (folder / "poses.csv").write_text(poses.replace("\n0000,", "\nleft,") if what == "table" else poses)
+    (folder / name).write_text("mine")
+    before = {path: (folder / path).read_bytes() for path in names(folder)}
+    plain = Views(VIEWS.depth, None if what == "colour" else VIEWS.rgb, VIEWS.intrinsics, VIEWS.X_WC, 0.001)
+    with pytest.raises(BadFile) as caught:
+        write_views(plain, folder)
+    said = f"these views have no {what}; move this file away or write into another folder."
+    assert str(caught.value) == f"{folder}/{name}: {said}"
+    assert {path: (folder / path).read_bytes() for path in names(folder)} == before
+
+
+def test_a_folder_of_someone_else_loses_nothing_but_what_is_written_over(folder: Path) -> None:
+    poses = (folder / "poses.csv").read_text()
+    (folder / "poses.csv").write_text(poses.replace("\n0000,", "\nleft,"))
+    write_views(Views(VIEWS.depth[:1], VIEWS.rgb[:1], VIEWS.intrinsics, VIEWS.X_WC[:1], 0.001, VIEWS.table), folder)
+    assert {"depth/0002.png", "color/0002.png"} <= set(names(folder))
+
+
+def test_views_are_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    from steelyard.io import view_folders
+
+    def fails(path: Path, pixels: np.ndarray) -> None:
+        raise BadFile(f"{path.name}: cannot be written (the disk is full).")
+
+    monkeypatch.setattr(view_folders, "write_image", fails)
+    with pytest.raises(BadFile, match="the disk is full"):
+        write_views(VIEWS, tmp_path / "new")
+    assert list(tmp_path.iterdir()) == []
+
+
 def camera(**change: object) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         path = folder / "camera.json"

@@ -10,7 +10,10 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from steelyard.bench.plain_clustering import plain_cluster
 from steelyard.errors import BadValue
+from steelyard.parts import clustering, merging
 from steelyard.parts.clustering import Hollow, Published, cluster
+from steelyard.parts.merging import merge_all
+from steelyard.shape.hull import hull_work
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
 
@@ -43,6 +46,32 @@ def test_the_tree_is_that_of_plain_python_with_qhull(cost, seed: int) -> None:
         np.testing.assert_allclose(ours.hull, plain.hull, rtol=1e-9)
         np.testing.assert_allclose(ours.volume, plain.volume, rtol=1e-12)
         assert took.hulls > len(mesh)
+
+
+@pytest.mark.parametrize("cost", COSTS)
+def test_where_the_kernel_gives_up_qhull_stands_in(cost, monkeypatch: pytest.MonkeyPatch) -> None:
+    mesh, runs = cross(60), []
+    apart = TetMesh(
+        np.concatenate([mesh.vertices, mesh.vertices + np.array([9, 0, 0])]),
+        np.concatenate([mesh.tets, mesh.tets + len(mesh.vertices)]),
+    )
+    right = cluster(apart, cost=cost)
+
+    def counted(*given):
+        runs.append(given)
+        return merge_all(*given)
+
+    def cut_room(points: int):
+        work = hull_work(points)
+        return work._replace(face=work.face[:44].copy())  # room for 44 faces: larger hulls are a fault
+
+    monkeypatch.setattr(merging, "hull_work", cut_room)
+    monkeypatch.setattr(clustering, "merge_all", counted)
+    found = cluster(apart, cost=cost)
+    assert len(runs) > 3
+    assert np.array_equal(found.merges, right.merges)
+    for name in ("cost", "volume", "hull"):
+        np.testing.assert_allclose(getattr(found, name), getattr(right, name), rtol=1e-9, atol=1e-9)
 
 
 @pytest.mark.parametrize("cost", COSTS)
@@ -85,8 +114,8 @@ def test_a_cross_falls_into_bars() -> None:
     mesh = TetMesh(xyz, Delaunay(xyz).simplices)
     x, y = np.abs(mesh.centroids[:, :2]).T
     tree = cluster(mesh.chosen((x < 0.5) | (y < 0.5)), cost=Hollow())
-    nodes = tree.shortest_cut(0.1)
     hollow = (tree.hull - tree.volume) / tree.volume[tree.root]
+    nodes = tree.cheapest_cut(hollow + 0.1)
     assert 2 <= len(nodes) <= 4
     assert hollow[nodes].sum() < 0.25 < 1 < hollow[tree.root]
 

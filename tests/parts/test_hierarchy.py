@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.parts.hierarchy import Hierarchy, joined
+from steelyard.parts.hierarchy import Hierarchy
 
 
 def tree(count: int, seed: int = 0, volumes: bool = True) -> Hierarchy:
@@ -80,10 +80,6 @@ def test_cheapest_cut_is_the_cheapest_of_all(seed: int) -> None:
         cost = rng.normal(size=one.root + 1)
         least = min(cost[nodes].sum() for nodes in all_cuts)
         assert cost[one.cheapest_cut(cost)].sum() == pytest.approx(least)
-    for per_part in (0.01, 0.1, 0.5):
-        total = {tuple(c): ((one.hull - one.volume)[c] / one.volume[-1] + per_part).sum() for c in all_cuts}
-        assert total[tuple(one.shortest_cut(per_part))] == pytest.approx(min(total.values()))
-    assert one.shortest_cut(100.0) == [one.root]
     assert one.cheapest_cut(np.zeros(one.root + 1)) == [one.root]
 
 
@@ -91,7 +87,7 @@ def test_one_piece_is_a_tree() -> None:
     one = Hierarchy(np.zeros(4, int), np.zeros((0, 2), int), np.zeros(0), np.ones(1), np.ones(1))
     assert len(one) == 1
     assert one.cut(1).tolist() == [0, 0, 0, 0]
-    assert one.nodes_at_depth(2) == [0] == one.shortest_cut(0.1)
+    assert one.nodes_at_depth(2) == [0] == one.cheapest_cut(np.ones(1))
     with pytest.raises(BadValue, match="can be cut into 1 to 1 parts, not 2"):
         one.cut(2)
 
@@ -113,8 +109,6 @@ def test_cuts_that_are_none_are_refused() -> None:
         one.cut_at([one.root, one.root])
     with pytest.raises(BadValue, match=r"nodes of this tree are 0\.\.8; got 9"):
         one.cut_at([9])
-    with pytest.raises(BadValue, match="needs the volume and hull of every node"):
-        tree(5, volumes=False).shortest_cut(0.1)
     with pytest.raises(BadValue, match="one cost for each of 9 nodes"):
         one.cheapest_cut([1.0])
 
@@ -130,11 +124,3 @@ def test_cuts_that_are_none_are_refused() -> None:
 def test_trees_that_are_none_are_refused(piece: list[int], merges: list[list[int]], message: str) -> None:
     with pytest.raises(BadValue, match=message):
         Hierarchy(np.array(piece), np.array(merges), np.zeros(2))
-
-
-def test_parts_are_joined_by_hand() -> None:
-    assert joined([0, 1, 2, 3, 1], [3, 1]).tolist() == [0, 1, 2, 1, 1]
-    with pytest.raises(BadValue, match="name two or more of the labels in use"):
-        joined([0, 1], [1])
-    with pytest.raises(BadValue, match="name two or more of the labels in use"):
-        joined([0, 1], [1, 7])

@@ -4,17 +4,27 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from steelyard.errors import BadValue
-from steelyard.shape import hull
 from steelyard.shape.exact_sign import determinant
-from steelyard.shape.hull import TOLERANCE, convex_hull, hull_volume, hull_work, qhull
+from steelyard.shape.hull import TOLERANCE, HullWork, hull_volume, hull_work, qhull
+from steelyard.shape.stand_ins import sure_hull, with_stand_ins
 from steelyard.spatial import Rotation
+
+
+def convex_hull(points: np.ndarray) -> tuple[float, np.ndarray]:
+    """Volume of the hull of points (N, 3), and which rows are its vertices, rising."""
+    work = hull_work(len(points))
+    tolerance = TOLERANCE * float(np.ptp(points, axis=0).max())
+    volume, vertices = hull_volume(points, np.arange(len(points)), len(points), tolerance, work)
+    assert vertices >= 0
+    return volume, np.sort(work.kept[:vertices])
+
 
 KINDS = ("ball", "sphere", "grid", "turned grid", "noisy grid", "thin", "needle", "repeated", "midpoints")
 
@@ -109,16 +119,39 @@ def test_numbers_that_are_not_finite_are_a_fault() -> None:
         points = np.random.default_rng(0).normal(size=(10, 3)) * (bad if bad == 1e200 else 1)
         points[3, 1] *= bad if bad != 1e200 else 1
         assert hull_volume(points, np.arange(10), 10, 0.0, hull_work(10))[1] == -1
-    with pytest.raises(BadValue, match="must be finite"):
-        convex_hull(np.full((5, 3), np.nan))
-    with pytest.raises(BadValue, match=r"a hull needs points \(N, 3\), N > 0; got \(0, 3\)"):
-        convex_hull(np.zeros((0, 3)))
 
 
-def test_a_fault_is_handed_to_qhull(monkeypatch: pytest.MonkeyPatch) -> None:
-    points = np.random.default_rng(0).normal(size=(30, 3))
-    volume, vertices = convex_hull(points)
-    monkeypatch.setattr(hull, "hull_volume", lambda *_: (np.nan, -1))
-    other, others = convex_hull(points)
-    assert other == pytest.approx(volume, rel=1e-12)
-    assert others.tolist() == vertices.tolist()
+def cut_room(points: int, faces: int) -> HullWork:
+    """Room for `faces` faces only: larger hulls are a fault."""
+    work = hull_work(points)
+    return work._replace(face=work.face[:faces].copy())
+
+
+@numba.njit
+def hulls_of_heads(points, counts, work, known):
+    """Volume and vertices of the hull of the first points, for each of `counts`; the last one's faces."""
+    found = np.empty((len(counts), 2))
+    for k, count in enumerate(counts):
+        volume, kept = sure_hull(points, np.arange(count), count, TOLERANCE, work, known)
+        found[k, 0], found[k, 1] = volume, kept
+    return found, np.sort(work.point[:kept, 2]), work.stack[: 2 * kept - 4, :3].copy()
+
+
+def test_qhull_stands_in_for_every_fault_of_a_loop() -> None:
+    points = np.random.default_rng(0).normal(size=(60, 3))
+    counts, runs = np.array([4, 50, 5, 60, 50]), []
+
+    def loop(work, known):
+        runs.append(len(known.volume))
+        return hulls_of_heads(points, counts, work, known)
+
+    right, rows, faces = with_stand_ins(points, lambda known: loop(hull_work(60), known))
+    assert runs == [0]
+    runs.clear()
+    assert hull_volume(points, np.arange(60), 60, TOLERANCE, cut_room(60, 12))[1] == -1
+    found, same, none = with_stand_ins(points, lambda known: loop(cut_room(60, 12), known))
+    assert runs == [0, 1, 2, 3]
+    np.testing.assert_allclose(found, right, rtol=1e-12)
+    np.testing.assert_array_equal(same, rows)
+    assert (faces >= 0).all()
+    assert (none == -1).all()

@@ -128,6 +128,38 @@ def test_nearest_to_a_mirror_image_is_right_handed() -> None:
     assert np.linalg.det(Rotation.nearest(np.diag([1.0, 1.0, -0.9])).matrix) == pytest.approx(1)
 
 
+@pytest.mark.parametrize("batch", BATCHES)
+@given(data=st.data())
+def test_aligning_finds_the_turn_between_vectors_of_a_plane_or_of_space(
+    batch: tuple[int, ...], data: st.DataObject
+) -> None:
+    turn, place = data.draw(rotations(batch)), data.draw(rotations(batch))
+    sizes = np.array([[1.0, 0, 0], [0, 2, 0], [0, 0, data.draw(st.sampled_from([0.0, 3.0]))]])
+    seen = np.swapaxes(place.matrix, -1, -2) @ sizes  # the vectors are its columns
+    match = turn.matrix @ seen @ np.swapaxes(seen, -1, -2)
+    same(Rotation.aligning(match), turn)
+    same(Rotation.aligning(1e9 * match), turn)
+
+
+def test_aligning_is_right_handed_and_least_squares_where_the_vectors_are_mirrored() -> None:
+    a, b = np.random.default_rng(0).normal(size=(2, 20, 3))
+    mirrored = b * [1, 1, -1]
+    found = Rotation.aligning(mirrored.T @ b)
+    assert np.linalg.det(found.matrix) == pytest.approx(1)
+    others = Rotation.exp(a)
+    left = ((mirrored - found.apply(b)) ** 2).sum()
+    assert (((mirrored - others[:, None].apply(b)) ** 2).sum((1, 2)) >= left).all()
+    np.testing.assert_array_equal(Rotation.aligning(a.T @ b).matrix, Rotation.nearest(a.T @ b).matrix)
+
+
+def test_aligning_about_one_axis_still_gives_a_rotation_that_fits() -> None:
+    a, b = np.array([0.0, 0.6, 0.8]), np.array([1.0, 0, 0])
+    found = Rotation.aligning(np.outer(a, b))
+    np.testing.assert_allclose(found.apply(b), a, atol=1e-12)
+    Rotation(found.matrix)
+    Rotation(Rotation.aligning(np.zeros((3, 3))).matrix)
+
+
 def test_a_product_of_accepted_rotations_is_accepted() -> None:
     rounded = Rotation(np.eye(3) * (1 + 4.5e-7))
     product = Rotation.identity()

@@ -3,18 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
-from multiprocessing import get_context
+from functools import partial
 from typing import Any
 
 import numpy as np
 
+from steelyard.bench.pool import spread
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
 from steelyard.identify.noise_aware import NoiseAware
-from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia import InertialParameters
 from steelyard.simulate import scenarios, simulate_log
 from steelyard.simulate.noise import Spectrum
 
@@ -99,13 +98,7 @@ def run(
 def _fitted(case: Case, jobs: list[tuple[int, str]], workers: int) -> Iterator[list[Outcome | str]]:
     """Yield the outcomes of the jobs in order, a batch at a time."""
     batches = [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)]
-    with ExitStack() as stack:
-        if workers == 1:
-            yield from (_fit_all(case, batch) for batch in batches)
-        else:
-            # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
-            pool = stack.enter_context(ProcessPoolExecutor(workers, mp_context=get_context("spawn")))
-            yield from pool.map(_fit_all, [case] * len(batches), batches)
+    yield from spread(partial(_fit_all, case), batches, workers)
 
 
 def _fit_all(case: Case, jobs: Sequence[tuple[int, str]]) -> list[Outcome | str]:
@@ -122,13 +115,8 @@ def _fit(case: Case, seed: int, name: str) -> Outcome | str:
     except SteelyardError as reason:
         return f"{name}, seed {seed}: {reason}"
     scale = object_scale(true)
-    error = (people(estimate.parameters) - people(true)) / scale
+    error = (estimate.parameters.people - true.people) / scale
     return Outcome(name, error, HALF_WIDTH * estimate.std / scale, estimate.identified)
-
-
-def people(body: InertialParameters) -> Array:
-    """Return mass, com, inertia about the CoM (10,) in the order of `Estimate.std`."""
-    return np.concatenate([[float(body.mass)], body.com, forms.upper(body.inertia_com)])
 
 
 def object_scale(body: InertialParameters) -> Array:

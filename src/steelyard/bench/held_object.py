@@ -2,12 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import partial
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
@@ -15,6 +12,7 @@ import numpy as np
 
 from steelyard import evaluate
 from steelyard.bench import bound
+from steelyard.bench.conditions import condition_means, conditions
 from steelyard.bench.held_object_cases import (
     METHODS,
     PART_METHODS,
@@ -27,6 +25,7 @@ from steelyard.bench.held_object_cases import (
     noisy_rows,
 )
 from steelyard.bench.held_object_summary import SCORES, Row, bound_means, summary, table_iv
+from steelyard.bench.pool import spread
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
@@ -48,7 +47,8 @@ RULES = (
     "runs, a failure counting as inconsistent. com_pct_floored: the same error cut to whole percents per axis, as the "
     "published code does. bound: Cramer-Rao with the true parts and free masses, to first order; groups: parts of "
     "equal density known as such. zeroed: parts with over 0.1 % of the mass found with less than a hundredth of "
-    "their own."
+    "their own. condition: of the regressor of all rows, first seed, mean over the objects; properly (columns of "
+    "length 1) and as the paper counts it (entries scaled to 0..1, extremes over single rows), beside what it prints."
 )
 TIMING = (
     "CPU time of the calling thread, warm, median of the repeats, first seed: moments to Estimate; hps: rows to "
@@ -95,7 +95,7 @@ def run(
     found: list[list[Outcome]] = [[] for _ in plans]
     done = 0
     for which, plan in enumerate(plans):
-        for outcome in _outcomes(plan, folders, workers):
+        for outcome in spread(partial(_object, plan), folders, workers):
             found[which] += [outcome] if outcome is not None else []
             done += 1
             if progress is not None:
@@ -147,17 +147,6 @@ class Outcome:
     bounds: dict[str, dict[str, dict[str, float]]]
 
 
-def _outcomes(plan: Plan, folders: list[Path], workers: int) -> Iterator[Outcome | None]:
-    """Yield the outcome of every object in order."""
-    with ExitStack() as stack:
-        if workers == 1:
-            yield from (_object(plan, folder) for folder in folders)
-        else:
-            # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
-            pool = stack.enter_context(ProcessPoolExecutor(workers, mp_context=get_context("spawn")))
-            yield from pool.map(_object, [plan] * len(folders), folders)
-
-
 def _object(plan: Plan, folder: Path) -> Outcome | None:
     """Return all rows of one object, None where the plan's parts do not apply to it."""
     case = load_case(folder, plan.parts)
@@ -175,12 +164,15 @@ def _object(plan: Plan, folder: Path) -> Outcome | None:
     }
     if case.seen is not None:
         entry["segmentation"] = case.seen.scores
-    rows = []
+    rows, condition = [], {}
     for noise in plan.noises:
         for seed in range(plan.seeds if any(noise_std(noise)) else 1):
             log = noisy_rows(case, noise, seed)
             head = {"object": entry["object"], "half": entry["half"], "noise": noise, "seed": seed}
             rows += [head | _row(case, method, log, plan.repeats if seed == 0 else 0) for method in methods]
+            if seed == 0:
+                condition[noise] = conditions(log)
+    entry["condition"] = condition
     bounds = {noise: _bound(case, noise) for noise in plan.noises if all(noise_std(noise))}
     return Outcome(entry, rows, bounds)
 
@@ -243,6 +235,7 @@ def _result(plan: Plan, outcomes: list[Outcome]) -> dict[str, Any]:
         "methods": list(plan.methods),
         "mean": summary(rows, plan.noises, plan.methods, np.mean),
         "median": summary(rows, plan.noises, plan.methods, np.median),
+        "condition": condition_means([outcome.entry["condition"] for outcome in outcomes]),
         "bound": bound_means([(outcome.entry["half"], outcome.bounds) for outcome in outcomes]),
         **_correlations(outcomes, rows),
         "rows": rows,

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from steelyard.bench.conditions import condition_lines
 from steelyard.bench.held_object_summary import HALVES
 from steelyard.bench.tables import block
 
@@ -47,7 +48,7 @@ def _head(result: dict[str, Any]) -> str:
     ]
     if result["parts"] in WITH_TABLE_IV:
         lines.append("Table IV: as printed in the paper, over its own twenty objects.")
-    return "\n".join(lines)
+    return "\n".join([*lines, *condition_lines(result["condition"])])
 
 
 def _runs(methods: dict[str, dict[str, Any]]) -> int:

@@ -45,7 +45,7 @@ def run(sets: int, progress: Callable[[int, int], None] | None = None) -> dict[s
     """Return per kind the largest error of our volumes and how many sets were given back.
 
     error   |ours - Qhull's|, over Qhull's volume or a thousandth of the cube of the set's size, whichever is larger
-    faults  sets that the kernel gives back; `convex_hull` then asks Qhull, so that no volume is wrong for it
+    faults  sets that the kernel gives back; in a clustering Qhull's hull stands in for those (`shape.stand_ins`)
     """
     if sets < 1:
         raise BadValue(f"at least one set is needed; got {sets}.")

@@ -3,19 +3,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from concurrent.futures import ProcessPoolExecutor
-from contextlib import ExitStack
 from dataclasses import dataclass, replace
 from functools import lru_cache
-from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steelyard.bench.coverage import BATCH, HALF_WIDTH, object_scale, people
+from steelyard.bench.coverage import BATCH, HALF_WIDTH, object_scale
 from steelyard.bench.held_object_cases import Case, load_case, noisy_rows
 from steelyard.bench.part_timing import TIMING, timings
+from steelyard.bench.pool import spread
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
@@ -97,13 +95,7 @@ def run(
 def _fitted(jobs: list[Job], workers: int) -> Iterator[list[Outcome | str]]:
     """Yield the outcomes of the jobs in order, a batch at a time."""
     batches = [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)]
-    with ExitStack() as stack:
-        if workers == 1:
-            yield from map(_fit_all, batches)
-        else:
-            # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
-            pool = stack.enter_context(ProcessPoolExecutor(workers, mp_context=get_context("spawn")))
-            yield from pool.map(_fit_all, batches)
+    yield from spread(_fit_all, batches, workers)
 
 
 def _fit_all(jobs: Sequence[Job]) -> list[Outcome | str]:
@@ -136,7 +128,7 @@ def _fit(folder: Path, seed: int, noise: str, truth: str) -> Outcome | str:
         return f"{folder.name}, seed {seed}: {reason}"
     true = case.known.truth
     scale = object_scale(true)
-    pairs = np.stack([people(estimate.parameters) - people(true), HALF_WIDTH * estimate.std]) / scale
+    pairs = np.stack([estimate.parameters.people - true.people, HALF_WIDTH * estimate.std]) / scale
     out = {"mass": pairs[:, :1], "com": pairs[:, 1:4], "inertia": pairs[:, 4:]}
     if truth == "summed":
         found = np.array([[part.mass, HALF_WIDTH * part.std] for part in estimate.parts]).T

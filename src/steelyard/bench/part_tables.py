@@ -4,14 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from steelyard.bench.tables import block
+from steelyard.bench.tables import COVERAGE, block
 
-_WIDTHS = (
-    ("coverage %", "coverage_pct", 1),
-    ("width ratio", "width_ratio", 2),
-    ("pooled", "width_ratio_pooled", 2),
-    ("intervals", "intervals", 0),
-)
 _TIMES = (
     ("parts", "parts", 0),
     ("free ms", "free_ms", 2),
@@ -35,7 +29,7 @@ def part_coverage_table(result: dict[str, Any]) -> str:
     lines = [f"{len(result['seeds'])} seeds over {len(result['objects'])} objects; 95 % intervals"]
     for name, case in result["cases"].items():
         if case["kinds"]:
-            lines += ["", *block(f"{name} ({case['logs']} logs)", case["kinds"], _WIDTHS)]
+            lines += ["", *block(f"{name} ({case['logs']} logs)", case["kinds"], COVERAGE)]
         said = f"part-not-homogeneous in {case['not_homogeneous']}; failures {len(case['failures'])}"
         lines += [f"  {said}", *(f"  {failure}" for failure in case["failures"][:3])]
     if result["timing"]["objects"]:

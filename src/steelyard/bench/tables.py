@@ -16,7 +16,7 @@ _IDENTIFY = (
     ("solve ms", "solve_ms", 3),
     ("log ms", "identify_ms", 2),
 )
-_COVERAGE = (
+COVERAGE = (
     ("coverage %", "coverage_pct", 1),
     ("width ratio", "width_ratio", 2),
     ("pooled", "width_ratio_pooled", 2),
@@ -57,7 +57,7 @@ def coverage_table(result: dict[str, Any]) -> str:
     """Return the coverage of the 95 % intervals, one block per case."""
     lines = [f"seeds {_listed(result['seeds'])}; {result['motion']}, {result['noise']}; 95 % intervals"]
     for name, case in result["cases"].items():
-        lines += ["", *block(f"{name} ({case['logs']} logs)", case["kinds"], _COVERAGE)]
+        lines += ["", *block(f"{name} ({case['logs']} logs)", case["kinds"], COVERAGE)]
         lines.append("inertia entries called identified (median of six):")
         lines += [f"  {_entries(case['objects'])}"]
     return "\n".join(lines)

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.team_pool import spread
+from steelyard.bench.pool import spread
 from steelyard.bench.timing import thread_ms
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.team_pool import spread
+from steelyard.bench.pool import spread
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team

@@ -27,7 +27,6 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
     from steelyard.cli.versus import summary, versus_table
     from steelyard.io import read_team, result_dict, write_result, write_team
     from steelyard.report import write_report
-    from steelyard.report.numbers import people
     from steelyard.simulate.three_omnids import three_omnids, told
 
     made = three_omnids(seed)
@@ -43,7 +42,7 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
         extra = {"truth": truth.vector.tolist(), "seed": seed, "report": str(output), "errors": _errors(best, made)}
         print_json(result_dict(best) | extra | {"paper": summary(paper, truth) | {"errors": _errors(paper, made)}})
         return
-    known = Known(people(truth), made.grasps, made.late_s)
+    known = Known(truth.people, made.grasps, made.late_s)
     click.echo(team_table(best, f"Three Omnids with one payload, one clock 13 ms late; made data (seed {seed})", known))
     click.echo("\n" + click.style("The same files in two ways", bold=True))
     click.echo(versus_table({"joint": best, "paper": paper}, truth))

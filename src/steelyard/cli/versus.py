@@ -7,10 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
 from steelyard.cli.table import LARGE_INERTIA, columns
 from steelyard.identify.estimate import Estimate
-from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia import InertialParameters
 
 _GROUPS = (("mass", slice(0, 1), 1e3, "g"), ("CoM", slice(1, 4), 1e3, "mm"), ("inertia", slice(4, 10), 1e6, "kg mm²"))
 _UNITS = {"mass": "mass_kg", "CoM": "com_m", "inertia": "inertia_com_kgm2"}
@@ -46,9 +45,5 @@ def summary(estimate: Estimate, truth: InertialParameters) -> dict[str, Any]:
 
 def _errors(estimate: Estimate, truth: InertialParameters) -> list[tuple[float, float]]:
     """Return length of the error, and of the standard deviations, of mass, CoM and inertia."""
-    gap = _people(estimate.parameters) - _people(truth)
+    gap = estimate.parameters.people - truth.people
     return [(float(np.linalg.norm(gap[part])), float(np.linalg.norm(estimate.std[part]))) for _, part, _, _ in _GROUPS]
-
-
-def _people(body: InertialParameters) -> Array:
-    return np.concatenate([[float(body.mass)], body.com, forms.upper(body.inertia_com)])

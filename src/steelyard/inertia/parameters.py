@@ -96,6 +96,11 @@ class InertialParameters:
         return forms.inertia_com(self.vector)
 
     @property
+    def people(self) -> Array:
+        """The numbers people read (..., 10): mass [kg], com [m], inertia about it xx xy xz yy yz zz [kg m^2]."""
+        return np.concatenate([self.mass[..., None], self.com, forms.upper(self.inertia_com)], axis=-1)
+
+    @property
     def pseudo_inertia(self) -> Array:
         """Pseudo-inertia (..., 4, 4)."""
         return forms.pseudo_inertia(self.vector)

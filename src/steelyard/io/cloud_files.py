@@ -12,8 +12,8 @@ from steelyard.errors import BadFile, BadValue
 from steelyard.io.array_table import ArrayTable
 from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
-from steelyard.io.whole_files import write_bytes
 from steelyard.shape.cloud import Cloud
+from steelyard.whole_files import write_bytes
 
 SUFFIXES = (".ply", ".pcd", ".npz")
 _LABELS = ("label", "segmentation", "part")

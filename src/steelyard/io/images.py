@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
-from steelyard.io.whole_files import write_bytes
 from steelyard.shape.mesh import Colours
 from steelyard.shape.views import Depths
+from steelyard.whole_files import write_bytes
 
 _MOST_PIXELS = 64_000_000
 

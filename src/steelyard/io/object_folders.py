@@ -11,10 +11,11 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.io.array_table import ArrayTable
+from steelyard.io.in_file import in_file
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.known import MOTION, KnownObject, Track, unseen_finding
@@ -55,11 +56,11 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
             raise BadFile(f"{folder}: {name} is missing. An object folder has the files {', '.join(FILES)}.")
     mesh = read_mesh(folder / "mesh.ply")
     facts = read_truth(folder / "truth.json")
-    solids: Solids = _value(folder / "mesh.ply", lambda: solids_of(mesh))
-    parts: Parts = _value(folder / "mesh.ply", lambda: parts_of_mesh(mesh, solids))
-    overlapping: Finding | None = _value(folder / "mesh.ply", lambda: overlap_finding(mesh, solids))
+    solids: Solids = in_file(folder / "mesh.ply", lambda: solids_of(mesh))
+    parts: Parts = in_file(folder / "mesh.ply", lambda: parts_of_mesh(mesh, solids))
+    overlapping: Finding | None = in_file(folder / "mesh.ply", lambda: overlap_finding(mesh, solids))
     cloud = _cloud(folder / "points.npz", mesh)
-    X_OS = _value(folder / "truth.json", lambda: Pose.from_matrix(facts["T_mesh_from_grasp"]))
+    X_OS = in_file(folder / "truth.json", lambda: Pose.from_matrix(facts["T_mesh_from_grasp"]))
     unseen = unseen_finding(parts, cloud)
     return KnownObject(
         name=str(facts.get("slug", folder.resolve().name)),
@@ -67,7 +68,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
         parts=parts,
         part_masses=_masses(folder / "truth.json", facts, parts),
         part_materials=tuple(str(row.get("material_fitted") or "") for row in _rows(facts, parts)),
-        truth=_value(folder / "truth.json", lambda: _whole(facts)).in_frame(X_OS.inverse()),
+        truth=in_file(folder / "truth.json", lambda: _whole(facts)).in_frame(X_OS.inverse()),
         X_SO=X_OS.inverse(),
         cloud=cloud,
         box=np.asarray(facts["reference_extents_sensor_m"], float),
@@ -105,14 +106,6 @@ def read_truth(path: Path) -> dict[str, Any]:
         if volume is not None and volume <= 0:
             raise BadFile(f"{path}: part {row.get('label')} has a volume of {volume:g} m^3; it must be above zero.")
     return facts
-
-
-def _value(path: Path, make: Any) -> Any:
-    """Return make(), with the path in front of what is wrong with the numbers."""
-    try:
-        return make()
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
 
 
 def _whole(facts: dict[str, Any]) -> InertialParameters:
@@ -153,7 +146,7 @@ def _masses(path: Path, facts: dict[str, Any], parts: Parts) -> Array | None:
 def _cloud(path: Path, mesh: TriangleMesh) -> Cloud:
     """Return the points; every label must be one of the mesh."""
     arrays = _arrays(path, ("xyz", "rgb", "label"))
-    cloud: Cloud = _value(path, lambda: Cloud(arrays["xyz"], arrays["rgb"], arrays["label"]))
+    cloud: Cloud = in_file(path, lambda: Cloud(arrays["xyz"], arrays["rgb"], arrays["label"]))
     strange = np.setdiff1d(cloud.labels, mesh.labels)
     if len(strange):
         raise BadFile(f"{path}: points carry the label {strange[0]}, and mesh.ply has no such part.")
@@ -166,7 +159,7 @@ def read_track(path: Path | str) -> Track:
     down = set(_DOWN.values()) <= set(ArrayTable.open(path).header.groups)
     names = {**MOTION, **(_DOWN if down else {})}
     arrays = _loaded(path, tuple(names.values()))
-    return _value(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))  # type: ignore[no-any-return]
+    return in_file(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))
 
 
 def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, Any]:

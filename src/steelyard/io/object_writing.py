@@ -4,19 +4,17 @@ from __future__ import annotations
 
 import io
 import json
-import os
-import shutil
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recording_files import object_table
-from steelyard.io.whole_files import write_bytes
 from steelyard.parts.known import KnownObject
+from steelyard.whole_files import whole_folder, write_bytes, write_text
 
 PARTS_NOTE = (
     "Exact integrals over the closed solids of the mesh; material, density and mass are the truth from which the whole "
@@ -50,23 +48,14 @@ def write_object(known: KnownObject, folder: Path | str) -> None:
     folder = Path(folder)
     if known.track is None or known.part_masses is None:
         raise BadValue(f"{known.name}: an object folder needs a motion and the masses of all parts.")
-    temporary = folder.with_name(f".{folder.name}.{os.getpid()}.part")
-    try:
-        temporary.mkdir(parents=True)
-        write_mesh(known.mesh, temporary / "mesh.ply")
+    with whole_folder(folder) as new:
+        write_mesh(known.mesh, new / "mesh.ply")
         cloud = known.cloud
         points = {"xyz": cloud.xyz, "rgb": cloud.rgb, "label": cloud.labels.astype(np.int32)}
-        write_bytes(temporary / "points.npz", _npz(points))
-        write_bytes(temporary / "motion.npz", _npz(known.track.columns()))
-        write_bytes(temporary / "truth.json", (json.dumps(truth_dict(known), indent=1) + "\n").encode())
-        write_bytes(temporary / "log.toml", f"{LOG}\n{object_table(known.X_SO)}".encode())
-        folder.mkdir(exist_ok=True)
-        for path in sorted(temporary.iterdir()):
-            path.replace(folder / path.name)
-    except OSError as error:
-        raise BadFile(f"{folder}: cannot be written ({error.strerror}).") from None
-    finally:
-        shutil.rmtree(temporary, ignore_errors=True)
+        write_bytes(new / "points.npz", _npz(points))
+        write_bytes(new / "motion.npz", _npz(known.track.columns()))
+        write_text(new / "truth.json", json.dumps(truth_dict(known), indent=1) + "\n")
+        write_text(new / "log.toml", f"{LOG}\n{object_table(known.X_SO)}")
 
 
 def _npz(arrays: dict[str, Any]) -> bytes:

@@ -20,11 +20,11 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.array_table import ArrayTable
-from steelyard.io.whole_files import write_bytes
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
+from steelyard.whole_files import write_bytes
 
 MOST_BYTES = 512 * 1024**2
 MOST_CELLS = 4_000_000

@@ -9,8 +9,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.whole_files import write_bytes
 from steelyard.shape.mesh import TriangleMesh
+from steelyard.whole_files import write_bytes
 
 Column = np.ndarray[Any, np.dtype[Any]]
 

@@ -8,9 +8,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
-from steelyard.io.whole_files import write_text
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Pose, Rotation
+from steelyard.whole_files import whole_folder, write_text
 
 _COLUMNS = {
     "force": (("fx", "fy", "fz"), 'unit = "N"'),
@@ -24,23 +24,20 @@ _COLUMNS = {
 def write_recording(recording: Recording, folder: Path) -> Path:
     """Write every stream as CSV and the description as log.toml into `folder`; return the description's path.
 
-    Raises BadFile where the folder cannot be written or a stream holds a quantity that this writer does not know.
+    All of it or nothing is written; other files in the folder stay. Raises BadFile where the folder cannot be written
+    or a stream holds a quantity that this writer does not know.
     """
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
     gravity = ", ".join(f"{g:g}" for g in recording.gravity)
     text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
     if recording.object_pose is not None:
         text.append(object_table(recording.object_pose, recording.object_pose_std))
-    for stream in recording.streams:
-        text.append(_described(stream))
-        write_text(folder / stream.name, _csv(stream))
-    description = folder / "log.toml"
-    write_text(description, "\n".join(text))
-    return description
+    text += [_described(stream) for stream in recording.streams]
+    with whole_folder(folder) as new:
+        for stream in recording.streams:
+            write_text(new / stream.name, _csv(stream))
+        write_text(new / "log.toml", "\n".join(text))
+    return folder / "log.toml"
 
 
 def object_table(pose: Pose, std: tuple[float, float] | None = None) -> str:

@@ -13,8 +13,8 @@ from steelyard.check import Array
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia import forms
 from steelyard.io.team_results import team_entries
-from steelyard.io.whole_files import write_text
 from steelyard.team.estimate import TeamEstimate
+from steelyard.whole_files import write_text
 
 
 def result_dict(estimate: Estimate) -> dict[str, Any]:

@@ -12,11 +12,11 @@ from typing import Protocol
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadFile, BadValue
-from steelyard.io.whole_files import write_bytes, write_text
+from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
+from steelyard.whole_files import whole_folder, write_bytes, write_text
 
 # Quantity -> columns, what its description says beside them, digits after the point.
 _COLUMNS: dict[str, tuple[tuple[str, ...], str, int]] = {
@@ -63,13 +63,18 @@ def write_team(
     packed   gzip the tables
     heading  stands first in the description, as a comment
 
-    Returns `path`. Raises BadFile where the folder cannot be written, BadValue for a six-axis robot with joints.
+    All of it or nothing is written; other files in the folders stay. Returns `path`. Raises BadFile where a folder
+    cannot be written, BadValue for a six-axis robot with joints.
     """
+    with whole_folder(path.parent) as new:
+        _write(log, new / path.name, joints, packed, heading)
+    return path
+
+
+def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings]], packed: bool, heading: str) -> None:
+    """Write the tables, then the description."""
     folder = path.with_suffix("")
-    try:
-        folder.mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
+    folder.mkdir(exist_ok=True)
     level = {_gravity(robot) for robot in log.robots}
     said = "".join(f"# {line}\n" for line in heading.splitlines())
     text = [f"{said}[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
@@ -87,7 +92,6 @@ def write_team(
             text.append(_recording(recording) + _stream(f"{folder.name}/{name}", columns))
             _write_table(folder / name, recording.tracks[robot.name].time, columns, packed)
     write_text(path, "\n".join(text))
-    return path
 
 
 def _robot(robot: TeamRobot, by_joints: bool) -> str:

@@ -7,19 +7,20 @@ import json
 import math
 from collections.abc import Callable
 from pathlib import Path
-from typing import Any, TypeVar
+from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile
 from steelyard.io.images import read_colour, read_depth, require_images, write_image
-from steelyard.io.whole_files import write_bytes
+from steelyard.io.in_file import in_file
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
+from steelyard.whole_files import whole_folder, write_text
 
 _COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
+_HEADER = ",".join(_COLUMNS)
 _CAMERA = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m")
-T = TypeVar("T")
 _UNIT = 1e-3  # how far from 1 the length of a quaternion may be
 
 
@@ -30,7 +31,7 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         raise BadFile(f"{folder}: no such folder. Views are a folder with camera.json, poses.csv and depth/.")
     camera = _camera(folder / "camera.json")
     names, X_WC = _poses(folder / "poses.csv")
-    intrinsics = _of(folder / "camera.json", lambda: _intrinsics(camera))
+    intrinsics = in_file(folder / "camera.json", lambda: _intrinsics(camera))
     size = (intrinsics.height, intrinsics.width)
     depth = np.zeros((len(names), *size), np.uint16)
     coloured = (folder / "color").is_dir()
@@ -42,15 +43,7 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         if progress:
             progress(k + 1, len(names))
     table = _table(folder / "table.json") if (folder / "table.json").exists() else None
-    return _of(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
-
-
-def _of(path: Path, make: Callable[[], T]) -> T:
-    """Return make(), with the path in front of what is wrong with the numbers."""
-    try:
-        return make()
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
+    return in_file(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
 
 
 def _object(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
@@ -152,29 +145,62 @@ def _table(path: Path) -> TablePlane:
     if not isinstance(normal, list) or len(normal) != 3:
         raise BadFile(f'{path}: "normal" must be three numbers; got {normal!r}.')
     axes = np.array([_number(path, "normal", value) for value in normal])
-    return _of(path, lambda: TablePlane(axes, _number(path, "offset_m", values["offset_m"])))
+    return in_file(path, lambda: TablePlane(axes, _number(path, "offset_m", values["offset_m"])))
 
 
 def write_views(views: Views, folder: Path | str) -> None:
-    """Write views as a folder; images are named 0000, 0001, ... Raises BadFile."""
+    """Write views as a folder, all of it or nothing; images are named 0000, 0001, ... Raises BadFile.
+
+    Of views written here before, what these lack goes: their table, colours and further images. Other files stay, and
+    where they would be read as a table or colours that these views lack, nothing is written.
+    """
     require_images()
     folder = Path(folder)
-    try:
-        for name in ("depth", *(["color"] if views.rgb is not None else [])):
-            (folder / name).mkdir(parents=True, exist_ok=True)
-    except OSError as error:
-        raise BadFile(f"{folder}: cannot be made ({error.strerror}).") from None
     names = [f"{k:04d}" for k in range(len(views))]
-    for k, name in enumerate(names):
-        write_image(folder / "depth" / f"{name}.png", views.depth[k])
-        if views.rgb is not None:
-            write_image(folder / "color" / f"{name}.png", views.rgb[k])
-    lens = views.intrinsics
-    camera = {key: getattr(lens, key) for key in _CAMERA[:-1]} | {"depth_unit_m": views.depth_unit}
-    write_bytes(folder / "camera.json", json.dumps(camera, indent=1).encode())
-    numbers = np.column_stack([views.X_WC.position, views.X_WC.rotation.quaternion_wxyz()])
-    lines = [",".join([name, *map(repr, row)]) for name, row in zip(names, numbers.tolist(), strict=True)]
-    write_bytes(folder / "poses.csv", ("\n".join([",".join(_COLUMNS), *lines]) + "\n").encode())
-    if views.table is not None:
-        table = {"normal": views.table.normal.tolist(), "offset_m": views.table.offset}
-        write_bytes(folder / "table.json", json.dumps(table).encode())
+    old = [path for path in _written_before(folder) if path.exists()]
+    _require_unread(views, folder, old)
+    with whole_folder(folder) as new:
+        for k, name in enumerate(names):
+            _write_image(new / "depth" / f"{name}.png", views.depth[k])
+            if views.rgb is not None:
+                _write_image(new / "color" / f"{name}.png", views.rgb[k])
+        lens = views.intrinsics
+        camera = {key: getattr(lens, key) for key in _CAMERA[:-1]} | {"depth_unit_m": views.depth_unit}
+        write_text(new / "camera.json", json.dumps(camera, indent=1))
+        numbers = np.column_stack([views.X_WC.position, views.X_WC.rotation.quaternion_wxyz()])
+        lines = [",".join([name, *map(repr, row)]) for name, row in zip(names, numbers.tolist(), strict=True)]
+        write_text(new / "poses.csv", "\n".join([_HEADER, *lines]) + "\n")
+        if views.table is not None:
+            table = {"normal": views.table.normal.tolist(), "offset_m": views.table.offset}
+            write_text(new / "table.json", json.dumps(table))
+        stale = [path for path in old if not (new / path.relative_to(folder)).exists()]
+    for path in stale:
+        path.unlink(missing_ok=True)
+    if views.rgb is None and (folder / "color").is_dir():
+        (folder / "color").rmdir()
+
+
+def _write_image(path: Path, pixels: Any) -> None:
+    path.parent.mkdir(exist_ok=True)
+    write_image(path, pixels)
+
+
+def _written_before(folder: Path) -> list[Path]:
+    """Return the files that `write_views` may have left in a folder and would not always replace."""
+    try:
+        lines = (folder / "poses.csv").read_text(encoding="utf-8").splitlines()
+    except (OSError, UnicodeDecodeError):
+        return []
+    names = [line.partition(",")[0] for line in lines[1:]]
+    if lines[:1] != [_HEADER] or names != [f"{k:04d}" for k in range(len(names))]:
+        return []
+    return [folder / "table.json", *(folder / kind / f"{name}.png" for kind in ("depth", "color") for name in names)]
+
+
+def _require_unread(views: Views, folder: Path, old: list[Path]) -> None:
+    """Raise BadFile where files of someone else would be read as the colour or the table that the views lack."""
+    colour = sorted((folder / "color").iterdir()) if (folder / "color").is_dir() else []
+    table = [path for path in (folder / "table.json",) if path.exists()]
+    for what, lacks, there in (("colour", views.rgb is None, colour), ("table", views.table is None, table)):
+        if lacks and (others := [path for path in there if path not in old]):
+            raise BadFile(f"{others[0]}: these views have no {what}; move this file away or write into another folder.")

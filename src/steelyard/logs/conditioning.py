@@ -1,4 +1,4 @@
-"""Conditioning: low-pass and interpolation of sampled channels, central differences, tare."""
+"""Conditioning: low-pass and interpolation of sampled channels, and how noisy they are."""
 
 from __future__ import annotations
 
@@ -81,21 +81,6 @@ def _butterworth(order: int, cutoff: float) -> Array:
     from scipy.signal import butter
 
     return np.asarray(butter(order, 2 * cutoff, output="sos"))
-
-
-def central_difference(time: Array, values: Array) -> Array:
-    """Return the derivative (N, D) by second-order central differences (one-sided at the ends), as the
-    papers do."""
-    return np.asarray(np.gradient(check.finite("values", values), check.finite("time", time), axis=0, edge_order=2))
-
-
-def tare(wrench: Array, rows: Any) -> tuple[Array, Array]:
-    """Return wrench (N, 6) less its mean over `rows` (mask, slice or indices), and that mean (6,)."""
-    w = check.vectors("wrench", wrench, 6)
-    if w[rows].size == 0:
-        raise BadValue("tare needs at least one row.")
-    mean = w[rows].mean(0)
-    return w - mean, mean
 
 
 def noise_std(values: Array) -> Array:

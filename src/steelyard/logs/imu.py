@@ -38,7 +38,7 @@ class Mounting:
     position      p (3,) [m] of the accelerometer in S
     bias          (3,) [m/s^2] in its own axes
     scale         what its numbers must be multiplied with to agree with gravity
-    rotation_std, position_std, bias_std   (3,) [rad, m, m/s^2]; zero where given
+    rotation_std, position_std   (3,) [rad, m]; zero where given
     scale_std     of the scale; zero where it was not sought
     """
 
@@ -48,7 +48,6 @@ class Mounting:
     scale: float = 1.0
     rotation_std: Array | None = None
     position_std: Array | None = None
-    bias_std: Array | None = None
     scale_std: float = 0.0
 
     def at_sensor(self, specific_force: Array, omega: Array, alpha: Array) -> Array:
@@ -99,11 +98,11 @@ def first_mount(specific_force: Array, gravity: Array | None, force: Array) -> R
     Gravity alone decides while it visits two directions of S; else the force joins in (it is along a - g for
     a load at rest). A constant bias of the accelerometer cancels, save for a small share that only breaks
     ties.
-    Source: Wahba 1965, by singular values; one-axis turning leaves rank two, which handedness completes.
+    One-axis turning leaves rank two, which handedness completes.
     """
     f = specific_force - specific_force.mean(0)
     if gravity is None:
-        return _wahba((force - force.mean(0)).T @ f)
+        return Rotation.aligning((force - force.mean(0)).T @ f)
     down = -(gravity - gravity.mean(0))
     match = down.T @ f + 0.01 * len(f) * np.outer(-gravity.mean(0), specific_force.mean(0))
     values = np.linalg.svd(match, compute_uv=False)
@@ -111,10 +110,4 @@ def first_mount(specific_force: Array, gravity: Array | None, force: Array) -> R
         forces = force - force.mean(0)
         spread = np.sqrt((forces**2).sum() / max((f**2).sum(), 1e-30)) or 1.0
         match = match + 0.1 * forces.T @ f / spread
-    return _wahba(match)
-
-
-def _wahba(match: Array) -> Rotation:
-    u, _, vt = np.linalg.svd(match)
-    u[:, 2] *= np.linalg.det(u @ vt)
-    return Rotation(u @ vt)
+    return Rotation.aligning(match)

@@ -135,7 +135,6 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
             layout.mounting(theta, question.imu),
             rotation_std=layout.get(std, "rotation", np.zeros(3)),
             position_std=layout.get(std, "position", np.zeros(3)),
-            bias_std=layout.get(std, "bias", np.zeros(3)),
             scale_std=max(float(layout.get(std, "scale", np.zeros(1))[0]), _GAIN) if "scale" in layout.slices else 0.0,
         )
     return Clocks(found, spread, mounting, theta[layout.slices["body"]], residual)

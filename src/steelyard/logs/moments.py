@@ -11,15 +11,12 @@ from __future__ import annotations
 from collections.abc import Iterable
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
-from zipfile import BadZipFile
 
 import numba
 import numpy as np
 
-from steelyard import check
 from steelyard.check import Array
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadValue
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 
 SIZE = 19
@@ -137,14 +134,6 @@ class Moments:
         """Return the statistic of the groups where `keep` (G,) is true."""
         return Moments(self.scatter[keep], self.noise_class[keep], self.block[keep], self.still[keep], self.noise)
 
-    def by_class(self) -> Moments:
-        """Return the statistic with blocks added up: one group per noise class and stillness."""
-        keys = np.stack([self.noise_class, self.still.astype(np.int64)], 1)
-        groups, label = np.unique(keys, axis=0, return_inverse=True)
-        out = np.zeros((len(groups), SIZE, SIZE))
-        np.add.at(out, label, self.scatter)
-        return Moments(out, groups[:, 0], np.full(len(groups), -1), groups[:, 1].astype(np.bool_), self.noise)
-
     @cached_property
     def sum(self) -> Array:
         """The scatter matrix (19, 19) of all rows."""
@@ -159,37 +148,6 @@ class Moments:
     def samples(self) -> float:
         """Rows in all."""
         return float(self.counts.sum())
-
-    def save(self, path: Path) -> None:
-        """Write the statistic as NPZ."""
-        noise = self.noise or ()
-        with open(path, "wb") as file:
-            np.savez(
-                file,
-                scatter=self.scatter,
-                noise_class=self.noise_class,
-                block=self.block,
-                still=self.still,
-                acceleration_variance=np.array([n.acceleration for n in noise]).reshape(-1, 6),
-                wrench_variance=np.array([n.wrench for n in noise]).reshape(-1, 6),
-            )
-
-    @classmethod
-    def load(cls, path: Path) -> Moments:
-        """Read what `save` wrote."""
-        try:
-            with open(path, "rb") as file, np.load(file, allow_pickle=False) as data:
-                pairs = zip(data["acceleration_variance"], data["wrench_variance"], strict=True)
-                noise = tuple(Noise(a, w) for a, w in pairs)
-                scatter = check.matrices("scatter", data["scatter"], SIZE, SIZE)
-                return cls(scatter, data["noise_class"], data["block"], data["still"], noise or None)
-        except (OSError, EOFError, BadZipFile, KeyError, TypeError, ValueError) as error:
-            reason = "not an NPZ file"
-            if isinstance(error, OSError):
-                reason = error.strerror or reason
-            elif isinstance(error, KeyError):
-                reason = str(error.args[0])
-            raise BadFile(f"{path} does not hold saved moments ({reason}). Write one with Moments.save.") from None
 
 
 def _taken(values: Array, rows: Integers) -> Array:

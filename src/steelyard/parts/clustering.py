@@ -18,6 +18,7 @@ from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.merging import merge_all
 from steelyard.shape.hull import TOLERANCE
 from steelyard.shape.mesh import Integers
+from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
 
 
@@ -64,19 +65,13 @@ def cluster(
     start, member = _corners(mesh, leaf, count)
     used = mesh.vertices[np.bincount(mesh.tets.ravel(), minlength=len(mesh.vertices)) > 0]
     diagonal = float(np.linalg.norm(np.ptp(used, axis=0)))
-    merges, costs, volume, hull, faults = merge_all(
-        np.ascontiguousarray(mesh.vertices - used.mean(0)) / diagonal,
-        start,
-        member,
-        np.bincount(leaf, mesh.volumes / diagonal**3, count).astype(np.float64),
-        np.bincount(leaf, minlength=count),
-        groups,
-        _edges(mesh, leaf, count),
-        TOLERANCE,
-        -1.0 if isinstance(cost, Published) else cost.size,
-    )[:5]
-    if faults:
-        raise BadValue(f"{faults} convex hulls of this solid came out open; report it with the mesh.")
+    xyz = np.ascontiguousarray(mesh.vertices - used.mean(0)) / diagonal
+    volumes = np.bincount(leaf, mesh.volumes / diagonal**3, count).astype(np.float64)
+    tets, edges = np.bincount(leaf, minlength=count), _edges(mesh, leaf, count)
+    size = -1.0 if isinstance(cost, Published) else cost.size
+    merges, costs, volume, hull = with_stand_ins(
+        xyz, lambda known: merge_all(xyz, start, member, volumes, tets, groups, edges, TOLERANCE, size, known)
+    )
     return Hierarchy(leaf, merges, costs, volume * diagonal**3, hull * diagonal**3)
 
 

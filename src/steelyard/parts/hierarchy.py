@@ -143,16 +143,6 @@ class Hierarchy:
                 open_nodes += below
         return sorted(found)
 
-    def shortest_cut(self, per_part: float) -> list[int]:
-        """Return the nodes of the cut of least description: sum of (hull - volume) / whole volume + per_part each.
-
-        Raises BadValue where the tree does not know the volumes of its nodes.
-        """
-        if self.volume is None or self.hull is None:
-            raise BadValue("a cut by description length needs the volume and hull of every node; this tree has none.")
-        hollow = np.maximum(self.hull - self.volume, 0) / self.volume[self.root]
-        return self.cheapest_cut(hollow + per_part)
-
     def _node(self, node: int) -> int:
         if not 0 <= node <= self.root:
             raise BadValue(f"nodes of this tree are 0..{self.root}; got {node}.")
@@ -166,15 +156,6 @@ class Hierarchy:
         while not np.array_equal(up, higher := up[up]):
             up = higher
         return np.asarray(place[up[: len(self)]])
-
-
-def joined(labels: Any, parts: Iterable[int]) -> Integers:
-    """Return labels (T,) with some parts made one, under the lowest of their numbers; no number is skipped."""
-    labels, chosen = np.asarray(labels, dtype=np.int64), sorted(set(parts))
-    known = np.unique(labels)
-    if len(chosen) < 2 or not np.isin(chosen, known).all():
-        raise BadValue(f"to join parts, name two or more of the labels in use ({known.tolist()}); got {chosen}.")
-    return np.unique(np.where(np.isin(labels, chosen), chosen[0], labels), return_inverse=True)[1]
 
 
 def _ancestors(parent: Integers, nodes: Integers) -> Integers:

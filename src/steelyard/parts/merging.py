@@ -19,7 +19,8 @@ from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
 from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place
 from steelyard.parts.reach import MOST, Room, reach, room
 from steelyard.shape.borrowed import borrowed, integer
-from steelyard.shape.hull import HullWork, hull_volume, hull_work
+from steelyard.shape.hull import HullWork, hull_work
+from steelyard.shape.stand_ins import StandIns, sure_hull
 
 # Hollow is counted in grains of this share of the whole volume. Unions that leave out the same tets are equally hollow,
 # and rounding is not to choose between them (the smaller one goes first), nor to make a convex union hollow.
@@ -87,29 +88,31 @@ def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, whole
 
 def merge_all(
     xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
-    tolerance: float, size: float,
-) -> tuple[Any, Array, Array, Array, int, int, int]:  # fmt: skip
-    """Return merges, cost, volume and hull of every node, faults, and the number of hulls and of their points."""
+    tolerance: float, size: float, stand_ins: StandIns,
+) -> tuple[Any, Array, Array, Array]:  # fmt: skip
+    """Return merges, cost, volume and hull of every node."""
     n = len(leaf_volume)
-    merges, cost, tally, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), np.zeros(3, np.int64), (0, n - 1)
+    merges, cost, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), (0, n - 1)
     volume, tets = np.pad(leaf_volume, more), np.pad(leaf_tets, more)
     group, gone, head = np.pad(leaf_group, more), np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
     latest = np.full((2 * n - 1, 2), -1, np.int32)
     clusters = Clusters(volume, np.zeros(2 * n - 1), tets, group, gone, head, latest)
     hulls, work = hulls_of(start, member, 2 * n - 1, len(xyz)), hull_work(len(xyz))
     edges = Edges(np.empty((len(ends), 4), np.int32), np.empty(len(ends)), np.zeros(len(ends), np.int8))
-    _begin(xyz, n, tolerance, clusters, hulls, ends, edges, work, tally)
+    _begin(xyz, n, tolerance, clusters, hulls, ends, edges, work, stand_ins)
     heap = empty_heap(len(ends))
-    made = _join_neighbours(xyz, n, tolerance, size, clusters, hulls, edges, heap, work, room(), merges, cost, tally)
+    made = _join_neighbours(
+        xyz, n, tolerance, size, clusters, hulls, edges, heap, work, room(), merges, cost, stand_ins
+    )
     if made < n - 1:
-        _join_bodies(xyz, n, made, tolerance, clusters, hulls, work, merges, cost, tally)
-    return merges, cost, volume, clusters.hull, int(tally[0]), int(tally[1]), int(tally[2])
+        _join_bodies(xyz, n, made, tolerance, clusters, hulls, work, merges, cost, stand_ins)
+    return merges, cost, volume, clusters.hull
 
 
 @numba.njit(cache=True, nogil=True)
 def _begin(
     xyz: Array, n: int, tolerance: float, clusters: Clusters, hulls: Hulls, ends: Any, edges: Edges, work: HullWork,
-    tally: Any,
+    stand_ins: StandIns,
 ) -> None:  # fmt: skip
     """Find the hulls of the first clusters and hang their edges on them."""
     volume, hull, head, end = clusters.volume, clusters.hull, clusters.head, edges.end
@@ -118,24 +121,13 @@ def _begin(
             hull[k] = volume[k]
             four_faces(xyz, hulls, k)
         else:
-            hull[k], kept = _hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, tally)
-            if kept > 0:
-                keep_in_place(hulls, k, work.point, work.stack, kept, hull[k] > 0)
+            hull[k], kept = sure_hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, stand_ins)
+            keep_in_place(hulls, k, work.point, work.stack, kept, hull[k] > 0)
     for e in range(len(ends)):
         a, b = ends[e, 0], ends[e, 1]
         edges.known[e] = max(hull[a], hull[b])
         end[e, 0], end[e, 1], end[e, 2], end[e, 3] = a, b, head[a], head[b]
         head[a], head[b] = 2 * e, 2 * e + 1
-
-
-@numba.njit(cache=True, nogil=True)
-def _hull(xyz: Array, rows: Any, count: int, tolerance: float, work: HullWork, tally: Any) -> tuple[float, int]:
-    """Return the volume of a hull and its number of vertices; 0 vertices is a fault, and counted."""
-    volume, kept = hull_volume(xyz, rows, count, tolerance, work)
-    tally[0] += kept < 0
-    tally[1] += 1
-    tally[2] += count
-    return volume, max(integer(0), kept)
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
@@ -150,7 +142,7 @@ def _priced(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, w
 @numba.njit(cache=True, nogil=True)
 def _join_neighbours(
     xyz: Array, n: int, tolerance: float, size: float, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges,
-    full_heap: Heap, work: HullWork, space: Room, merges: Any, cost: Array, tally: Any,
+    full_heap: Heap, work: HullWork, space: Room, merges: Any, cost: Array, stand_ins: StandIns,
 ) -> int:  # fmt: skip
     """Join clusters that touch, always the two of least cost; return how often."""
     c, h, d, p = all_clusters, all_hulls, all_edges, full_heap
@@ -186,13 +178,13 @@ def _join_neighbours(
             heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
         elif stage[e] == _GROWN:
             count = both(hulls, end[e, 0], end[e, 1])
-            edges.known[e], kept = _hull(xyz, hulls.rows, count, tolerance, work, tally)
+            edges.known[e], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
             stage[e], last = _EXACT, e
             heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
         else:
             _note(clusters, edges, e, heap.order[0, 0], n, made, in_all, size, merges, cost)
             if last != e:
-                kept = _hull_again(xyz, hulls, end[e, 0], end[e, 1], tolerance, work, tally)
+                kept = _hull_again(xyz, hulls, end[e, 0], end[e, 1], tolerance, work, stand_ins)
             last = integer(-1)
             keep(hulls, n + made, clusters.gone, work.point, work.stack, kept, clusters.hull[n + made] > 0)
             heaped = _hand_over(clusters, edges, heap, heaped, e, n, made, across, whole, size)
@@ -245,13 +237,13 @@ def _note(
 
 
 @numba.njit(cache=True, nogil=True)
-def _hull_again(xyz: Array, hulls: Hulls, a: int, b: int, tolerance: float, work: HullWork, tally: Any) -> int:
+def _hull_again(xyz: Array, hulls: Hulls, a: int, b: int, tolerance: float, work: HullWork, stand_ins: StandIns) -> int:
     """Make the hull of two clusters, which was made before, or is that of five points; return its vertices."""
     count = both(hulls, a, b)
     if count == 5:
         five_faces(xyz, hulls.rows, work.point, work.stack)
         return 5
-    return int(_hull(xyz, hulls.rows, count, tolerance, work, tally)[1])
+    return int(sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)[1])
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
@@ -295,7 +287,7 @@ def _hand_over(
 @numba.njit(cache=True, nogil=True)
 def _join_bodies(
     xyz: Array, n: int, made: int, tolerance: float, clusters: Clusters, hulls: Hulls, work: HullWork,
-    merges: Any, cost: Array, tally: Any,
+    merges: Any, cost: Array, stand_ins: StandIns,
 ) -> None:  # fmt: skip
     """Join separate bodies: always the two of least volume, until one is left."""
     volume, gone = clusters.volume, clusters.gone
@@ -305,7 +297,7 @@ def _join_bodies(
         (va, a), (vb, b) = heapq.heappop(bodies), heapq.heappop(bodies)
         c = n + made
         count = both(hulls, a, b)
-        clusters.hull[c], kept = _hull(xyz, hulls.rows, count, tolerance, work, tally)
+        clusters.hull[c], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
         merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
         cost[made], volume[c] = np.inf, va + vb
         gone[a] = gone[b] = True

@@ -17,12 +17,12 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadValue
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.hulls import vertices_of_both
 from steelyard.parts.skin import Skin
-from steelyard.shape.hull import hull_volume, hull_work
+from steelyard.shape.hull import HullWork, hull_work
 from steelyard.shape.mesh import Integers
+from steelyard.shape.stand_ins import StandIns, sure_hull, with_stand_ins
 from steelyard.shape.tets import TetMesh
 
 STRAIGHT, CREASED = 0.07, 0.25  # mean turn [rad] across a border that is no seam, and that is one
@@ -72,21 +72,11 @@ def seam_tree(
     weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
     moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
     centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
-    merges, cost, seam, node_volume, hull, faults = _merge(
-        xyz,
-        start,
-        member.astype(np.int64),
-        volume,
-        centre,
-        share,
-        colour.astype(np.int64),
-        contact,
-        touch,
-        _BLUNT,
-        (STRAIGHT, CREASED, NECK, FLANK),
+    leaves = (start, member.astype(np.int64), volume, centre, share, colour.astype(np.int64))
+    work, limits = hull_work(len(xyz)), (STRAIGHT, CREASED, NECK, FLANK)
+    merges, cost, seam, node_volume, hull = with_stand_ins(
+        xyz, lambda known: _merge(xyz, *leaves, contact.copy(), touch.copy(), _BLUNT, limits, work, known)
     )
-    if faults:
-        raise BadValue(f"{faults} convex hulls of this solid came out open; report it with the mesh.")
     whole = mesh.volume
     return SeamTree(Hierarchy(piece, merges, cost, node_volume * whole, hull * whole), seam)
 
@@ -196,8 +186,9 @@ def _best_partner(a: int, price: Array, alive: Any) -> int:
 def _merge(
     xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_middle: Array, leaf_share: Array, leaf_colour: Any,
     contact: Any, touch: Any, tolerance: float, limits: tuple[float, float, float, float],
-) -> tuple[Any, Array, Array, Array, Array, int]:  # fmt: skip
-    """Return merges, cost, seam, volume and hull of every node, and faults. Clusters live in the rows of `contact`.
+    work: HullWork, stand_ins: StandIns,
+) -> tuple[Any, Array, Array, Array, Array]:  # fmt: skip
+    """Return merges, cost, seam, volume and hull of every node. Clusters live in the rows of `contact`.
 
     Hulls only grow: a pair is priced by the larger of the hulls known to lie in its union until it is the cheapest.
     """
@@ -210,13 +201,10 @@ def _merge(
     hull = np.empty(n)
     pool = np.empty(len(member) + 64 * n, np.int64)
     offset, length = np.empty(n, np.int64), np.empty(n, np.int64)
-    filled, faults, stamp = 0, 0, 0
+    filled, stamp = 0, 0
     rows, mark = np.empty(len(xyz), np.int64), np.full(len(xyz), -1, np.int64)
-    work = hull_work(len(xyz))
     for k in range(n):
-        hull[k], kept = hull_volume(xyz, member[start[k] :], start[k + 1] - start[k], tolerance, work)
-        if kept < 0:
-            faults, kept, hull[k] = faults + 1, 0, volume[k]
+        hull[k], kept = sure_hull(xyz, member[start[k] :], start[k + 1] - start[k], tolerance, work, stand_ins)
         offset[k], length[k] = filled, kept
         for i in range(kept):
             pool[filled + i] = work.point[i, 2]
@@ -268,11 +256,8 @@ def _merge(
                 break
             stamp += 1
             count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
-            h, kept = hull_volume(xyz, rows, count, tolerance, work)
-            if kept >= 0:
-                known[p, q] = h
-            else:
-                faults += 1
+            h, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
+            known[p, q] = h
             exact[p, q] = True
             last_p, last_q = p, q
             stage = 0 if colour[p] == colour[q] and colour[p] >= 0 else 2
@@ -292,11 +277,7 @@ def _merge(
         if last_p != p or last_q != q:
             stamp += 1
             count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
-            h, kept = hull_volume(xyz, rows, count, tolerance, work)
-        if kept < 0:
-            faults, kept, h = faults + 1, count, max(hull[p], hull[q])
-            for i in range(count):
-                work.point[i, 2] = rows[i]
+            h, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
         paint = PAINT * min(share[p], share[q])
         if apart:
             cost[made], seam[made] = np.inf, paint + max(0.0, h - volume[p] - volume[q])
@@ -332,4 +313,4 @@ def _merge(
                 price[low, high] = np.inf
         changed[p] = True
         made += 1
-    return merges, cost, seam, node_volume, node_hull, faults
+    return merges, cost, seam, node_volume, node_hull

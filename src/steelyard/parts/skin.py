@@ -68,11 +68,6 @@ class Skin:
         return np.stack(total, axis=1), np.asarray(area, dtype=np.float64)
 
     @cached_property
-    def vertex_areas(self) -> Array:
-        """Share (V,) of the boundary's area at each vertex, a third of its triangles; 0 inside."""
-        return np.asarray(self._vertex_sums[1] / max(float(3 * self.areas.sum()), 1e-300))
-
-    @cached_property
     def normals(self) -> Array:
         """Mean outward normal (V, 3) at each vertex, weighted by area; 0 inside."""
         total = self._vertex_sums[0]

@@ -6,7 +6,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
-from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia import forms
 from steelyard.report.markup import Html, tag
 from steelyard.spatial import Rotation
 
@@ -56,11 +56,6 @@ def mass_unit(mass: float) -> tuple[float, str]:
 def inertia_unit(moment: float) -> tuple[float, str]:
     """Return factor and unit for a moment of inertia [kg m^2]."""
     return (1e6, "kg mm²") if abs(moment) < 0.1 else (1.0, "kg m²")
-
-
-def people(body: InertialParameters) -> Array:
-    """Return mass [kg], com [m], inertia about it xx xy xz yy yz zz [kg m^2] (10,)."""
-    return np.concatenate([[float(body.mass)], body.com, forms.upper(body.inertia_com)])
 
 
 def rpy_deg(rotation: Rotation) -> Array:

@@ -5,33 +5,23 @@ from __future__ import annotations
 import base64
 import contextlib
 import hashlib
-import os
 from functools import cache
 from importlib import resources
 from pathlib import Path
 from string import Template
 
 from steelyard import check
-from steelyard.errors import BadFile
 from steelyard.report import sections, team_sections
 from steelyard.report.contents import Report
 from steelyard.report.drawing import drawing
 from steelyard.report.legend import viewer
 from steelyard.report.markup import joined, script_json, tag, text
+from steelyard.whole_files import write_text
 
 
 def write_report(report: Report, path: Path | str) -> None:
     """Write the page; the file appears complete or not at all. Raises BadFile."""
-    path = Path(path)
-    temporary = path.with_name(f".{path.name}.{os.getpid()}.part")
-    try:
-        temporary.write_text(render(report), encoding="utf-8")
-        temporary.replace(path)
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be written ({error.strerror}).") from None
-    finally:
-        with contextlib.suppress(OSError):
-            temporary.unlink(missing_ok=True)
+    write_text(Path(path), render(report))
 
 
 def render(report: Report, version: str | None = None) -> str:

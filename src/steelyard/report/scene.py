@@ -133,10 +133,11 @@ def pose_from_centroids(in_sensor: Array, in_object: Array) -> Pose | None:
     if a.shape != b.shape or len(a) < 3:
         return None
     middle_a, middle_b = a.mean(0), b.mean(0)
-    u, spread, vt = np.linalg.svd((a - middle_a).T @ (b - middle_b))
+    match = (a - middle_a).T @ (b - middle_b)
+    spread = np.linalg.svd(match, compute_uv=False)
     if spread[1] < _EXACT * spread[0]:
         return None
-    turn = u @ np.diag([1, 1, np.linalg.det(u) * np.linalg.det(vt)]) @ vt
-    found = Pose(Rotation(turn), middle_a - turn @ middle_b)
+    turn = Rotation.aligning(match)
+    found = Pose(turn, middle_a - turn.apply(middle_b))
     gap = np.linalg.norm(found.apply(b) - a, axis=1).max()
     return found if gap < _EXACT * np.sqrt(spread[0]) else None

@@ -9,7 +9,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import decimals, fixed, general, inertia_unit, mass_unit, measured, people, principal
+from steelyard.report.numbers import decimals, fixed, general, inertia_unit, mass_unit, measured, principal
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, residual_plot
 from steelyard.team.estimate import TeamEstimate
@@ -27,7 +27,7 @@ def section(title: str, *children: object, name: str, lead: str = "") -> Html:
 def headline(report: Report) -> Html:
     """Return the three cards: mass, centre of mass, principal moments of inertia."""
     seen, truth = report.estimate, report.truth
-    true = None if truth is None else people(truth.body)
+    true = None if truth is None else truth.body.people
     factor, unit = mass_unit(seen.mass)
     value = measured(factor * seen.mass, factor * float(seen.std[0]), unit)
     mass = _card(
@@ -106,11 +106,11 @@ def comparison(report: Report) -> Html:
     answers = {"Steelyard": report.estimate, **report.rivals}
     if report.truth is None:
         return _side_by_side(answers) if report.rivals else Html("")
-    true = people(report.truth.body)
+    true = report.truth.body.people
     size = float(np.linalg.norm(report.truth.body.inertia_com))
     rows = []
     for estimate in answers.values():
-        gap = people(estimate.parameters) - true
+        gap = estimate.parameters.people - true
         turned = np.linalg.norm(gap[4:] * np.sqrt([1, 2, 2, 1, 2, 1]))
         rows.append([
             100 * abs(gap[0]) / true[0], 1e3 * float(np.linalg.norm(gap[1:4])), 100 * float(turned) / size,
@@ -187,8 +187,8 @@ def findings(report: Report) -> Html:
 def numbers(report: Report) -> Html:
     """Return the ten numbers with their standard deviations, and the truth where it is known."""
     seen = report.estimate
-    values, std = people(seen.parameters), seen.std
-    true = None if report.truth is None else people(report.truth.body)
+    values, std = seen.parameters.people, seen.std
+    true = None if report.truth is None else report.truth.body.people
     lines = []
     for k, name in enumerate(_ENTRIES):
         factor, unit = mass_unit(seen.mass) if k == 0 else (1e3, "mm") if k < 4 else inertia_unit(_largest(values))

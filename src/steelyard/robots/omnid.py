@@ -3,7 +3,7 @@
 Six joint angles, three of the Delta and then the gimbal's about x, y and z, give the pose of the grasp in the home
 frame (the Delta's base axes, origin at the platform's home). The gimbal bears no moment: the wrench is a force, and the
 springs of the Delta tell it.
-Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B and eq. 34-35; sizes, stops and spring of the
+Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B and eq. 34-35; sizes and stops of the
 published firmware (2018-2020).
 """
 
@@ -23,14 +23,13 @@ from steelyard.spatial import Pose, Rotation, Twist, Wrench
 
 @dataclass(frozen=True)
 class Omnid:
-    """Delta, limits and spring of one Omnid.
+    """Delta and limits of one Omnid.
 
     home_height  of the platform above the Delta's base plane in the home configuration [m]
     arm_limits   of the Delta's joints [rad]
     gimbal_stops half travel about x, y, z [rad]; about z it bounds the travel and not the reading, whose zero depends
                  on how the gripper was clamped
     work_box     half widths in x and y, lowest and highest z of the platform above the base plane [m]
-    spring       of each series-elastic joint [N m/rad]
     """
 
     delta: Delta = field(default_factory=Delta)
@@ -38,7 +37,6 @@ class Omnid:
     arm_limits: tuple[float, float] = (0.0, np.deg2rad(80.0))
     gimbal_stops: tuple[float, float, float] = (0.6674, 0.6674, 0.35377)
     work_box: tuple[float, float, float, float] = (0.10, 0.10, 0.20, 0.45)
-    spring: float = 17.0
 
     def pose(self, joints: ArrayLike) -> Pose:
         """Return the grasp's pose T_i0 (...) in the home frame from joint angles (..., 6) [rad] (eq. 34)."""
@@ -86,10 +84,6 @@ class Omnid:
         """Return the spring torques (..., 3) [N m] while the grasp applies `force` (..., 3) [N], in its own axes."""
         q = check.vectors("joint angles", joints, 6)
         return self.delta.torques(q[..., :3], gimbal_rotation(q[..., 3:]).apply(force))
-
-    def deflection_torques(self, deflection: ArrayLike) -> Array:
-        """Return the spring torques (...) [N m] from deflections (...) [rad], before less after the spring."""
-        return self.spring * check.finite("spring deflection", deflection)
 
     def require_within(self, joints: ArrayLike) -> None:
         """Raise BadValue where joint angles (..., 6) [rad] are beyond an arm's limit or a gimbal stop."""

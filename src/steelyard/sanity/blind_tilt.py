@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.sanity.glance import Glance
 from steelyard.sanity.static_fit import beside, solve
+from steelyard.spatial import Rotation
 
 # Gains of accelerometers are good to 3 %; a sweep further off, beyond five standard deviations, is a tilt (16 degrees).
 GAIN, SURE, LEFT = 0.04, 5.0, 0.01
@@ -26,9 +27,8 @@ def blind_tilt(view: Glance, gravity: Array, blind: Array) -> tuple[Finding, ...
         return ()
     seen = view.seen(gravity, view.rotation)
     felt, up = view.smooth(view.accelerometer), -(seen.pull - seen.pull.mean(0))
-    u, _, vt = np.linalg.svd(up.T @ (felt - felt.mean(0)))
-    u[:, 2] *= np.linalg.det(u @ vt)
-    gain, spread, left = solve(beside(up[:, :, None], seen.lever), felt @ (u @ vt).T, view.block)
+    turn = Rotation.aligning(up.T @ (felt - felt.mean(0)))
+    gain, spread, left = solve(beside(up[:, :, None], seen.lever), felt @ turn.matrix.T, view.block)
     if abs(gain[0] - 1) < max(GAIN, SURE * spread[0]) or abs(gain[0] - 1) > 0.5 or left > LEFT:
         return ()
     size = float(np.linalg.norm(gravity))

@@ -23,7 +23,6 @@ BEYOND_BIAS, LONGEST_LEVER = 40.0, 1.0
 class LoadChange:
     """At `time` [s] the mass went from `before` to `after` [kg]; residual (F, 6) with both bodies."""
 
-    slice: int
     time: float
     before: float
     after: float
@@ -80,7 +79,7 @@ def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange |
     residual = slices.y - slices.A @ x[: len(run.ridge)]
     residual[j:] -= slices.A[j:, :, :10] @ change
     time = float(slices.time[j - 1] + slices.time[j]) / 2
-    return LoadChange(j, time, float(before[0]), float(before[0] + change[0]), residual)
+    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual)
 
 
 def _running(values: Array) -> Array:

@@ -12,6 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.sanity.glance import Glance, Integers
 from steelyard.sanity.static_fit import beside, fit, leave_out, solve
+from steelyard.spatial import Rotation
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
@@ -117,9 +118,7 @@ def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
     seen = replace(view, acceleration=None).seen(gravity, view.rotation)
     force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
     down = -pull * (np.sign(mass) or 1.0)
-    u, _, vt = np.linalg.svd(force.T @ down)
-    u[:, 2] *= np.linalg.det(u @ vt)
-    X = u @ vt
+    X = Rotation.aligning(force.T @ down).matrix
     axis = np.array([X[2, 1] - X[1, 2], X[0, 2] - X[2, 0], X[1, 0] - X[0, 1]]) / 2
     angle = float(np.arctan2(np.linalg.norm(axis), (np.trace(X) - 1) / 2))
     _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)

@@ -1,10 +1,10 @@
-"""Volume of the convex hull of points: a compiled quickhull for inner loops, SciPy's Qhull where it gives up.
+"""Volume of the convex hull of points: a compiled quickhull for inner loops, and SciPy's Qhull.
 
 A point is added where it lies more than a tolerance above a face; which faces it sees is then decided by the exact sign
 of a determinant: in double precision with an error bound, in double-double where that cannot tell, and last without any
 rounding. So the surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points
 within the tolerance of the hull are left out. Its topology is checked all the same: a fault is reported, never a wrong
-volume.
+volume, and Qhull's hull stands in for it (`stand_ins`).
 
 Source: Barber, Dobkin, Huhdanpaa 1996, "The Quickhull algorithm for convex hulls" (outside sets, farthest point first);
 Shewchuk 1997, "Adaptive precision floating-point arithmetic" (error bounds, exact differences and products).
@@ -16,11 +16,8 @@ from typing import Any
 
 import numba
 import numpy as np
-from numpy.typing import ArrayLike
 
-from steelyard import check
 from steelyard.check import Array
-from steelyard.errors import BadValue
 from steelyard.shape.borrowed import borrowed, integer
 from steelyard.shape.hull_faces import (
     FAR,
@@ -39,7 +36,7 @@ from steelyard.shape.hull_faces import (
 )  # fmt: skip
 from steelyard.shape.mesh import Integers
 
-__all__ = ["TOLERANCE", "HullWork", "convex_hull", "hull_volume", "hull_work", "qhull"]
+__all__ = ["TOLERANCE", "HullWork", "hull_volume", "hull_work", "qhull"]
 
 # Of the extent: nearer to the hull, a point is on it. Rounding of turned, coplanar points is a thousandth.
 TOLERANCE = 1e-13
@@ -94,7 +91,7 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
             p = integer(face[f, FAR])
             faces, edges = look(xyz, plane, face, stack, rim, f, p, noise)
             loose, free = clear(point, face, stack, faces, p, free)
-            used, free = cone(xyz, point, plane, face, stack, rim, p, edges, used, free, tolerance, noise)
+            used, free = cone(xyz, point, plane, face, stack, rim, p, edges, used, free, tolerance)
             if used < 0:
                 face[:, QUEUED] = 0
                 return np.nan, -1
@@ -102,24 +99,8 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
     return total(point, plane, face, stack, rows, used)
 
 
-def convex_hull(points: ArrayLike) -> tuple[float, Integers]:
-    """Return the volume of the convex hull of points (N, 3), and which rows are its vertices, rising.
-
-    Flat sets have volume 0, and every row counts as a vertex.
-    """
-    xyz = check.vectors("points", points)
-    if xyz.ndim != 2 or not len(xyz):
-        raise BadValue(f"a hull needs points (N, 3), N > 0; got {xyz.shape}.")
-    work = hull_work(len(xyz))
-    tolerance = TOLERANCE * float(np.ptp(xyz, axis=0).max())
-    volume, vertices = hull_volume(xyz, np.arange(len(xyz)), len(xyz), tolerance, work)
-    if vertices < 0:
-        return qhull(xyz)
-    return float(volume), np.sort(work.kept[:vertices]).astype(np.int64)
-
-
 def qhull(points: Array) -> tuple[float, Integers]:
-    """Return the same from SciPy's Qhull: three to thirty times slower, and another witness.
+    """Return volume and vertices, rising, by SciPy's Qhull: three to thirty times slower, and another witness.
 
     Qhull gives up on some sets that are not flat; those it is given again, joggled.
     """

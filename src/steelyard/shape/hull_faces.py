@@ -243,7 +243,7 @@ def clear(point: Any, face: Any, stack: Any, faces: int, p: int, free: int) -> t
 @numba.njit(cache=True, nogil=True, forceinline=True)
 def cone(
     xyz: Array, point: Any, plane: Array, face: Any, stack: Any, rim: Any, p: int, edges: int, used: int, free: int,
-    tolerance: float, noise: float,
+    tolerance: float,
 ) -> tuple[int, int]:  # fmt: skip
     """Join point p to the horizon's edges; return the slots used and free, -1 used where the horizon is no circle."""
     if edges > len(point):

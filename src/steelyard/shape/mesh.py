@@ -10,7 +10,6 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose, Rotation, cross
 
@@ -153,12 +152,3 @@ def require_closed(mesh: TriangleMesh) -> TriangleMesh:
             "Close the surface, weld equal vertices, and turn all triangles outward."
         )
     return mesh
-
-
-def surface_finding(mesh: TriangleMesh) -> Finding | None:
-    """Return the finding `surface-open` where edges are open, else None."""
-    counts = open_edges(mesh)
-    if not counts.any():
-        return None
-    named = ", ".join(str(label) for label in mesh.labels[counts > 0])
-    return Finding.of("surface-open", f"The surface has {counts.sum()} open edges, in part {named}.")

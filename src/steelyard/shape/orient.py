@@ -56,11 +56,6 @@ class Oriented:
     spacing: float
 
 
-def orient(cloud: Cloud) -> Array:
-    """Return outward unit normals (N, 3) of the points of a closed surface."""
-    return oriented(cloud).normals
-
-
 def oriented(cloud: Cloud) -> Oriented:
     """Return the surface elements of a cloud; normals that it carries are kept."""
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal

@@ -122,4 +122,4 @@ def _exact(seen: Kinematics) -> MotionLog:
 
 def truth_for_people(truth: InertialParameters) -> Array:
     """Return mass, com, inertia about the CoM xx xy xz yy yz zz (10,)."""
-    return np.concatenate([[float(truth.mass)], truth.com, truth.inertia_com[np.triu_indices(3)]])
+    return truth.people

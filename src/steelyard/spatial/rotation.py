@@ -60,6 +60,24 @@ class Rotation:
         loose = s[..., 1] + sign * s[..., 2] <= _ZERO_NORM * s[..., 0]
         if loose.any():
             raise BadValue(f"matrix must have one nearest rotation; {int(loose.sum())} of {loose.size} do not.")
+        return cls._right_handed(u, vt, sign)
+
+    @classmethod
+    def aligning(cls, match: ArrayLike) -> Rotation:
+        """Return R_AB that turns vectors b in B onto the same ones a in A best: it minimises sum |a - R_AB b|^2.
+
+        match  (..., 3, 3), sum of a b^T over the pairs; its scale does not matter
+
+        Vectors in one plane are enough: handedness completes rank two. Where they are about one axis (rank one, or
+        zero) many rotations do as well and one of them is returned without a word, as where two singular values tie
+        under a reflection; `nearest` refuses these. Source: Wahba 1965, by singular values (Kabsch 1976).
+        """
+        u, _, vt = np.linalg.svd(check.matrices("match", match))
+        return cls._right_handed(u, vt, np.linalg.det(u @ vt))
+
+    @classmethod
+    def _right_handed(cls, u: Array, vt: Array, sign: Array) -> Rotation:
+        """Return u vt, its least singular direction turned where `sign`, the determinant, is -1."""
         u[..., :, 2] *= sign[..., None]
         return cls._trusted(u @ vt)
 

@@ -1,4 +1,4 @@
-"""Trials of the team bench, in this process or in several."""
+"""Jobs of a bench, in this process or in several."""
 
 from __future__ import annotations
 
