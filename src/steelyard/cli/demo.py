@@ -89,7 +89,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         print_json(result_dict(best) | extra | others)
         return
     title = f"A hammer, scanned from {len(seen.views)} views and turned slowly, made data (seed {seed})"
-    click.echo(estimate_table(best, title, hammer.truth_for_people(seen.truth), _names(best, shape, seen)))
+    click.echo(estimate_table(best, title, seen.truth.people, _names(best, shape, seen)))
     click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
     say(f"The page with the parts in 3D: {output}")
     if keep is None:

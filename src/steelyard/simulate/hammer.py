@@ -118,8 +118,3 @@ def _exact(seen: Kinematics) -> MotionLog:
         seen.angular_velocity,
         seen.angular_acceleration,
     )
-
-
-def truth_for_people(truth: InertialParameters) -> Array:
-    """Return mass, com, inertia about the CoM xx xy xz yy yz zz (10,)."""
-    return truth.people

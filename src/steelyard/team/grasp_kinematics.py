@@ -44,14 +44,14 @@ def rotation(omega_i: Array, omega_j: Array) -> tuple[Rotation, Array]:
 
     Raises CannotAnswer where all of them are about one axis.
     """
-    u, s, vt = np.linalg.svd(omega_i.T @ omega_j)
+    match = omega_i.T @ omega_j
+    s = np.asarray(np.linalg.svd(match, compute_uv=False), np.float64)
     if not s[1] > ONE_AXIS**2 * s[0]:
         raise CannotAnswer(
             "the angular velocities must be about two axes or more to tell how one grasp is turned against another; "
             f"they are about one (second singular value {s[1]:.2g} of {s[0]:.2g}). Tilt the payload about another axis."
         )
-    u[:, 2] *= np.linalg.det(u @ vt)
-    return Rotation(u @ vt), s
+    return Rotation.aligning(match), s
 
 
 def position(twist_i: Array, twist_j: Array, turn: Rotation) -> tuple[Array, Array]:

@@ -67,12 +67,12 @@ def _grasps(T_r: Pose, T: Pose) -> Pose:
     alpha, beta = (turns_between(Rotation.identity(), X.rotation) for X in (A, B))
     a, b = A.position - A.position.mean(0), B.position - B.position.mean(0)
     turning, moving = (x.T @ y.swapaxes(0, 1) for x, y in ((alpha, beta), (a, b)))
-    first = _wahba(turning)
+    first = Rotation.aligning(turning)
     seen, axes = np.linalg.eigh(alpha.T @ alpha)
     if seen[1] > ONE_AXIS**2 * seen[2] and seen[1] > rows * (10 * ROTATION_NOISE) ** 2:
         return Pose(first, _positions(A, B, first)[0])
     about = [Rotation.exp(angle * axes[:, 2]) for angle in np.arange(TURNS) * (2 * np.pi / TURNS)]
-    candidates = [first, _wahba(moving), *(turn @ first for turn in about)]
+    candidates = [first, Rotation.aligning(moving), *(turn @ first for turn in about)]
     found = [_positions(A, B, R) for R in candidates]
     spread = float(np.linalg.norm(alpha, axis=1).mean()) + 1e-12
     size = float(np.linalg.norm(a, axis=1).mean()) + 1e-12
@@ -83,16 +83,6 @@ def _grasps(T_r: Pose, T: Pose) -> Pose:
     best, each = np.argmin(cost, axis=0), np.arange(len(first.matrix))
     turns = np.stack([R.matrix for R in candidates])[best, each]
     return Pose(Rotation(turns), np.stack([place for place, _ in found])[best, each])
-
-
-def _wahba(H: Array) -> Rotation:
-    """Return R (K,) that minimise sum |alpha - R beta|^2 for H (K, 3, 3) = sum alpha beta^T.
-
-    Source: the paper, eq. 5.
-    """
-    u, _, vt = np.linalg.svd(H)
-    u[..., 2] *= np.linalg.det(u @ vt)[:, None]
-    return Rotation(u @ vt)
 
 
 def _positions(A: Pose, B: Pose, R: Rotation) -> tuple[Array, Array]:

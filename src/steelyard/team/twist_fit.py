@@ -127,19 +127,13 @@ def _pair(S: Array) -> tuple[Array, Array]:
     """Return rotation (3, 3) and position (3,) of the second robot's grasp in the first's from their scatter."""
     w_w, v_v = S[:3, 6:9], S[3:6, 9:12]
     values, axes = np.linalg.eigh(S[:3, :3])
-    candidates = [_wahba(w_w), _wahba(v_v)]
+    candidates = [Rotation.aligning(w_w).matrix, Rotation.aligning(v_v).matrix]
     if values[1] < ONE_AXIS**2 * values[2]:
         for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS):
             candidates.append(Rotation.exp(angle * axes[:, 2]).matrix @ candidates[0])
     found = [_position(S, R) for R in candidates]
     best = int(np.argmin([cost for _, cost in found]))
     return candidates[best], found[best][0]
-
-
-def _wahba(H: Array) -> Array:
-    u, _, vt = np.linalg.svd(H)
-    u[:, 2] *= np.linalg.det(u @ vt)
-    return np.asarray(u @ vt)
 
 
 def _position(S: Array, R: Array) -> tuple[Array, float]:
