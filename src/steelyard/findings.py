@@ -11,6 +11,8 @@ REMEDIES: dict[str, str] = {
     "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] or the [[robot]] ("on-object" if that is "on-sensor").',
     "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
     "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
+    "weight-compensated": "Set the payload in the controller, or in the sensor's driver, to zero, and record again.",
+    "wrench-unexplained": "Check order and signs of columns, angles, clocks, and a payload set in the controller.",
     "force-unit": "Check the force and torque units of the wrench stream.",
     "length-in-mm": 'Set the unit that the numbers have: "mm" (or "m") for positions, "N*mm" (or "N*m") for torques.',
     "quaternion-order": "Swap form between quaternion-wxyz and quaternion-xyzw.",

@@ -7,6 +7,8 @@ Every step is a named room; what it noticed travels along as findings.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Literal
 
@@ -101,10 +103,13 @@ def identify(
     aligned, level = levelled_as(options.gravity, align(recording), recording)
     log, unmeasured = _with_known_acceleration(aligned.log, aligned)
     keep, touched = (slice(None), ()) if unmeasured else untouched(log, options.bias == "free")
+    if any(f.code == "weight-compensated" for f in before):
+        touched = ()  # moving rows carry the whole mass, and only look touched
     log = without_dead(with_declared(log.rows(keep), recording.noise), dead_channels(recording))
     shape = None if parts is None else _shape(parts, recording.object_pose, recording.object_pose_std)
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
-    estimate = load.estimate()
+    with _beside(before):
+        estimate = load.estimate()
     late = after(log, estimate, aligned, recording)
     if load.bias.free and not load.bias.drift and any(f.code == "bias-drift" for f in late):
         load = replace(load, bias=replace(load.bias, drift=True))
@@ -121,6 +126,18 @@ def identify(
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late)
     return _in_recording_sign(replace(estimate, delays_s=dict(aligned.delays_s)).noted(*aligned.notes), recording)
+
+
+@contextmanager
+def _beside(findings: tuple[Finding, ...]) -> Iterator[None]:
+    """Say with a refusal what was noticed before: it is the likely cause."""
+    try:
+        yield
+    except CannotAnswer as error:
+        if not findings:
+            raise
+        said = " ".join(f"{f.message} {f.remedy}" for f in findings)
+        raise CannotAnswer(f"{error} Noticed before the fit: {said}") from None
 
 
 @within_numbers()

@@ -38,7 +38,8 @@ def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recor
     rotation = rotation_of(log, aligned)
     tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
     drift = () if tilted else bias_drift(log)
-    size = implausible(estimate, float(np.linalg.norm(recording.gravity)))
+    noise = max((_white(s.time, v) for s, _, v in channel(recording, "force")), default=0.0)
+    size = implausible(estimate, float(np.linalg.norm(recording.gravity)), noise)
     return (*seen, *tilted, *drift, *_noise_level(estimate, recording), *_prior(estimate), *size)
 
 

@@ -22,7 +22,9 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
+from steelyard.sanity.compensated import compensated
 from steelyard.sanity.glance import Glance, glance
+from steelyard.sanity.mirrored import Mirror, mirrored
 from steelyard.sanity.misread import MISREAD, Misread
 from steelyard.sanity.static_fit import StaticFit, beside, fit, solve
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
@@ -68,7 +70,9 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     if best is not None:
         found.append(_rival_finding(best, reading))
         recording, reading = _as_read(recording, best), best
-    flipped, findings = _signs(recording, view, reading)
+    found.extend(less := compensated(view, recording.gravity, reading.rotation))
+    # What a controller leaves of a weight may have either sign.
+    flipped, findings = (recording, ()) if less else _signs(recording, view, reading)
     if findings:
         reading = _reading(view, "", flipped.gravity, reading.rotation)
     recording = flipped
@@ -231,6 +235,15 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
             f"unexplained instead of {_percent(reading.fit.force_share)}; the answer does not assume this."
         )
         return recording, (Finding.of("gravity-frame", message),)
+    mirror = mirrored(view, reading.gravity, reading.fit.mass)
+    if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
+        message = (
+            f"The forces fit one body if they are read as {mirror.words}: so, {_percent(mirror.force_share)} of their "
+            f"variance is left unexplained instead of {_percent(reading.fit.force_share)}; the answer does not assume "
+            "this."
+        )
+        remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
+        return recording, (Finding("force-unit", message, remedy),)
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
@@ -249,6 +262,13 @@ def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> b
         and turned.force_share < min(MUCH_BETTER * given.force_share, 0.3)
         and (tilt is None or turned.force_share < 0.5 * tilt.force_share)
     )
+
+
+def _columns_mixed(mirror: Mirror, turned: Turn | None, tilt: GlanceTilt | None, given: StaticFit) -> bool:
+    """Tell whether forces read in another order or sign explain what no turn of S and no tilted gravity does."""
+    rivals = [found.force_share for found in (turned, tilt) if found is not None]
+    bar = min(MUCH_BETTER * given.force_share, 0.3, *(0.5 * share for share in rivals))
+    return mirror.force_share < bar
 
 
 def _plain(tilt: GlanceTilt, given: StaticFit) -> bool:

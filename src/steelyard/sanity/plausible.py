@@ -11,26 +11,27 @@ from steelyard.identify.estimate import Estimate
 HEAVIEST, DENSEST = 500.0, 22600.0
 # The residual is far beyond what the weight lets a right model leave: as a share of the weight's force.
 MISFIT = 0.2
-# Chi-square per degree of freedom of a fit whose noise was estimated: far above one, the model does not fit.
-CHI2 = 10.0
+# It is no noise either where it is so many times what scatters from sample to sample; of a table nobody knows, but no
+# reading at rest scatters by half a newton.
+NO_NOISE, QUIET = 5.0, 0.1
 
 
-def implausible(estimate: Estimate, gravity: float) -> tuple[Finding, ...]:
-    """Return `force-unit` or `length-in-mm` where mass, size or residual are those of wrong units.
+def implausible(estimate: Estimate, gravity: float, noise: float = 0.0) -> tuple[Finding, ...]:
+    """Return `force-unit`, `length-in-mm` or `wrench-unexplained` where mass, size or residual are no body's.
 
     gravity  its size [m/s^2]
+    noise    of the raw force from sample to sample [N], zero where the log has no clock
     """
     mass = estimate.mass
     if mass > HEAVIEST:
         return (Finding.of("force-unit", f"The mass comes out at {mass:.4g} kg, more than an arm holds."),)
-    chi2 = estimate.evidence.chi2_per_dof or 0.0
-    if chi2 > CHI2 and estimate.evidence.residual_force_N > MISFIT * mass * gravity:
-        miss, weight = estimate.evidence.residual_force_N, mass * gravity
+    miss, weight = estimate.evidence.residual_force_N, mass * gravity
+    if miss > MISFIT * weight and miss > NO_NOISE * (noise or QUIET):
         text = (
-            f"The force misses by {miss:.2g} N rms where the weight is {weight:.2g} N (chi^2 per degree of freedom "
-            f"{chi2:.0f}): force and torque do not belong to one body."
+            f"The force misses by {miss:.2g} N rms where the weight is {weight:.2g} N: one rigid body does not explain "
+            "this wrench, and the error bars do not hold."
         )
-        return (Finding.of("force-unit", text),)
+        return (Finding.of("wrench-unexplained", text),)
     if not estimate.identified[4:].all():
         return ()
     # The second moment of a ball of the densest metal is the least that a body of this mass can have.

@@ -1,0 +1,47 @@
+"""Force columns of another order or sign: no turn of the sensor explains them, but a reflection of its axes does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import permutations, product
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.sanity.glance import Glance
+from steelyard.sanity.static_fit import beside, solve
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """How the columns of the force would have to be read, and the share of the force variance that is then left."""
+
+    words: str
+    force_share: float
+
+
+def _reflections() -> Array:
+    """Return the 24 matrices (24, 3, 3) that exchange axes and signs, and turn a right hand into a left one."""
+    signed = (np.eye(3)[list(order)] * np.array(signs) for order in permutations(range(3))
+              for signs in product((1.0, -1.0), repeat=3))  # fmt: skip
+    return np.stack([X for X in signed if np.linalg.det(X) < 0])
+
+
+_REFLECTIONS = _reflections()
+
+
+def mirrored(view: Glance, gravity: Array, mass: float) -> Mirror | None:
+    """Return the exchange of axes and signs that explains the force best, None without rotations."""
+    if view.rotation is None:
+        return None
+    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
+    force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
+    down = -pull * (np.sign(mass) or 1.0)
+    # force = X m down: the trace with X is largest for the right one.
+    X = max(_REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
+    _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
+    said = []
+    for row, name in zip(X.T, "xyz", strict=True):  # down_k = sum_i X_ik force_i
+        k = int(np.argmax(np.abs(row)))
+        said.append(f"F{name} = {'-' if row[k] < 0 else ''}F{'xyz'[k]}")
+    return Mirror(", ".join(said), share)

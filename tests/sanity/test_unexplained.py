@@ -1,0 +1,81 @@
+"""Forces that one body does not explain: columns mixed up, weights that a controller takes away, and plain misfits."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import steelyard as sy
+from steelyard.errors import CannotAnswer
+from steelyard.logs.recording import Recording
+from steelyard.pipelines import held_object
+from steelyard.sanity import examine
+from steelyard.simulate import hammer
+
+MASS = 0.62464
+
+
+@pytest.fixture(scope="module")
+def made() -> Recording:
+    return hammer.recording(0).recording
+
+
+def forces(recording: Recording, change: np.ndarray) -> Recording:
+    """Return the recording with the force columns multiplied by `change` (3, 3)."""
+    streams = tuple(
+        replace(s, channels={q: v @ change.T if q == "force" else v for q, v in s.channels.items()})
+        for s in recording.streams
+    )
+    return replace(recording, streams=streams)
+
+
+def compensated(recording: Recording, mass: float) -> Recording:
+    """Return the recording as a controller reports it that takes the weight of `mass` away."""
+    motion = next(s for s in recording.streams if "rotation" in s.channels)
+    out = []
+    for s in recording.streams:
+        if "force" in s.channels and motion.time is not None and s.time is not None:
+            turn = motion.channels["rotation"]
+            down = np.einsum("nji,j->ni", turn, recording.gravity)
+            pull = np.stack([np.interp(s.time, motion.time, column) for column in down.T], 1)
+            force = s.channels["force"] + recording.wrench_sign * mass * pull
+            s = replace(s, channels={**s.channels, "force": force})
+        out.append(s)
+    return replace(recording, streams=tuple(out))
+
+
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [
+        (np.diag([1.0, -1, 1]), "Fx = Fx, Fy = -Fy, Fz = Fz"),
+        (np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]]), "Fx = Fy, Fy = Fx, Fz = Fz"),
+        (np.array([[0.0, 0, 1], [0, 1, 0], [1, 0, 0]]), "Fx = Fz, Fy = Fy, Fz = Fx"),
+    ],
+)
+def test_columns_of_another_order_or_sign_are_told(made: Recording, change: np.ndarray, words: str) -> None:
+    (found,) = (f for f in examine(forces(made, change))[1] if f.code == "force-unit")
+    assert (
+        words in found.message or words.replace("= -", "= ~").replace("= F", "= -F").replace("~", "") in found.message
+    )
+    assert "columns" in found.remedy
+
+
+def test_a_weight_that_a_controller_takes_away_is_told(made: Recording) -> None:
+    for mass in (0.9 * MASS, 1.3 * MASS):
+        _, findings = examine(compensated(made, mass))
+        assert [f.code for f in findings] == ["weight-compensated"], mass
+        assert "0.62" in findings[0].message or "0.63" in findings[0].message
+    assert examine(compensated(made, 0.0))[1] == ()
+
+
+def test_it_is_said_with_the_refusal_too(made: Recording) -> None:
+    with pytest.raises(CannotAnswer, match="Noticed before the fit: The forces fit one body if they are read as"):
+        held_object.identify(forces(made, np.diag([1.0, -1, 1])))
+
+
+def test_a_wrench_that_no_body_explains_is_told(made: Recording) -> None:
+    found = sy.identify(forces(made, np.diag([1.0, 1, 0.2])))
+    assert "wrench-unexplained" in found.codes()
+    assert "wrench-unexplained" not in sy.identify(made).codes()
