@@ -281,3 +281,16 @@ def test_sides_with_unlike_patterns_of_points_are_closed() -> None:
     assert solid.mesh.volume == pytest.approx(made.volume, rel=0.05)
     assert codes(solid) == set()
     assert "surface-open" in codes(enclose(Cloud(seen)))
+
+
+def test_stray_points_are_left_out_and_told() -> None:
+    rng = np.random.default_rng(3)
+    ball = rng.normal(size=(2500, 3))
+    ball *= 0.05 / np.linalg.norm(ball, axis=1)[:, None]
+    stray = rng.uniform(-0.2, 0.2, (60, 3))
+    stray = stray[np.linalg.norm(stray, axis=1) > 0.08]
+    clean, strewn = enclose(Cloud(ball)), enclose(Cloud(np.concatenate([ball, stray])))
+    assert strewn.mesh.volume == pytest.approx(clean.mesh.volume, rel=0.01)
+    (found,) = (f for f in strewn.findings if f.code == "outliers")
+    assert f"{len(stray)} of {2500 + len(stray)} points" in found.message
+    assert "outliers" not in codes(clean)

@@ -20,15 +20,16 @@ _SAME = 1e-7  # of the diagonal: points nearer than this are one
 _FLAT = 1e-4  # of the longest extent: less depth than this is a plane
 _DRAWN = 12  # points drawn for each that is kept
 _APART = 6.0  # spacings between the points of two objects, at least
-_PIECE = 0.02  # of the points: fewer are strays
+_PIECE = 0.02  # of the points: fewer are no object
+_STRAY = 0.1  # of the points: more than this that lie by themselves are no strays
 _LINKS = 12  # neighbours by which pieces hang together
 
 
 def working_cloud(cloud: Cloud, most: int) -> tuple[Cloud, tuple[Finding, ...]]:
     """Return the points to make a solid from, at most about `most`, and what was done to them.
 
-    Millimetres become metres, repeated points one, and of several objects the largest stays. Raises BadValue where
-    fewer than twenty points remain or all lie in a plane.
+    Millimetres become metres, repeated points one, strays go, and of several objects the largest stays. Raises
+    BadValue where fewer than twenty points remain or all lie in a plane.
     """
     findings = []
     cloud, found = _in_metres(cloud)
@@ -80,11 +81,16 @@ def _thinned(cloud: Cloud, most: int) -> tuple[Cloud, list[Finding]]:
 
 
 def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
-    """Return the largest of the pieces that lie far apart."""
+    """Return the largest of the pieces that lie far apart, without strays."""
     if len(cloud) < LEAST:
         return cloud, []
     piece, spacing = _pieces(cloud.near)
     sizes = np.bincount(piece)
+    stray = (sizes < LEAST)[piece]
+    if 0 < stray.sum() < _STRAY * len(cloud):
+        text = f"{stray.sum()} of {len(cloud)} points lie far from all others; they were left out."
+        rest, found = _one_object(cloud.chosen(~stray))
+        return rest, [Finding("outliers", text, "Nothing to do if the scan has stray points."), *found]
     large = np.flatnonzero(sizes >= max(_PIECE * len(cloud), LEAST))
     if len(sizes) == 1 or not len(large):
         return cloud, []
