@@ -54,7 +54,7 @@ def test_a_moving_base_among_standing_ones_errs_as_bars_say(moving: str) -> None
     assert 0.25 < np.sqrt(np.mean(bodies**2)) < 1.3
 
 
-@pytest.mark.parametrize(("rate", "hz", "off"), [(100.0, 1.0, 1e-5), (100.0, 2.0, 3e-4), (20.0, 1.0, 3e-4)])
+@pytest.mark.parametrize(("rate", "hz", "off"), [(100.0, 1.0, 1e-6), (100.0, 3.0, 1e-3), (20.0, 1.0, 1e-3)])
 def test_twists_from_poses_have_the_size_of_measured_ones(rate: float, hz: float, off: float) -> None:
     time = np.arange(0, 6, 1 / rate)
     phase = 2 * np.pi * hz * time
@@ -71,4 +71,4 @@ def test_rows_near_a_gap_have_no_twist() -> None:
     seen = np.ones(100, np.bool_)
     seen[50] = False
     _, good = derived(Pose(Rotation.identity(100), np.zeros((100, 3))), seen, 100.0)
-    assert np.flatnonzero(~good).tolist() == [*range(11), *range(39, 62), *range(89, 100)]
+    assert np.flatnonzero(~good).tolist() == [*range(17), *range(33, 68), *range(83, 100)]

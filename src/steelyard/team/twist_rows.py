@@ -19,7 +19,7 @@ from steelyard.team.turns import turns_between
 
 # [s] of poses that make a twist, and the degree of the polynomial through them. As loud as a difference over 0.1 s, but
 # that takes 1.6 % of a twist at 1 Hz: beside robots that measure their twists, it moved grasps by eight of their bars.
-SPAN, DEGREE = 0.22, 5
+SPAN, DEGREE = 0.34, 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -79,7 +79,7 @@ def derived(path: Pose, seen: Mask, rate: float) -> tuple[Array, Mask]:
     """Return body twists (T, 6) from poses (T,) at rows whose neighbours within half of SPAN are all seen.
 
     Differences over 1, 2, ... steps either side are fitted with the odd powers of a polynomial of degree DEGREE, whose
-    slope is the twist: what is slow beside the span keeps its size (1e-4 off at 2 Hz), as it has in measured twists.
+    slope is the twist: what is slow beside the span keeps its size (3e-4 off at 4 Hz), as it has in measured twists.
     """
     half = max((DEGREE + 1) // 2, round(SPAN * rate / 2))
     out, good = np.zeros((len(seen), 6)), np.zeros(len(seen), np.bool_)
