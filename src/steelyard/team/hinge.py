@@ -16,13 +16,15 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.conditioning import lowpass
-from steelyard.logs.log import Integers
+from steelyard.logs.log import Integers, Mask
+from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint, exp
 from steelyard.team.stacked import Stretch
-from steelyard.team.twist_rows import differenced
 
 # [Hz] above which twists from poses are mostly noise.
 CUTOFF_HZ = 2.0
+# [s] between the poses whose difference makes a twist: shorter is louder, longer smooths the motion, of all alike.
+SPAN = 0.1
 # Two grasps are on one body where less than this share of the twist's power is left, each part in its own size.
 RIGID = 0.05
 # One screw explains at least this share of what the second body does beyond the first.
@@ -55,6 +57,18 @@ def moving_twists(parts: Sequence[Stretch]) -> tuple[Array, Array, float]:
     smooth = lowpass(twist, min(CUTOFF_HZ, 0.4 * part.rate), part.rate)
     taken = ((twist - smooth)[good - good[0]] ** 2).mean(0).reshape(-1, 2, 3).mean(2)
     return smooth.reshape(len(rows), -1, 6), taken, part.rate
+
+
+def differenced(path: Pose, seen: Mask, rate: float) -> tuple[Array, Mask]:
+    """Return body twists (T, 6) from poses (T,) at rows that have both neighbours."""
+    half = max(1, round(SPAN * rate / 2))
+    out, good = np.zeros((len(seen), 6)), np.zeros(len(seen), np.bool_)
+    if len(seen) > 2 * half:
+        before, after, here = path[: -2 * half], path[2 * half :], path[half:-half].rotation.inverse()
+        out[half:-half, :3] = (before.rotation.inverse() @ after.rotation).log() * (rate / (2 * half))
+        out[half:-half, 3:] = here.apply(after.position - before.position) * (rate / (2 * half))
+        good[half:-half] = seen[: -2 * half] & seen[2 * half :] & seen[half:-half]
+    return out, good
 
 
 def longest_run(rows: Integers, bridged: int) -> Integers:

@@ -15,9 +15,11 @@ from steelyard.logs.team_rows import channel_at
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose
 from steelyard.team.stacked import Stretch, bridged, rotation_at, stretches
+from steelyard.team.turns import turns_between
 
-# [s] between the poses whose difference makes a twist: shorter is louder, longer smooths the motion.
-SPAN = 0.1
+# [s] of poses that make a twist, and the degree of the polynomial through them. As loud as a difference over 0.1 s, but
+# that takes 1.6 % of a twist at 1 Hz: beside robots that measure their twists, it moved grasps by eight of their bars.
+SPAN, DEGREE = 0.34, 9
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,7 @@ def _read(made: TwistStretch, i: int, track: Track, gravity: Array | None, movin
             made.twist[:, i, 3 * k : 3 * k + 3], good = channel_at(track, name, time)
             made.seen[:, i] = good if k == 0 else made.seen[:, i] & good
     elif not moving and track.has("rotation", "position"):
-        made.twist[:, i], made.seen[:, i] = differenced(made.rows.poses[:, i], made.rows.seen[:, i], made.rows.rate)
+        made.twist[:, i], made.seen[:, i] = derived(made.rows.poses[:, i], made.rows.seen[:, i], made.rows.rate)
     made.seen[:, i] = bridged(made.seen[:, i])
     if track.has("gravity"):
         made.down[:, i], good = channel_at(track, "gravity", time)
@@ -73,13 +75,23 @@ def _read(made: TwistStretch, i: int, track: Track, gravity: Array | None, movin
         made.down[:, i], made.level[:, i] = turn.inverse().apply(gravity), bridged(good)
 
 
-def differenced(path: Pose, seen: Mask, rate: float) -> tuple[Array, Mask]:
-    """Return body twists (T, 6) from poses (T,) at rows that have both neighbours."""
-    half = max(1, round(SPAN * rate / 2))
+def derived(path: Pose, seen: Mask, rate: float) -> tuple[Array, Mask]:
+    """Return body twists (T, 6) from poses (T,) at rows whose neighbours within half of SPAN are all seen.
+
+    Differences over 1, 2, ... steps either side are fitted with the odd powers of a polynomial of degree DEGREE, whose
+    slope is the twist: what is slow beside the span keeps its size (3e-4 off at 4 Hz), as it has in measured twists.
+    """
+    half = max((DEGREE + 1) // 2, round(SPAN * rate / 2))
     out, good = np.zeros((len(seen), 6)), np.zeros(len(seen), np.bool_)
-    if len(seen) > 2 * half:
-        before, after, here = path[: -2 * half], path[2 * half :], path[half:-half].rotation.inverse()
-        out[half:-half, :3] = (before.rotation.inverse() @ after.rotation).log() * (rate / (2 * half))
-        out[half:-half, 3:] = here.apply(after.position - before.position) * (rate / (2 * half))
-        good[half:-half] = seen[: -2 * half] & seen[2 * half :] & seen[half:-half]
+    if len(seen) <= 2 * half:
+        return out, good
+    middle = slice(half, len(seen) - half)
+    good[middle] = np.lib.stride_tricks.sliding_window_view(seen, 2 * half + 1).all(1)
+    steps = np.arange(1, half + 1)
+    slope = np.linalg.pinv((steps / half)[:, None] ** np.arange(1, DEGREE + 1, 2))[0] * (rate / (2 * half))
+    here = path[middle].rotation.inverse()
+    for k, share in zip(steps, slope, strict=True):
+        before, after = path[half - k : len(seen) - half - k], path[half + k : len(seen) - half + k]
+        out[middle, :3] += share * turns_between(before.rotation, after.rotation)
+        out[middle, 3:] += share * here.apply(after.position - before.position)
     return out, good
