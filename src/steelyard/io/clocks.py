@@ -12,6 +12,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.channels import require_finite
+from steelyard.io.units import TIME
 
 # [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
 _CLOSEST, _FURTHEST = 1e-7, 3600.0
@@ -21,11 +22,26 @@ _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them 
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """Stamps as the file holds them (N,), int64 or float64; `per_second` of them make a second."""
+    """Stamps as the file holds them (N,), int64 or float64; `per_second` of them make a second.
+
+    `missing` (N,) marks rows without a stamp, which hold that of a neighbour and are NaN as seconds; None has none.
+    """
 
     stamps: np.ndarray[Any, np.dtype[Any]]
     per_second: int
     where: str
+    missing: np.ndarray[Any, np.dtype[np.bool_]] | None = None
+
+    @classmethod
+    def of(cls, column: np.ndarray[Any, np.dtype[Any]], unit: str, where: str, gaps: bool = False) -> Clock:
+        """Return the clock of a time column in `unit`; with `gaps` stamps may be missing, but not all of them."""
+        missing = ~np.isfinite(column)
+        if not gaps or not missing.any() or missing.all():
+            return cls(column, TIME[unit], where)
+        known = np.where(missing, 0, np.arange(len(column)))
+        latest = np.maximum.accumulate(known)
+        latest[: np.argmin(missing)] = np.argmin(missing)
+        return cls(column[latest], TIME[unit], where, missing)
 
     def __post_init__(self) -> None:
         if self.stamps.dtype.kind != "i":
@@ -50,7 +66,8 @@ class Clock:
 
     def seconds_after(self, origin: int) -> Array:
         """Return (N,) [s] after `origin` [s]; integers are subtracted as integers."""
-        return check.frozen((self.stamps - origin * self.per_second) / self.per_second)
+        seconds = (self.stamps - origin * self.per_second) / self.per_second
+        return check.frozen(seconds if self.missing is None else np.where(self.missing, np.nan, seconds))
 
     @property
     def first_second(self) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
-from steelyard.io.channels import channel
+from steelyard.io.channels import channel_with_gaps
 from steelyard.io.description import EXAMPLE, Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
@@ -186,7 +186,7 @@ def _vector_spec(
 
 def _unit_by_size(quantity: str, values: Array) -> str | None:
     """Return SI; an accelerometer shows whether it counts in g, and gravity that it is gravity."""
-    size = float(np.median(np.linalg.norm(values, axis=-1))) if len(values) else 0.0
+    size = _size(values) if len(values) else 0.0
     if quantity == "specific_force" and _ONE_G[0] < size < _ONE_G[1]:
         return "g"
     low, high = {"specific_force": _SPECIFIC_FORCE, "gravity": _GRAVITY}.get(quantity, (-1.0, np.inf))
@@ -200,6 +200,7 @@ def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
         if said in TIME:
             return said
     stamps = cells[number].astype(np.float64)
+    stamps = stamps[np.isfinite(stamps)]
     for unit, per_second in TIME.items():
         if len(stamps) and _EPOCH[0] < stamps[0] / per_second < _EPOCH[1]:
             return unit
@@ -209,19 +210,26 @@ def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
     return "s"
 
 
+def _size(values: Array) -> float:
+    """Return the median length of the rows of (N, 3) that hold numbers; NaN where none does."""
+    sizes = np.linalg.norm(values[np.isfinite(values).all(-1)], axis=-1)
+    return float(np.median(sizes)) if len(sizes) else float("nan")
+
+
 def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> Array:
     """Return gravity in W, z up, as long as the file's own gravity; standard where it has none."""
     for spec in specs:
         if spec.name == "gravity":
             values = np.stack([cells[int(n)] for n in spec.columns], -1)
-            return np.array([0.0, 0.0, -float(np.median(np.linalg.norm(values, axis=-1)))])
+            return np.array([0.0, 0.0, -_size(values)])
     return default_gravity()
 
 
 def _turns_each_row(specs: Sequence[QuantitySpec], cells: Cells, gravity: Array) -> bool:
     """Whether gravity turns by more than 5 degrees from row to row: then each row is a still pose."""
     spec = next(s for s in reversed(specs) if s.name in ("rotation", "gravity", "specific_force"))
-    values = channel(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)
+    values = channel_with_gaps(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)
     down = values[:, 2] if spec.form else values / np.linalg.norm(values, axis=-1, keepdims=True)
     cosine = np.einsum("ni,ni->n", down[1:], down[:-1])
+    cosine = cosine[np.isfinite(cosine)]
     return bool(len(cosine)) and float(np.median(cosine)) < _NEW_POSE
