@@ -125,7 +125,7 @@ TABLES: list[tuple[str, str | bytes, type[BadInput], str]] = [
     ("UTF-16", "t,fx\n1,2\n".encode("utf-16"), BadFile, "DIR/a.csv: the text is in UTF-16. Save it in UTF-8."),
     ("one line", "a" * 70_000, BadFile, "DIR/a.csv: expected a table with one row per line; found no line end in the first 64 kB."),
     ("text in a cell", third("2,1,abc,3,1,1,1,1,0,0,0\n"), BadFile, 'DIR/a.csv: line 4, column "fy" holds "abc", which is not a number. Correct or delete that line.'),
-    ("empty cell", third("2,1,,3,1,1,1,1,0,0,0\n"), BadFile, 'DIR/a.csv: line 4, column "fy" holds nothing. Correct or delete that line.'),
+    ("empty cell", third("2,1,,3,1,1,1,1,0,0,0\n"), BadValue, f"{STREAM}, force: 1 of 4 rows are NaN, infinite or empty: row 3. Delete those rows, or record again."),
     ("decimal comma", CSV.replace(",", ";").replace("0.1", "0,1"), BadFile, 'DIR/a.csv: line 2, column "tx" holds "0,1", which is not a number. Write decimals with a point.'),
     ("short row", third("2,1,2,3\n"), BadFile, "DIR/a.csv: line 4 has 4 cells, the rows before it have 11. Complete or delete that line."),
     ("long row", third("2,1,2,3,1,1,1,1,0,0,0,0\n"), BadFile, "DIR/a.csv: line 4 has 12 cells, the rows before it have 11. Complete or delete that line."),

@@ -199,6 +199,8 @@ def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
     for said in (names.units.get(number, ""), name.rpartition("_")[2]):
         if said in TIME:
             return said
+    if cells[number].dtype.kind == "M":
+        return "s"
     stamps = cells[number].astype(np.float64)
     stamps = stamps[np.isfinite(stamps)]
     for unit, per_second in TIME.items():
