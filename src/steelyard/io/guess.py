@@ -37,6 +37,9 @@ _STEMS: dict[str, tuple[str, ...]] = {
     "angular_acceleration": ("alpha", "angular_acceleration"),
 }
 _QUATERNION = ("q", "quat", "quaternion", "orientation", "rotation")
+# Angles leave open in which order they turn and whether they are degrees. Names -> the form and unit that are usual.
+_ANGLES = {("roll", "pitch", "yaw"): ("rpy", "deg"), ("rx", "ry", "rz"): ("rotation-vector", "rad")}
+_ROTATION_LINE = next(line for line in EXAMPLE.splitlines() if line.startswith("rotation"))
 _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
 _TIMES = ("t", "time", "timestamp", "stamp", "secs", "seconds")
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
@@ -76,13 +79,13 @@ def describe(table: Table) -> tuple[Description, Cells]:
     vectors = {quantity: found for quantity in _STEMS if (found := _vector(names, quantity))}
     rotation = _rotation(names)
     stamps = next(_time_columns(names), None)
-    _require(table, [*vectors, *(["rotation"] if rotation else [])])
+    _require(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     exact = [] if stamps is None else [stamps]
     cells = table.read(sorted({*map(int, wanted), *exact}), exact)
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
-    _require(table, [spec.name for spec in specs])
+    _require(table, names, [spec.name for spec in specs])
     time = None if stamps is None else TimeSpec(stamps, _time_unit(table, names, stamps, cells), 0.0, "time")
     gravity = _gravity(specs, cells)
     poses = time is None and _turns_each_row(specs, cells, gravity)
@@ -152,15 +155,32 @@ def _time_columns(names: _Names) -> Iterator[int]:
                 yield names.plain[name + suffix]
 
 
-def _require(table: Table, found: Sequence[str]) -> None:
+def _require(table: Table, names: _Names, found: Sequence[str]) -> None:
     missing = [name for name in ("force", "torque") if name not in found]
     if missing:
         raise _cannot_tell(table, f"no {' and no '.join(missing)} was recognised")
     if not {"rotation", "gravity", "specific_force"} & set(found):
+        _require_no_angles(table, names)
         raise _cannot_tell(table, "nothing says where gravity points in the sensor frame")
 
 
-def _cannot_tell(table: Table, reason: str) -> BadDescription:
+def _require_no_angles(table: Table, names: _Names) -> None:
+    """Raise BadDescription with the line to write where the orientation is there, but as angles."""
+    for three, (form, unit) in _ANGLES.items():
+        found = names.all_of(three, len(three[0]) < 3)
+        if found:
+            shown = table.header.names or ()
+            columns = ", ".join(f'"{shown[n]}"' for n in found)
+            line = f'rotation = {{ columns = [{columns}], form = "{form}", unit = "{unit}" }}   # S to W; check both'
+            raise _cannot_tell(
+                table,
+                f"{', '.join(three)} turn the sensor, but only a description can say in which form (rpy or "
+                "rotation-vector) and unit (deg or rad)",
+                EXAMPLE.replace(_ROTATION_LINE, line),
+            )
+
+
+def _cannot_tell(table: Table, reason: str, example: str = EXAMPLE) -> BadDescription:
     shown = (
         f"Columns here: {listed(table.header.shown())}."
         if table.header.names
@@ -168,7 +188,7 @@ def _cannot_tell(table: Table, reason: str) -> BadDescription:
     )
     return BadDescription(
         f"{table.path}: cannot tell what the columns are: {reason}. {shown} "
-        f"Write a description that says it, for example:\n{EXAMPLE}"
+        f"Write a description that says it, for example:\n{example}"
     )
 
 
