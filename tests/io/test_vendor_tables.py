@@ -276,3 +276,52 @@ def test_a_head_that_ends_within_a_character(tmp_path: Path) -> None:
     for blanks in range(2):
         comment = "# " + " " * blanks + "ä" * 40_000
         same(only(read(tmp_path, "\n".join([*head, comment]), time="Größe")))
+
+
+# --- common arms --------------------
+
+
+def about(axis: int, angle: float) -> np.ndarray:
+    c, s = np.cos(angle), np.sin(angle)
+    i, j = [(1, 2), (2, 0), (0, 1)][axis]
+    out = np.eye(3)
+    out[i, i], out[j, j], out[i, j], out[j, i] = c, c, -s, s
+    return out
+
+
+DOCUMENTED = (Path(__file__).parents[2] / "docs" / "formats.md").read_text()
+
+
+@pytest.mark.parametrize("arm", ["UR", "KUKA", "UFACTORY", "Franka", "Kinova"])
+def test_the_documentation_names_the_columns_of_common_arms(tmp_path: Path, arm: str) -> None:
+    row = next(line for line in DOCUMENTED.splitlines() if line.startswith(f"| {arm}"))
+    position, rotation = (cell.strip(" `") for cell in row.split("|")[2:4])
+    a, b, c = np.radians([20.0, -35.0, 130.0])
+    turn, place = about(2, a) @ about(1, b) @ about(0, c), np.array([0.3, -0.2, 0.5])
+    angle = np.arccos((np.trace(turn) - 1) / 2)
+    axis = np.array([turn[2, 1] - turn[1, 2], turn[0, 2] - turn[2, 0], turn[1, 0] - turn[0, 1]]) / (2 * np.sin(angle))
+    pose = np.eye(4)
+    pose[:3, :3], pose[:3, 3] = turn, place
+    six = {
+        "UR": [*place, *angle * axis],
+        "KUKA": [*1000 * place, 20, -35, 130],
+        "UFACTORY": [*1000 * place, 130, -35, 20],
+        "Franka": [*pose.T.ravel()],
+        "Kinova": [*place, 130, -35, 20],
+    }[arm]
+    names = {
+        "UR": "x y z rx ry rz",
+        "KUKA": "X Y Z A B C",
+        "UFACTORY": "x y z roll pitch yaw",
+        "Franka": " ".join(f"T{k}" for k in range(16)),
+        "Kinova": "tool_pose_x tool_pose_y tool_pose_z tool_pose_theta_x tool_pose_theta_y tool_pose_theta_z",
+    }[arm]
+    header = f"{names} fx fy fz tx ty tz".replace(" ", ",")
+    (tmp_path / "a.csv").write_text("\n".join([header, *[",".join(f"{v:.15g}" for v in [*six, 1, 2, 3, 4, 5, 6])] * 3]))
+    (tmp_path / "log.toml").write_text(
+        f'[[stream]]\npath = "a.csv"\nkind = "poses"\nposition = {{ {position} }}\nrotation = {{ {rotation} }}\n'
+        'force = { columns = ["fx", "fy", "fz"] }\ntorque = { columns = ["tx", "ty", "tz"] }\n'
+    )
+    stream = only(read_recording(tmp_path / "log.toml"))
+    np.testing.assert_allclose(stream.channels["rotation"][0], turn, atol=1e-12)
+    np.testing.assert_allclose(stream.channels["position"][0], place, atol=1e-12)
