@@ -189,3 +189,32 @@ def test_pendant_lines_that_are_wrong(line: str, text: str) -> None:
     with pytest.raises(BadValue) as caught:
         read_pendant([line])
     assert str(caught.value) == text
+
+
+@pytest.mark.parametrize(
+    ("names", "form"),
+    [
+        (["roll", "pitch", "yaw"], 'form = "rpy", unit = "deg"'),
+        (["Roll [deg]", "Pitch [deg]", "Yaw [deg]"], 'form = "rpy", unit = "deg"'),
+        (["pose.roll", "pose.pitch", "pose.yaw"], 'form = "rpy", unit = "deg"'),
+        (["rx", "ry", "rz"], 'form = "rotation-vector", unit = "rad"'),
+        (["Rx", "Ry", "Rz"], 'form = "rotation-vector", unit = "rad"'),
+    ],
+)
+def test_angles_need_a_description_whose_line_is_shown(tmp_path: Path, names: list[str], form: str) -> None:
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, ["t", "fx", "fy", "fz", "tx", "ty", "tz", *names], [0, *W, 0, 0, 0], [0.01, *W, 0, 0, 0])
+    text = str(caught.value)
+    assert "turn the sensor, but only a description can say in which form (rpy or rotation-vector) and unit" in text
+    columns = ", ".join(f'"{name}"' for name in names)
+    line = f"rotation = {{ columns = [{columns}], {form} }}"
+    assert line in text
+    assert "quaternion" not in text
+    (tmp_path / "log.toml").write_text(text[text.index("[log]") :])
+    assert read_recording(tmp_path / "log.toml").streams[0].channels["rotation"].shape == (2, 3, 3)
+
+
+def test_a_rotation_that_is_read_is_not_asked_for_in_angles(tmp_path: Path) -> None:
+    names = ["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"]
+    stream = bare(tmp_path, names, [*W, *Q, 1, 2, 3])
+    assert "rotation" in stream.channels

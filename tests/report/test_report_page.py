@@ -212,6 +212,12 @@ def test_inertia_that_is_not_fixed_is_not_shown(full: Report, estimate: Estimate
     assert "Inertia ellipsoid" not in words
 
 
+def test_the_sensor_frame_keeps_its_name(full: Report) -> None:
+    words = Page(render(full)).words
+    assert "In the sensor frame S; inertia about the centre of mass." in words
+    assert "sensor frame s;" not in words
+
+
 def test_without_a_pose_only_the_shape_is_drawn(full: Report) -> None:
     assert full.scene is not None
     page = Page(render(replace(full, scene=replace(full.scene, X_SO=None))))

@@ -53,10 +53,15 @@ def require_finite(values: Array, where: str) -> None:
     good = np.isfinite(values)
     rows = np.flatnonzero(~(good if good.ndim == 1 else good.all(-1)))
     if len(rows):
-        raise BadValue(
-            f"{where}: {len(rows)} of {len(values)} rows are NaN or infinite: {rows_text(rows)}. "
-            "Delete those rows, or record again."
-        )
+        raise BadValue(unfit_text(rows, len(values), where))
+
+
+def unfit_text(rows: np.ndarray[Any, np.dtype[np.int64]], count: int, where: str) -> str:
+    """Return the error for `rows`, of `count`, that hold no number."""
+    return (
+        f"{where}: {len(rows)} of {count} rows are NaN, infinite or empty: {rows_text(rows)}. "
+        "Delete those rows, or record again."
+    )
 
 
 def _require_likely(values: Array, where: str) -> None:

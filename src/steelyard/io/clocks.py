@@ -11,21 +11,46 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.io.channels import require_finite
+from steelyard.io.channels import require_finite, unfit_text
+from steelyard.io.units import TIME
 
 # [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
 _CLOSEST, _FURTHEST = 1e-7, 3600.0
 _FEW_STEPS = 10
+# Excel counts days since 1900: these are 2000 to 2100. No log has 50 000 rows a second in just these seconds.
+_DAYS, _FASTEST = (36526.0, 73051.0), 2e-5
 _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them to a nanosecond
 
 
 @dataclass(frozen=True, eq=False)
 class Clock:
-    """Stamps as the file holds them (N,), int64 or float64; `per_second` of them make a second."""
+    """Stamps as the file holds them (N,), int64 or float64; `per_second` of them make a second.
+
+    `missing` (N,) marks rows without a stamp, which hold that of a neighbour and are NaN as seconds; None has none.
+    """
 
     stamps: np.ndarray[Any, np.dtype[Any]]
     per_second: int
     where: str
+    missing: np.ndarray[Any, np.dtype[np.bool_]] | None = None
+
+    @classmethod
+    def of(cls, column: np.ndarray[Any, np.dtype[Any]], unit: str, where: str, gaps: bool = False) -> Clock:
+        """Return the clock of a time column in `unit`; with `gaps` stamps may be missing, but not all of them.
+
+        Stamps with a date, datetime64[ns], need no unit.
+        """
+        missing = ~np.isfinite(column)
+        if missing.any() and (missing.all() or not gaps):
+            raise BadValue(unfit_text(np.flatnonzero(missing), len(column), where))
+        dated = column.dtype.kind == "M"
+        column, per_second = (column.astype(np.int64), TIME["ns"]) if dated else (column, TIME[unit])
+        if not missing.any():
+            return cls(column, per_second, where)
+        known = np.where(missing, 0, np.arange(len(column)))
+        latest = np.maximum.accumulate(known)
+        latest[: np.argmin(missing)] = np.argmin(missing)
+        return cls(column[latest], per_second, where, missing)
 
     def __post_init__(self) -> None:
         if self.stamps.dtype.kind != "i":
@@ -46,11 +71,23 @@ class Clock:
                 "Name the column of the clock, or give time = { rate = .. }."
             )
         if len(steps) > _FEW_STEPS:
+            self._refuse_days()
             require_likely_step(float(np.median(steps)) / self.per_second or _CLOSEST, self.where)
+
+    def _refuse_days(self) -> None:
+        """Raise BadValue where the stamps are Excel's dates: days, whose fractions would pass for seconds."""
+        first, last = float(self.stamps[0]), float(self.stamps[-1])
+        step = (last - first) / (len(self.stamps) - 1)
+        if self.per_second == 1 and _DAYS[0] <= first and last < _DAYS[1] and step < _FASTEST:
+            raise BadValue(
+                f"{self.where}: these look like Excel's dates, counted in days: {first:.10g} to {last:.10g}. Add a "
+                "column of seconds, = (A2 - A$2) * 86400 formatted as a number with all its digits, and name that one."
+            )
 
     def seconds_after(self, origin: int) -> Array:
         """Return (N,) [s] after `origin` [s]; integers are subtracted as integers."""
-        return check.frozen((self.stamps - origin * self.per_second) / self.per_second)
+        seconds = (self.stamps - origin * self.per_second) / self.per_second
+        return check.frozen(seconds if self.missing is None else np.where(self.missing, np.nan, seconds))
 
     @property
     def first_second(self) -> int:

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
-from steelyard.io.channels import channel
+from steelyard.io.channels import channel_with_gaps
 from steelyard.io.description import EXAMPLE, Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
@@ -37,6 +37,9 @@ _STEMS: dict[str, tuple[str, ...]] = {
     "angular_acceleration": ("alpha", "angular_acceleration"),
 }
 _QUATERNION = ("q", "quat", "quaternion", "orientation", "rotation")
+# Angles leave open in which order they turn and whether they are degrees. Names -> the form and unit that are usual.
+_ANGLES = {("roll", "pitch", "yaw"): ("rpy", "deg"), ("rx", "ry", "rz"): ("rotation-vector", "rad")}
+_ROTATION_LINE = next(line for line in EXAMPLE.splitlines() if line.startswith("rotation"))
 _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
 _TIMES = ("t", "time", "timestamp", "stamp", "secs", "seconds")
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
@@ -76,13 +79,13 @@ def describe(table: Table) -> tuple[Description, Cells]:
     vectors = {quantity: found for quantity in _STEMS if (found := _vector(names, quantity))}
     rotation = _rotation(names)
     stamps = next(_time_columns(names), None)
-    _require(table, [*vectors, *(["rotation"] if rotation else [])])
+    _require(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     exact = [] if stamps is None else [stamps]
     cells = table.read(sorted({*map(int, wanted), *exact}), exact)
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
-    _require(table, [spec.name for spec in specs])
+    _require(table, names, [spec.name for spec in specs])
     time = None if stamps is None else TimeSpec(stamps, _time_unit(table, names, stamps, cells), 0.0, "time")
     gravity = _gravity(specs, cells)
     poses = time is None and _turns_each_row(specs, cells, gravity)
@@ -152,15 +155,32 @@ def _time_columns(names: _Names) -> Iterator[int]:
                 yield names.plain[name + suffix]
 
 
-def _require(table: Table, found: Sequence[str]) -> None:
+def _require(table: Table, names: _Names, found: Sequence[str]) -> None:
     missing = [name for name in ("force", "torque") if name not in found]
     if missing:
         raise _cannot_tell(table, f"no {' and no '.join(missing)} was recognised")
     if not {"rotation", "gravity", "specific_force"} & set(found):
+        _require_no_angles(table, names)
         raise _cannot_tell(table, "nothing says where gravity points in the sensor frame")
 
 
-def _cannot_tell(table: Table, reason: str) -> BadDescription:
+def _require_no_angles(table: Table, names: _Names) -> None:
+    """Raise BadDescription with the line to write where the orientation is there, but as angles."""
+    for three, (form, unit) in _ANGLES.items():
+        found = names.all_of(three, len(three[0]) < 3)
+        if found:
+            shown = table.header.names or ()
+            columns = ", ".join(f'"{shown[n]}"' for n in found)
+            line = f'rotation = {{ columns = [{columns}], form = "{form}", unit = "{unit}" }}   # S to W; check both'
+            raise _cannot_tell(
+                table,
+                f"{', '.join(three)} turn the sensor, but only a description can say in which form (rpy or "
+                "rotation-vector) and unit (deg or rad)",
+                EXAMPLE.replace(_ROTATION_LINE, line),
+            )
+
+
+def _cannot_tell(table: Table, reason: str, example: str = EXAMPLE) -> BadDescription:
     shown = (
         f"Columns here: {listed(table.header.shown())}."
         if table.header.names
@@ -168,7 +188,7 @@ def _cannot_tell(table: Table, reason: str) -> BadDescription:
     )
     return BadDescription(
         f"{table.path}: cannot tell what the columns are: {reason}. {shown} "
-        f"Write a description that says it, for example:\n{EXAMPLE}"
+        f"Write a description that says it, for example:\n{example}"
     )
 
 
@@ -186,7 +206,7 @@ def _vector_spec(
 
 def _unit_by_size(quantity: str, values: Array) -> str | None:
     """Return SI; an accelerometer shows whether it counts in g, and gravity that it is gravity."""
-    size = float(np.median(np.linalg.norm(values, axis=-1))) if len(values) else 0.0
+    size = _size(values) if len(values) else 0.0
     if quantity == "specific_force" and _ONE_G[0] < size < _ONE_G[1]:
         return "g"
     low, high = {"specific_force": _SPECIFIC_FORCE, "gravity": _GRAVITY}.get(quantity, (-1.0, np.inf))
@@ -199,7 +219,10 @@ def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
     for said in (names.units.get(number, ""), name.rpartition("_")[2]):
         if said in TIME:
             return said
+    if cells[number].dtype.kind == "M":
+        return "s"
     stamps = cells[number].astype(np.float64)
+    stamps = stamps[np.isfinite(stamps)]
     for unit, per_second in TIME.items():
         if len(stamps) and _EPOCH[0] < stamps[0] / per_second < _EPOCH[1]:
             return unit
@@ -209,19 +232,26 @@ def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
     return "s"
 
 
+def _size(values: Array) -> float:
+    """Return the median length of the rows of (N, 3) that hold numbers; NaN where none does."""
+    sizes = np.linalg.norm(values[np.isfinite(values).all(-1)], axis=-1)
+    return float(np.median(sizes)) if len(sizes) else float("nan")
+
+
 def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> Array:
     """Return gravity in W, z up, as long as the file's own gravity; standard where it has none."""
     for spec in specs:
         if spec.name == "gravity":
             values = np.stack([cells[int(n)] for n in spec.columns], -1)
-            return np.array([0.0, 0.0, -float(np.median(np.linalg.norm(values, axis=-1)))])
+            return np.array([0.0, 0.0, -_size(values)])
     return default_gravity()
 
 
 def _turns_each_row(specs: Sequence[QuantitySpec], cells: Cells, gravity: Array) -> bool:
     """Whether gravity turns by more than 5 degrees from row to row: then each row is a still pose."""
     spec = next(s for s in reversed(specs) if s.name in ("rotation", "gravity", "specific_force"))
-    values = channel(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)
+    values = channel_with_gaps(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)
     down = values[:, 2] if spec.form else values / np.linalg.norm(values, axis=-1, keepdims=True)
     cosine = np.einsum("ni,ni->n", down[1:], down[:-1])
+    cosine = cosine[np.isfinite(cosine)]
     return bool(len(cosine)) and float(np.median(cosine)) < _NEW_POSE

@@ -9,6 +9,7 @@ from steelyard import check
 from steelyard.errors import BadFile
 from steelyard.io import guess
 from steelyard.io.description import Description, read_description
+from steelyard.io.missing_rows import without_missing
 from steelyard.io.requirements import require_answerable, require_matched_rows
 from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
 from steelyard.io.tables import Table, find_file, open_table
@@ -51,8 +52,8 @@ def _recording(
 ) -> Recording:
     specs = description.streams
     require_answerable(specs, path.name)
-    channels = [channels_of(*each, description.gravity) for each in zip(specs, tables, cells, strict=True)]
-    times = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels])
+    channels = [channels_of(*each, description.gravity, True) for each in zip(specs, tables, cells, strict=True)]
+    times = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels], gaps=True)
     names = stream_names(specs)
     streams = tuple(
         Stream(
@@ -67,6 +68,7 @@ def _recording(
         for name, spec, values, time in zip(names, specs, channels, times, strict=True)
     )
     require_matched_rows(streams, path.name)
+    streams, findings = without_missing(specs, streams)
     tool = None if description.tool is None else str(find_file(description.tool, path.parent, data))
     placed = description.placed
     return Recording(
@@ -78,4 +80,5 @@ def _recording(
         object_pose=None if placed is None else placed.pose,
         object_pose_std=None if placed is None else placed.std,
         name=path.stem,
+        findings=findings,
     )

@@ -17,11 +17,14 @@ from steelyard.logs.recording import Recording, Stream
 
 PENDANT_COLUMNS = "roll pitch yaw (deg, S to W), fx fy fz (N), tx ty tz (N*m)"
 
+_WITH_COMMA = re.compile(r"[+-]?(\d+|\d*,\d+)([eE][+-]?\d+)?")
+
 
 def read_pendant(lines: Iterable[str], gravity: Array | None = None, on_sensor: bool = True) -> Recording:
     """Return still poses typed one per line: roll pitch yaw [deg] of S in W, fx fy fz [N], tx ty tz [N m].
 
-    lines      nine numbers each, between blanks, commas or semicolons; empty lines and # comments are skipped
+    lines      nine numbers each, between blanks, commas or semicolons, decimals with a comma where none stands between;
+               empty lines and # comments are skipped
     gravity    (3,) [m/s^2] in W; standard gravity, z up, where left out
     on_sensor  whether the readings are the reaction on the sensor (most are) or what the robot applies
 
@@ -41,8 +44,16 @@ def read_pendant(lines: Iterable[str], gravity: Array | None = None, on_sensor: 
     return Recording((stream,), down, -1 if on_sensor else 1, name="pendant")
 
 
+def _words(line: str) -> list[str]:
+    """Return the numbers as written; nine between blanks or semicolons may have decimal commas."""
+    words = re.split(r"[\s;]+", line.strip(" \t\r\n;"))
+    if len(words) == 9 and "." not in line and all(map(_WITH_COMMA.fullmatch, words)):
+        return [word.replace(",", ".") for word in words]
+    return re.split(r"[\s,;]+", line.strip(" \t\r\n,;"))
+
+
 def _row(line: str, number: int) -> list[float] | None:
-    words = re.split(r"[\s,;]+", line.split("#")[0].strip(" \t\r\n,;"))
+    words = _words(line.split("#")[0])
     if words == [""]:
         return None
     try:

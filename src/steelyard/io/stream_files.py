@@ -15,7 +15,6 @@ from steelyard.io.channels import channel, channel_with_gaps, require_one_length
 from steelyard.io.clocks import Clock, common_origin, require_likely_step, steady
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
 from steelyard.io.tables import Table, choose_columns, find_file, open_table
-from steelyard.io.units import TIME
 
 Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
@@ -84,17 +83,24 @@ def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, ga
 
 
 def seconds_of(
-    specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Cells], rows: Sequence[int]
+    specs: Sequence[StreamSpec],
+    tables: Sequence[Table],
+    cells: Sequence[Cells],
+    rows: Sequence[int],
+    gaps: bool = False,
 ) -> list[Array | None]:
-    """Return seconds after one common origin; a stream with only a rate starts with the earliest clock."""
+    """Return seconds after one common origin; a stream with only a rate starts with the earliest clock.
+
+    With `gaps`, stamps that are missing stay NaN, else they are an error.
+    """
     clocks: dict[int, Clock] = {}
     for i, (spec, table, mine) in enumerate(zip(specs, tables, cells, strict=True)):
         for number in _time_column(spec, table):
             if spec.time is not None:
-                clocks[i] = Clock(mine[number], TIME[spec.time.unit], spec.time.where)
+                clocks[i] = Clock.of(mine[number], spec.time.unit, spec.time.where, gaps)
     origin = common_origin(list(clocks.values()))
     seconds: list[Array | None] = [clocks[i].seconds_after(origin) if i in clocks else None for i in range(len(specs))]
-    start = min((float(s[0]) for s in seconds if s is not None), default=0.0)
+    start = min((float(np.nanmin(s)) for s in seconds if s is not None), default=0.0)
     for i, spec in enumerate(specs):
         if spec.time is not None and spec.time.column is None:
             require_likely_step(1 / spec.time.rate, spec.time.where)

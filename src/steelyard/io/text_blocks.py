@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import codecs
 import gzip
 import re
 import zlib
@@ -36,12 +37,20 @@ def head_lines(path: Path) -> list[str]:
     with _open(path) as stream:
         head = _read(path, stream, _HEAD)
     _require_text(path, head)
-    text = head.removeprefix(_BOM).decode("utf-8", "replace").replace("\r\n", "\n").replace("\r", "\n")
+    text = decoded(head.removeprefix(_BOM)).replace("\r\n", "\n").replace("\r", "\n")
     if len(head) == _HEAD:
         text = text[: text.rfind("\n") + 1]
         if not text:
             raise BadFile(f"{path}: expected a table with one row per line; found no line end in the first 64 kB.")
     return text.split("\n")
+
+
+def decoded(text: bytes) -> str:
+    """Return the start of a text, which may end within a character: UTF-8, or what Windows wrote before it."""
+    try:
+        return codecs.getincrementaldecoder("utf-8")().decode(text)
+    except UnicodeDecodeError:
+        return text.decode("cp1252", "replace")
 
 
 def _require_text(path: Path, block: bytes) -> None:

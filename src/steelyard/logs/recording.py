@@ -9,6 +9,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 from steelyard.check import Array
+from steelyard.findings import Finding
 from steelyard.spatial import Pose, Rotation
 
 STANDARD_GRAVITY = 9.80665
@@ -74,6 +75,7 @@ class Recording:
                   angular_acceleration [rad/s^2]; missing ones are estimated
     tool          path of the result or log of the gripper alone, to be taken away
     object_pose   pose of the scan's frame O in S, with its uncertainty (m, rad)
+    findings      what reading it already showed: rows that missed a number and were left out
     """
 
     streams: tuple[Stream, ...]
@@ -84,3 +86,4 @@ class Recording:
     object_pose: Pose | None = None
     object_pose_std: tuple[float, float] | None = None
     name: str = "log"
+    findings: tuple[Finding, ...] = ()

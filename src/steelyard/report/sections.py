@@ -205,7 +205,8 @@ def numbers(report: Report) -> Html:
             cells.append(tag("td", "" if away is None else f"{fixed(away, 1)} σ", class_="bad" if away and away > 3 else None))  # fmt: skip  # noqa: E501
         lines.append(tag("tr", *cells))
     heads = ("parameter", "found", *(("truth", "away") if true is not None else ()))
-    lead = f"{_place(seen).capitalize()}; inertia about the centre of mass."
+    place = _place(seen)
+    lead = f"{place[:1].upper()}{place[1:]}; inertia about the centre of mass."
     return section("All ten parameters", table(heads, lines), name="numbers", lead=lead)
 
 

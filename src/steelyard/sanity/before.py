@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
@@ -20,10 +22,11 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     doubt, so that the answer is right all the same. Each finding says what was assumed.
     """
     _require_rows(recording)
+    read, recording = recording.findings, replace(recording, findings=())
     recording, rows = examine_rows(recording)
     recording, units = examine_units(recording)
     recording, conventions = examine_conventions(recording)
-    return recording, (*rows, *units, *conventions)
+    return recording, (*read, *rows, *units, *conventions)
 
 
 def _require_rows(recording: Recording) -> None:

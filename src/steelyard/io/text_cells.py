@@ -1,0 +1,142 @@
+"""What a cell of a text table may be, and blocks of such cells made plain for numpy's reader.
+
+A cell is a number, nothing, a stamp as ISO 8601, or, between semicolons or tabs, a number with a decimal comma.
+"""
+
+from __future__ import annotations
+
+import csv
+import re
+import warnings
+from collections.abc import Iterable, Sequence
+from typing import Any
+
+import numpy as np
+
+STAMP_TYPE = "U48"  # longer than any stamp of the form below
+_WORDS = re.compile(r'"[^"]*"|\S+')
+_EXPONENT = r"(?:[eE][+-]?\d+)?"
+_DECIMAL_COMMA = re.compile(rf"[+-]?\d*,\d+{_EXPONENT}")
+_DECIMAL_POINT = re.compile(rf"[+-]?(?:\d+\.\d*|\.\d+){_EXPONENT}")
+_STAMP_FORM = r"\d{4}-\d\d-\d\d[T ]\d\d:\d\d:\d\d(?:[.,]\d{1,9})?(?:Z|[+-]\d\d:?\d\d)?"
+_STAMP = re.compile(_STAMP_FORM)
+_STAMPS = re.compile(rf"(?:(?:{_STAMP_FORM}|nan)\n)*")
+_DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\b.*|\d{1,2}:\d\d\b.*")
+# What a decimal point becomes where commas are the decimals: 1.234,5 or 1.234 may mean thousands, so is no number.
+_NO_POINT = "\x01"  # binary, so in no text
+
+
+def split(line: str, delimiter: str | None) -> tuple[str, ...]:
+    """Return the cells of a line without blanks and quotes around them."""
+    if delimiter is None:
+        return tuple(word.strip('"') for word in _WORDS.findall(line))
+    return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)))
+
+
+def holds_row(line: str) -> bool:
+    """Whether a line is neither blank nor a comment."""
+    line = line.lstrip()
+    return bool(line) and line[0] != "#"
+
+
+def is_number(cell: str) -> bool:
+    """Whether numpy reads the cell as a number."""
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell
+
+
+def is_stamp(cell: str) -> bool:
+    """Whether the cell is a date with a time of day as ISO 8601."""
+    return _STAMP.fullmatch(cell) is not None
+
+
+def is_decimal_comma(cell: str) -> bool:
+    """Whether the cell is a number with a decimal comma."""
+    return _DECIMAL_COMMA.fullmatch(cell) is not None
+
+
+def is_other_date(cell: str) -> bool:
+    """Whether the cell looks like a date or a time of day that is not read."""
+    return _DATE.fullmatch(cell) is not None
+
+
+def are_data(cells: Sequence[str], delimiter: str | None) -> bool:
+    """Whether a line of cells is a row: each that is not empty a number or a stamp."""
+    return any(cells) and all(_is_datum(cell, delimiter) for cell in cells if cell)
+
+
+def are_words(cells: Sequence[str], delimiter: str | None) -> bool:
+    """Whether no cell of a line is a number or a stamp."""
+    return any(cells) and not any(_is_datum(cell, delimiter) for cell in cells if cell)
+
+
+def _is_datum(cell: str, delimiter: str | None) -> bool:
+    return is_number(cell) or is_stamp(cell) or (may_have_commas(delimiter) and is_decimal_comma(cell))
+
+
+def may_have_commas(delimiter: str | None) -> bool:
+    """Whether a comma in a number can only be the decimal one, because something else stands between the cells."""
+    return delimiter in (";", "\t")
+
+
+def has_commas(lines: Iterable[str], delimiter: str | None, columns: Sequence[int]) -> bool:
+    """Whether the cells of `columns` have decimal commas, and none has a decimal point."""
+    if not may_have_commas(delimiter):
+        return False
+    rows = [split(line, delimiter) for line in lines if "," in line or "." in line]
+    cells = [row[n] for row in rows for n in columns if n < len(row)]
+    return any(map(is_decimal_comma, cells)) and not any(map(_DECIMAL_POINT.fullmatch, cells))
+
+
+def with_points(block: str) -> str:
+    """Return a block with decimal commas as decimal points; what was a point is then no number."""
+    return block.replace(".", _NO_POINT).replace(",", ".")
+
+
+def with_commas(cell: str) -> str:
+    """Return a cell of such a block as it was."""
+    return cell.replace(".", ",").replace(_NO_POINT, ".")
+
+
+def filled(block: str, delimiter: str | None) -> str:
+    """Return a block with nan in its empty cells."""
+    if delimiter is None:
+        return block
+    mark = re.escape(delimiter)
+    empty = rf'^ *(?:"")? *(?={mark})|(?<={mark}) *(?:"")? *(?={mark}|$)'
+    return re.sub(empty, "nan", block, flags=re.MULTILINE)
+
+
+def completed(block: str, delimiter: str | None, first: Sequence[str]) -> str:
+    """Return the end of a file with nan where its last line was cut off, as by a logger that was killed.
+
+    Such a line has no line end, and fewer cells than the `first` row or half a number in the last. Of its cells those
+    before the last are whole.
+    """
+    start = block.rfind("\n") + 1
+    line = block[start:]
+    if not holds_row(line) or "#" in line:
+        return block
+    cells = line.split() if delimiter is None else line.split(delimiter)
+    last = cells[-1].strip().strip('"')
+    half = last and not _is_datum(last, delimiter) and _is_datum(first[-1], delimiter)
+    if len(cells) > len(first) or (len(cells) == len(first) and not half):
+        return block
+    mark = " " if delimiter is None else delimiter
+    return block[:start] + mark.join([*cells[:-1], *["nan"] * (len(first) - len(cells) + 1)])
+
+
+def stamps_of(cells: np.ndarray[Any, np.dtype[Any]]) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return stamps (N,) as datetime64[ns] in UTC, NaT where missing; raises ValueError where one is of another form.
+
+    Without a zone they are taken as they stand: only their differences count.
+    """
+    text = "\n".join([*cells.tolist(), ""]).replace(_NO_POINT, ".").replace(",", ".")
+    if not _STAMPS.fullmatch(text):
+        raise ValueError("a stamp of another form")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", UserWarning)  # numpy turns zones into UTC, and says that it keeps none
+        return np.array(text.replace("nan", "NaT").split("\n")[:-1]).astype("M8[ns]")
