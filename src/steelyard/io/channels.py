@@ -40,12 +40,20 @@ def channel_with_gaps(spec: QuantitySpec, columns: Sequence[Array], gravity: Arr
     """Return a quantity like `channel`, with NaN in rows that miss a number; raises BadValue where all do."""
     _require_one_length(spec, columns)
     values = np.stack(columns, -1)
-    good = np.asarray(np.isfinite(values).all(-1))
+    good = known_rows(values)
     if good.all() or not good.any():
         return channel(spec, columns, gravity)
     out = np.array(channel(spec, list(np.where(good[:, None], values, values[good.argmax()]).T), gravity))
     out[~good] = np.nan
     return check.frozen(out)
+
+
+def known_rows(values: Array) -> np.ndarray[Any, np.dtype[np.bool_]]:
+    """Return which rows of (N, ..) hold numbers; a sum that is one shows at once that all do."""
+    with np.errstate(over="ignore", invalid="ignore"):
+        if np.isfinite(values.sum()):
+            return np.ones(len(values), np.bool_)
+    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(1))
 
 
 def require_finite(values: Array, where: str) -> None:

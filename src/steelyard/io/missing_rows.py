@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.check import frozen
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
-from steelyard.io.channels import rows_text, unfit_text
+from steelyard.io.channels import known_rows, rows_text, unfit_text
 from steelyard.io.stream_entries import StreamSpec
 from steelyard.logs.recording import Stream
 
@@ -50,19 +50,15 @@ def without_missing(
 def _whole(stream: Stream) -> Mask:
     """Return which rows (N,) hold a number everywhere."""
     columns = [*stream.channels.values(), *(() if stream.time is None else (stream.time,))]
-    return np.asarray(np.logical_and.reduce([_known(column) for column in columns]))
-
-
-def _known(values: np.ndarray[Any, np.dtype[Any]]) -> Mask:
-    return np.asarray(np.isfinite(values.reshape(len(values), -1)).all(1))
+    return np.asarray(np.logical_and.reduce([known_rows(column) for column in columns]))
 
 
 def _require_most(spec: StreamSpec, stream: Stream, rows: Mask) -> None:
     """Raise BadValue at the first quantity that misses too many rows, then where all of them together do."""
     for quantity in spec.quantities:
-        _refuse_many(_known(stream.channels[quantity.name]), quantity.where)
+        _refuse_many(known_rows(stream.channels[quantity.name]), quantity.where)
     if spec.time is not None and stream.time is not None:
-        _refuse_many(_known(stream.time), spec.time.where)
+        _refuse_many(known_rows(stream.time), spec.time.where)
     _refuse_many(rows, spec.where)
 
 
@@ -74,8 +70,8 @@ def _refuse_many(known: Mask, where: str) -> None:
 def _told(stream: Stream, rows: Mask, others: bool) -> Finding:
     """Return the finding: how many rows, where, and in what."""
     missing = np.flatnonzero(~rows)
-    named = [name for name, values in stream.channels.items() if not _known(values).all()]
-    named += ["time"] if stream.time is not None and not _known(stream.time).all() else []
+    named = [name for name, values in stream.channels.items() if not known_rows(values).all()]
+    named += ["time"] if stream.time is not None and not known_rows(stream.time).all() else []
     with_others = ", with the same rows of the other streams" if others and stream.time is None else ""
     message = (
         f"{len(missing)} of {len(rows)} rows of '{stream.name}' miss a number in {', '.join(named)}: "

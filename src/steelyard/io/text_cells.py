@@ -13,6 +13,8 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.errors import BadValue
+
 STAMP_TYPE = "U48"  # longer than any stamp of the form below
 _WORDS = re.compile(r'"[^"]*"|\S+')
 _EXPONENT = r"(?:[eE][+-]?\d+)?"
@@ -130,13 +132,13 @@ def completed(block: str, delimiter: str | None, first: Sequence[str]) -> str:
 
 
 def stamps_of(cells: np.ndarray[Any, np.dtype[Any]]) -> np.ndarray[Any, np.dtype[Any]]:
-    """Return stamps (N,) as datetime64[ns] in UTC, NaT where missing; raises ValueError where one is of another form.
+    """Return stamps (N,) as datetime64[ns] in UTC, NaT where missing; raises BadValue where one is of another form.
 
     Without a zone they are taken as they stand: only their differences count.
     """
     text = "\n".join([*cells.tolist(), ""]).replace(_NO_POINT, ".").replace(",", ".")
     if not _STAMPS.fullmatch(text):
-        raise ValueError("a stamp of another form")
+        raise BadValue("a stamp is of another form")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # numpy turns zones into UTC, and says that it keeps none
         return np.array(text.replace("nan", "NaT").split("\n")[:-1]).astype("M8[ns]")

@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile
+from steelyard.errors import BadFile, BadValue
 from steelyard.io.table_header import Columns, Header
 from steelyard.io.text_blocks import blocks, decoded, head_lines
 from steelyard.io.text_cells import (
@@ -125,7 +125,7 @@ class TextTable:
                 rows = np.loadtxt(lines, kind, comments, self.delimiter, usecols=how.order, ndmin=1, quotechar=quote)
             return {n: stamps_of(rows[str(n)]) if n in how.stamps else np.ascontiguousarray(rows[str(n)])
                     for n in how.order}  # fmt: skip
-        except (ValueError, OverflowError, DeprecationWarning) as error:
+        except (ValueError, OverflowError, DeprecationWarning, BadValue) as error:
             without_holes = filled(block, self.delimiter)
             if without_holes != block:
                 return self._parse(without_holes, how, line)
