@@ -17,6 +17,8 @@ from steelyard.sanity.static_fit import beside, solve
 
 # The weight is that of less than this share of the mass that is accelerated, beyond so many standard deviations.
 SHARE, SURE = 0.8, 5.0
+# Nobody sets a payload of twice the mass: a weight of minus the mass that is accelerated is a gravity upside down.
+TOO_MUCH = 0.7
 # An accelerated mass above this [kg] is one of wrong units.
 HEAVIEST = 100.0
 # Both masses together explain all but this share of the force variance.
@@ -37,7 +39,7 @@ def compensated(view: Glance, gravity: Array, rotation: Array | None) -> tuple[F
     moved, weighed = float(masses[0]), float(np.sign(masses[0]) * masses[1])
     short = SHARE * abs(moved) - weighed
     sure = abs(moved) > SURE * spread[0] and short > SURE * float(np.hypot(SHARE * spread[0], spread[1]))
-    if not sure or abs(moved) > HEAVIEST or left > EXPLAINED:
+    if not sure or abs(moved) > HEAVIEST or left > EXPLAINED or weighed < -TOO_MUCH * abs(moved):
         return ()
     message = (
         f"The force follows the acceleration as that of {abs(moved):.3g} ± {spread[0]:.2g} kg, but the direction of "
