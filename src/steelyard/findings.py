@@ -16,6 +16,8 @@ REMEDIES: dict[str, str] = {
     "force-unit": "Check the force and torque units of the wrench stream.",
     "length-in-mm": 'Set the unit that the numbers have: "mm" (or "m") for positions, "N*mm" (or "N*m") for torques.',
     "quaternion-order": "Swap form between quaternion-wxyz and quaternion-xyzw.",
+    "sensor-turned": "Set mount = { rotation = [..], form = 'rotation-vector' } of the wrench, or correct the poses.",
+    "gains-differ": "Calibrate the sensor, or weigh a known mass in several poses.",
     "base-tilted": "Level the base, or correct [log] gravity to the direction found.",
     "stream-delayed": "Give delay = { value = .., unit = 'ms' } for this stream so that it is not estimated anew.",
     "imu-rotated": "Give mount = { rotation = .. } for this stream so that it is not estimated anew.",

@@ -457,6 +457,7 @@ def test_demo(tmp_path: Path) -> None:
     run = steelyard("demo", "--json", "-o", page, "--keep", kept)
     assert run.status == 0
     assert run.json["method"] == "part-masses"
+    assert run.json["findings"] == []
     np.testing.assert_allclose(run.json["truth"], BODY.vector)
     assert run.json["mass_kg"] == pytest.approx(float(BODY.mass), rel=1e-3)
     off = np.abs(np.array(run.json["inertia_com_kgm2"]) - BODY.inertia_com)

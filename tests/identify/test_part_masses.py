@@ -139,7 +139,7 @@ def test_a_wrong_grasp_is_in_the_error_bars() -> None:
     log = log_of(TRUTH, "low", 0)
     sure = PartMasses(boxes(), bias="none").identify(log)
     loose = PartMasses(boxes(), bias="none", shape_error=ShapeError(grasp_m=0.002, grasp_rad=0.02)).identify(log)
-    assert (loose.std[1:4] > 2 * sure.std[1:4]).any()
+    assert (loose.std[4:] > 2 * sure.std[4:]).any()  # the log alone knows the centre better
     shifted = boxes().in_frame(Pose(Rotation.exp([0.01, 0, 0]), np.array([0.001, 0, 0])))
     off = PartMasses(shifted, bias="none", shape_error=ShapeError(grasp_m=0.002, grasp_rad=0.02)).identify(log)
     assert (np.abs(people(off.parameters) - people(TRUTH)) < 4 * off.std).all()

@@ -241,6 +241,10 @@ def test_bad_recordings_say_what_is_missing():
         align(replace(made, streams=(wrench,)))
     with pytest.raises(CannotAnswer, match="share no time"):
         align(replace(made, streams=(wrench, replace(pose, time=pose.time + 1e6), imu)))
+    with pytest.raises(CannotAnswer, match=r"from 1700000000\.00"):
+        align(replace(made, streams=(wrench, *(replace(s, time=s.time + 1.7e9 + 0.001) for s in (pose, imu)))))
+    with pytest.raises(CannotAnswer, match=r"share 0.00\d+ s .* Check the time units"):
+        align(replace(made, streams=tuple(replace(s, time=1e-3 * s.time) for s in made.streams)))
     with pytest.raises(BadDescription, match="need a clock"):
         align(replace(made, streams=(wrench, replace(pose, time=None))))
 

@@ -17,7 +17,7 @@ from steelyard.logs.log import MotionLog, Noise
 from steelyard.sanity.contact import untouched
 from steelyard.simulate import scenarios
 from steelyard.simulate.logs import simulate_log
-from steelyard.spatial import Rotation
+from steelyard.spatial import Pose, Rotation
 
 MOTIONS = ("stop_go", "dyn_slow", "dyn_fast")
 SHARES = (0.05, 0.2, 0.55)
@@ -117,6 +117,39 @@ def test_the_message_has_time_share_and_size() -> None:
     assert force == pytest.approx(10, rel=0.1)
     assert torque < 0.3
     assert share == pytest.approx(10 * (last - first), abs=1.5)
+
+
+def test_what_misses_one_body_in_most_of_a_log_is_not_called_a_hand() -> None:
+    """Half of the weight is taken away, none of the inertia."""
+    log = made("hammer", "stop_go", "moderate", 0)
+    body = scenarios.body("hammer").parameters().vector.copy()
+    body[4:] = 0
+    at_rest = replace(
+        log,
+        acceleration=0 * log.acceleration,
+        angular_velocity=0 * log.angular_velocity,
+        angular_acceleration=0 * log.angular_acceleration,
+    )
+    mask, (finding,) = untouched(replace(log, wrench=log.wrench - 0.5 * at_rest.predicted(body)), True)
+    assert finding.code == "contact"
+    assert finding.message.startswith("The wrench does not fit one body in")
+    assert "controller compensates" in finding.remedy
+    assert log.still[mask].mean() > log.still.mean()
+
+
+@pytest.mark.parametrize(("slip", "noise"), [(0.05, "low"), (0.05, "high"), (0.08, "low")])
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_a_slip_is_named_with_its_time(slip: float, noise: str, seed: int) -> None:
+    log = made("hammer", "stop_go", noise, seed)
+    body = scenarios.body("hammer").parameters()
+    moved = body.in_frame(Pose(Rotation.identity(), np.array([0.0, slip, 0.0]))).vector - body.vector
+    late = log.time >= 5.0
+    mask, (finding,) = untouched(replace(log, wrench=log.wrench + late[:, None] * log.predicted(moved)), True)
+    assert finding.code == "load-changed"
+    said = finding.message.split("its centre of mass moved by ")[1]
+    assert float(said.split(" mm")[0]) == pytest.approx(1e3 * slip, rel=0.25)
+    assert float(finding.message.split()[1]) == pytest.approx(5.0, abs=0.3)
+    assert not (mask & late).any() or not (mask & ~late).any()
 
 
 @pytest.mark.parametrize("motion", MOTIONS)

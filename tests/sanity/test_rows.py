@@ -51,6 +51,14 @@ def test_stuck_and_clipped_rows_are_left_out(tmp_path: Path) -> None:
     assert len(wrench_of(clipped)) < 6520
 
 
+def test_channels_clipped_at_both_ends_are_not_stuck(recording: Recording) -> None:
+    wrench = wrench_of(recording)
+    force = wrench.channels["force"]
+    low, high = np.quantile(force, [0.1, 0.9], axis=0)
+    both = replace(wrench, channels={**wrench.channels, "force": np.clip(force, low, high)})
+    assert set(codes(with_wrench(recording, both))) == {"channel-saturated"}
+
+
 def test_a_dead_channel_is_named(recording: Recording) -> None:
     wrench = wrench_of(recording)
     torque = wrench.channels["torque"].copy()

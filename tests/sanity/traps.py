@@ -7,8 +7,8 @@ from dataclasses import replace
 
 import numpy as np
 
+from steelyard.logs.misread import rolled
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.misread import rolled
 from steelyard.spatial import Rotation
 
 Edit = Callable[[Recording], Recording]

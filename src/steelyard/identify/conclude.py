@@ -67,8 +67,8 @@ def conclude(
     H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
     cost, square = noise_cost.value(K, data, *noise)
     H, rows = nonnegative(H, plain), problem.samples
-    chi2 = max(cost / max(6 * rows - len(solution.linear), 1.0), 0.0)
-    residual_torque, residual_force = (float(np.sqrt(max(s.mean() / rows, 0))) for s in (square[:3], square[3:]))
+    chi2 = max(cost / max(int(problem.heard.sum()) * rows - len(solution.linear), 1.0), 0.0)
+    residual_torque, residual_force = problem.rms(square / rows)
     white = max(chi2, 1.0) * (H + extra)
     bread, meat = H, white
     if solution.weights is not None:

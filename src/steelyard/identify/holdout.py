@@ -48,11 +48,11 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Arra
         refits.append(moved)
         misses.append(miss)
         rows += float(problem.blocks[chosen, 18, 18].sum())
-    square = np.sum(misses, axis=0) / rows
+    torque, force = problem.rms(np.sum(misses, axis=0) / rows)
     phi = np.array(refits)[:, :10] - solution.known
     return {
-        "holdout_force_N": float(np.sqrt(max(square[3:].mean(), 0))),
-        "holdout_torque_Nm": float(np.sqrt(max(square[:3].mean(), 0))),
+        "holdout_force_N": force,
+        "holdout_torque_Nm": torque,
         "blocks": len(numbers),
         "jackknife": _jackknife(phi),
         "jackknife_people": _jackknife(_people(phi)),

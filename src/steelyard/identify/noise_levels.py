@@ -110,11 +110,11 @@ def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
     return replace(log, noise=noise)
 
 
-def without_dead(log: MotionLog, dead: Mask) -> MotionLog:
-    """Return the log with so much noise on the wrench channels `dead` (6,) [tau, f] that they say nothing."""
-    if log.noise is None or not dead.any():
+def without_dead(log: MotionLog) -> MotionLog:
+    """Return the log with so much noise on its dead channels that they say nothing."""
+    if log.noise is None or not log.dead.any():
         return log
-    return replace(log, noise=tuple(Noise(n.acceleration, np.where(dead, DEAF, n.wrench)) for n in log.noise))
+    return replace(log, noise=tuple(Noise(n.acceleration, np.where(log.dead, DEAF, n.wrench)) for n in log.noise))
 
 
 def _declared(variance: Array, declared: Mapping[str, float], names: tuple[str, str]) -> Array:
@@ -175,11 +175,18 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
             unsure = 2 * np.sqrt(2 / rows) if resting else 0.0
             left = (1 - unsure) * miss - (K[:, :6] ** 2) @ acceleration[group]
             left = np.maximum(left, 0.0 if resting else LEAST_SHARE * miss)
-        out[c] = np.maximum(_pooled(left, int(rows)), SMALLEST)
+        out[c] = np.maximum(_pooled(_of_heard(left, log.dead), int(rows)), SMALLEST)
         shares[c] = rows / moments.samples
     quiet = np.min(out[resting], axis=0) if resting else SMALLEST
     # A few rows in one pose can be fitted without any residual; they are not better than the sensor is elsewhere.
     return np.asarray(np.maximum(np.maximum(out, quiet), QUIETEST * shares @ out))
+
+
+def _of_heard(variance: Array, dead: Mask) -> Array:
+    """Return the variances (6,) with those of dead channels at the mean of the channels beside them."""
+    heard = (~dead).reshape(2, 3)
+    mean = (variance.reshape(2, 3) * heard).sum(1) / np.maximum(heard.sum(1), 1)
+    return np.where(dead, np.repeat(mean, 3), variance)
 
 
 def _pooled(variance: Array, rows: int) -> Array:

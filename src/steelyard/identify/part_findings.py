@@ -13,6 +13,7 @@ from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.material_choice import Choices
 from steelyard.identify.placement import misplaced
+from steelyard.inertia import InertialParameters
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
 
@@ -29,9 +30,17 @@ MISFIT_CHANCE = 1e-5
 
 
 def part_findings(
-    estimate: Estimate, parts: Parts, data: Effective, choices: Choices | None, materials: Sequence[Material]
+    estimate: Estimate,
+    body: InertialParameters,
+    parts: Parts,
+    data: Effective,
+    choices: Choices | None,
+    materials: Sequence[Material],
 ) -> list[Finding]:
-    """Return what there is to know: parts at zero, parts not told apart, materials tied or impossible, misfit."""
+    """Return what there is to know: parts at zero, parts not told apart, materials tied or impossible, misfit.
+
+    body  what the shape makes of the masses, judged against the log
+    """
     out = _zero(estimate, parts)
     rank = seen_rank(parts, data.information, estimate.mass)
     if rank < len(parts):
@@ -44,7 +53,7 @@ def part_findings(
             out.append(Finding.of("centroids-coplanar", text))
     if choices is not None:
         out += _material_findings(estimate, data, choices, materials)
-    elif (misfit := data.misfit(estimate.parameters.vector)) > (limit := misfit_limit(data, len(parts))):
+    elif (misfit := data.misfit(body.vector)) > (limit := misfit_limit(data, len(parts))):
         text = (
             f"Homogeneous parts of this shape leave a chi-square of {misfit:.0f} that ten free numbers do not "
             f"(at most {limit:.0f} by chance): a part is not of one density, or the shape is wrong."

@@ -35,7 +35,8 @@ from steelyard.identify.part_models import (
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.placement import misplaced
 from steelyard.identify.problem import Problem
-from steelyard.identify.shape_error import DRAWN, EXACT, MEASURED, ShapeError
+from steelyard.identify.recentred import recentred
+from steelyard.identify.shape_error import DRAWN, MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
@@ -147,11 +148,14 @@ class PartMasses:
             body = _with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
         masses = self._masses(data, body, self.parts)
-        _with_mass(self.parts, masses.mean, data)
+        body = _with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
-        seen = data.blurred(self.shape_error.with_grasp(first.parameters))
-        findings = part_findings(first, self.parts, seen, masses.choices, self.materials)
-        if not self.materials and suspicious(seen, first.parameters.vector, self.parts):
+        # Judged where the shape puts the body, as far as a scan says: what a wrong grasp moves must not hide a misfit.
+        if self._doubtful:
+            body = recentred(data, body, self.shape_error.covariance(body)).body
+        seen = data.blurred(self.shape_error.with_grasp(body))
+        findings = part_findings(first, body, self.parts, seen, masses.choices, self.materials)
+        if not self.materials and suspicious(seen, body.vector, self.parts):
             found = uneven(seen, self.parts)
             if found is not None:
                 others = (f for f in findings if f.code != "part-not-homogeneous")
@@ -171,8 +175,11 @@ class PartMasses:
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
         body = InertialParameters(found.vector)
-        covariance = found.covariance + self.shape_error.with_grasp(body)
-        return self._built(problem, data, found.masses, body, covariance, found.covariance)
+        error, follows = self.shape_error.with_grasp(body), found.covariance
+        if self._movable:
+            placed = recentred(data, body, error)
+            body, error, follows = placed.body, placed.error, placed.following(data, follows)
+        return self._built(problem, data, found.masses, body, found.covariance + error, follows)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
@@ -194,7 +201,9 @@ class PartMasses:
         if self._doubtful:
             masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
         covariance = rest @ spread @ rest.T + error - gain @ error
-        follows = _follows(data, error, spread, error)
+        blur = _blur(data, error)
+        masses_follow = spread @ blur
+        follows = masses_follow + error @ (blur - seen.information @ masses_follow)
         made = self._built(problem, data, masses, nearest_body(body.vector, moved), covariance, follows)
         so = "so that the wrench fits" if seen.misfit(body.vector) < limit else "and the wrench does not fit even so"
         note = f"the shape was trusted {2**doubling} times less than given, {so}"
@@ -224,24 +233,32 @@ class PartMasses:
         """Whether the shape may be worse than a measured mesh."""
         return self.shape_error.com_m > MEASURED.com_m
 
+    @property
+    def _movable(self) -> bool:
+        """Whether the object may lie elsewhere than its shape says."""
+        return self._doubtful or bool(self.shape_error.grasp_steps())
+
     def _estimate(self, problem: Problem, data: Effective, masses: Masses) -> Estimate:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
 
         phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with a measured shape (e = 0): letting a
-        log move it lost more in the thin axes than it won in the others. The centre of mass of a scan moves as far as
-        the log says.
+        log move it lost more in the thin axes than it won in the others. Mass and centre of a scan, or of an object
+        whose grasp is uncertain, move as far as the log says.
         """
         B = self.parts.per_mass
         body = self.parts.whole(masses.mean)
         moved = self._moved(data, body)
-        error = self.shape_error.covariance(body)
+        drawn = self.shape_error.covariance(body)
+        error = drawn + moved.T @ moved
         spread = follows = B @ masses.covariance @ B.T
         if self._doubtful:
-            body, error, follows = self._recentred(data, body, error, spread)
-        covariance = spread + error + moved.T @ moved
+            follows = spread @ _blur(data, drawn)
+        if self._movable:
+            placed = recentred(data, body, error)
+            body, error, follows = placed.body, placed.error, placed.following(data, follows)
         if self._doubtful:
             masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
-        return self._built(problem, data, masses, body, covariance, follows)
+        return self._built(problem, data, masses, body, spread + error, follows)
 
     def _off(self, data: Effective, body: InertialParameters) -> bool:
         """Whether the log contradicts the shape by more than a scan is wrong."""
@@ -260,23 +277,6 @@ class PartMasses:
         shifted = (self.parts.in_frame(Pose(Rotation.identity(), DRAWN * axis)).per_mass for axis in np.eye(3))
         steps = [gain @ ((moved - self.parts.per_mass) * masses.mean) for moved in shifted]
         return np.asarray(sum(step @ step.T for step in steps))
-
-    def _recentred(
-        self, data: Effective, body: InertialParameters, error: Array, spread: Array
-    ) -> tuple[InertialParameters, Array, Array]:
-        """Return the body with its centre of mass where shape and log together see it, and what is left of the error.
-
-        Then how the whole follows F phi_hat, where masses by the log alone leave it `spread` (10, 10).
-
-        Inertia about the centre of mass stays that of the shape. The mean of e given the rest r = phi_hat - B m is
-        G_c (F^-1 + G)^-1 r, G_c the part of G that moves the centre.
-        """
-        centre = replace(EXACT, com_m=self.shape_error.com_m).covariance(body)
-        seen = data.blurred(error)
-        step = centre @ (seen.pull - seen.information @ body.vector)
-        com = body.com + step[1:4] / float(body.mass)
-        found = InertialParameters.from_com(float(body.mass), com, body.inertia_com)
-        return found, error - centre @ seen.information @ centre, _follows(data, error, spread, centre)
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
@@ -320,15 +320,9 @@ class PartMasses:
         return np.stack([(found(X) - found(X.inverse())) / 2 for X in steps])
 
 
-def _follows(data: Effective, error: Array, spread: Array, moving: Array) -> Array:
-    """Return how phi follows F phi_hat (10, 10) where masses are found by the log blurred by the error of the shape.
-
-    spread  (10, 10) covariance of phi that the masses leave
-    moving  (10, 10) the part of `error` that moves with the log
-    """
-    blur = np.linalg.inv(np.eye(10) + data.information @ error)  # (F^-1 + G)^-1 F^-1
-    masses = spread @ blur
-    return np.asarray(masses + moving @ (blur - data.blurred(error).information @ masses))
+def _blur(data: Effective, error: Array) -> Array:
+    """Return (F^-1 + G)^-1 F^-1 (10, 10): what an error G of the shape leaves of F phi_hat."""
+    return np.asarray(np.linalg.inv(np.eye(10) + data.information @ error))
 
 
 def _padded(phi: Array, size: int) -> Array:

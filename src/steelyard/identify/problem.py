@@ -10,8 +10,9 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.linear import normal_equations, solve_scaled
 from steelyard.identify.noise_cost import weight
+from steelyard.identify.noise_levels import DEAF
 from steelyard.identify.regressor import design
-from steelyard.logs.log import Integers, MotionLog, Noise
+from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 
 # Variances [(N m)^2, N^2] of an everyday wrist sensor with its model errors.
@@ -55,6 +56,17 @@ class Problem:
     block_number: Integers
     still_samples: float = 0.0
     bias_prior: BiasPrior = field(default=NOTHING_KNOWN)
+
+    @property
+    def heard(self) -> Mask:
+        """Which channels [tau, f] (6,) measure."""
+        return np.asarray((self.wrench < DEAF).any(0))
+
+    def rms(self, square: Array) -> tuple[float, float]:
+        """Return the rms [N m] and [N] per axis that measures, from mean squares (6,) of the channels."""
+        both = np.where(self.heard, square, 0.0).reshape(2, 3).sum(1) / np.maximum(self.heard.reshape(2, 3).sum(1), 1)
+        torque, force = np.sqrt(np.maximum(both, 0.0))
+        return float(torque), float(force)
 
     @classmethod
     def of(cls, moments: Moments, with_bias: bool) -> Problem:

@@ -151,7 +151,7 @@ def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
     used = {*moving.streams, *([sensor.name] if sensor is not None else [])} - {wrench_stream.name}
     known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
     sought = [s.name for s in streams if s.name in used and s.delay is None] if options.estimate_delays else []
-    felt = Felt.of(wrench_stream, recording.wrench_sign)
+    felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
     known = {n: d for n, d in known.items() if n not in sought}
     return _Prepared(
         recording, options, _time(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought)
@@ -239,12 +239,19 @@ def _rows(given: _Prepared) -> tuple[Array, Felt]:
     end = min((e for _, e in spans), default=float(time[-1]))
     reach = given.options.max_delay_s
     shared = (time >= start - reach) & (time <= end + reach)
-    if start > end or shared.sum() < _FEWEST_ROWS:
+    if start > end or not shared.any():
         raise CannotAnswer(
             "the streams share no time: "
-            f"the wrench runs from {given.clock[0]:.6g} to {given.clock[-1]:.6g} s, "
-            f"the others together from {start:.6g} to {end:.6g} s. "
+            f"the wrench runs from {given.clock[0]:.13g} to {given.clock[-1]:.13g} s, "
+            f"the others together from {start:.13g} to {end:.13g} s. "
             "Check the time units and that all are of one run."
+        )
+    if shared.sum() < _FEWEST_ROWS:
+        first, last = max(start, float(given.clock[0])), min(end, float(given.clock[-1]))
+        raise CannotAnswer(
+            f"the streams share {max(last - first, 0.0):.3g} s ({int(shared.sum())} rows after the low-pass), too "
+            f"short a time to tell how the sensor moved; at least {_FEWEST_ROWS} rows are needed. Check the time "
+            "units, or record longer."
         )
     values = signal(given.clock, given.felt.values, given.cutoff).at(time[shared])
     return time[shared], replace(given.felt, values=values)
@@ -310,6 +317,7 @@ def _log(given: _Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Mot
         noise_std(given.wrench(clocks.delays_s)) ** 2 * share, given.recording.noise,
     )  # fmt: skip
     log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
+    log = replace(log, dead=np.array(felt.dead))
     return log, motion
 
 

@@ -103,7 +103,7 @@ def _scan_cost(question: Question, delays: Mapping[str, float], name: str, by_wr
     motion, wrench, force = question.seen(delays)
     own = force is not None and question.imu is not None and name == question.imu.name
     chosen = [np.ones((len(force), 1)), force] if own and force is not None else features(motion, None)
-    cost = _log_share(wrench, chosen) if by_wrench else 0.0
+    cost = _log_share(wrench[:, ~np.array(question.felt.dead)], chosen) if by_wrench else 0.0
     if force is not None and not own and motion.gravity is not None:
         # The accelerometer feels gravity turn as well, and no hand on the object disturbs it.
         cost += _log_share(force, chosen)

@@ -23,15 +23,17 @@ class Felt:
     values  moment and force, each in S or, where `world` names it, in W
     world   which of "torque" and "force" are in W
     arm     (3,) [m] from the S origin, in S, to where moments are about
+    dead    channels [tau, f] of S that do not measure
     """
 
     stream: str
     values: Array
     world: frozenset[str]
     arm: Array
+    dead: tuple[bool, ...] = (False,) * 6
 
     @classmethod
-    def of(cls, stream: Stream, sign: int) -> Felt:
+    def of(cls, stream: Stream, sign: int, dead: tuple[bool, ...] = (False,) * 6) -> Felt:
         """Return the wrench of a stream; `sign` +1 where it is on the object, -1 on the sensor."""
         world = frozenset(part for part in _PARTS if stream.frames.get(part, "S") == "W")
         mounted = None if stream.mount is None else stream.mount.rotation
@@ -39,7 +41,7 @@ class Felt:
         if mounted is not None:
             parts = [v if part in world else mounted.apply(v) for part, v in zip(_PARTS, parts, strict=True)]
         arm = np.zeros(3) if stream.mount is None or stream.mount.position is None else stream.mount.position
-        felt = cls(stream.name, sign * np.concatenate(parts, 1), world, arm)
+        felt = cls(stream.name, sign * np.concatenate(parts, 1), world, arm, dead)
         # What is all in S is moved to the S origin once and for all.
         return felt if world else replace(felt, values=felt.in_sensor(None), arm=np.zeros(3))
 

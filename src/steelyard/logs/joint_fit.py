@@ -256,7 +256,7 @@ def _memory(residual: Array) -> Array:
 
 
 def _first_scales(question: Question, layout: _Layout) -> Array:
-    """Return starting scales (k,): what free linear fits of the channels leave over."""
+    """Return starting scales (k,): what free linear fits of the channels leave over, infinite for dead channels."""
     motion, wrench, force = question.seen(layout.delays(layout.start, question))
     residual = free_residual(wrench, features(motion, force))
     scales = 1.4826 * np.median(np.abs(residual), axis=0)
@@ -266,7 +266,9 @@ def _first_scales(question: Question, layout: _Layout) -> Array:
     sizes = wrench.std(0)
     if len(scales) > 6 and force is not None:
         sizes = np.append(sizes, np.full(3, force.std()))
-    return np.asarray(np.maximum(scales, _FINEST * sizes + 1e-12))
+    scales = np.maximum(scales, _FINEST * sizes + 1e-12)
+    scales[:6][list(question.felt.dead)] = np.inf
+    return np.asarray(scales)
 
 
 def _weights(residual: Array, sigma: Array, power: int) -> Array:

@@ -69,6 +69,7 @@ class MotionLog:
     pose: Integers = None  # type: ignore[assignment]
     noise_class: Integers = None  # type: ignore[assignment]
     noise: tuple[Noise, ...] | None = None
+    dead: Mask = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
         rows = len(self.wrench)
@@ -83,6 +84,9 @@ class MotionLog:
             value: np.ndarray[Any, Any] = np.full(rows, default, kind) if given is None else np.asarray(given, kind)
             value.flags.writeable = False
             object.__setattr__(self, name, value)
+        dead: Mask = np.zeros(6, np.bool_) if self.dead is None else np.array(self.dead, np.bool_)
+        dead.flags.writeable = False
+        object.__setattr__(self, "dead", dead)
         self._check_lengths(rows)
 
     def _check_lengths(self, rows: int) -> None:
@@ -107,7 +111,7 @@ class MotionLog:
         return replace(self, **chosen)
 
     def in_frame(self, X_AS: Pose) -> MotionLog:
-        """Return the same log as a sensor at frame A, fixed to S, would have recorded it (noise is dropped)."""
+        """Return the same log as a sensor at frame A, fixed to S, would have recorded it (noise, dead dropped)."""
         R, p = X_AS.rotation, X_AS.position
         omega, alpha = R.apply(self.angular_velocity), R.apply(self.angular_acceleration)
         lever = np.cross(alpha, p) + np.cross(omega, np.cross(omega, p))
@@ -121,6 +125,7 @@ class MotionLog:
             angular_velocity=omega,
             angular_acceleration=alpha,
             noise=None,
+            dead=np.zeros(6, np.bool_),
         )
 
     @classmethod

@@ -75,6 +75,7 @@ class Recording:
                   angular_acceleration [rad/s^2]; missing ones are estimated
     tool          path of the result or log of the gripper alone, to be taken away
     object_pose   pose of the scan's frame O in S, with its uncertainty (m, rad)
+    dead          channels of the wrench [tau, f] in S that do not measure: nothing may be concluded from them
     findings      what reading it already showed: rows that missed a number and were left out
     """
 
@@ -86,4 +87,5 @@ class Recording:
     object_pose: Pose | None = None
     object_pose_std: tuple[float, float] | None = None
     name: str = "log"
+    dead: tuple[bool, ...] = (False,) * 6
     findings: tuple[Finding, ...] = ()

@@ -33,8 +33,8 @@ from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
 from steelyard.sanity import (
     after,
-    dead_channels,
     examine,
+    examine_sensor,
     fitted_gravity,
     impossible_density,
     levelled,
@@ -105,7 +105,7 @@ def identify(
     keep, touched = (slice(None), ()) if unmeasured else untouched(log, options.bias == "free")
     if any(f.code == "weight-compensated" for f in before):
         touched = ()  # moving rows carry the whole mass, and only look touched
-    log = without_dead(with_declared(log.rows(keep), recording.noise), dead_channels(recording))
+    log = without_dead(with_declared(log.rows(keep), recording.noise))
     shape = None if parts is None else _shape(parts, recording.object_pose, recording.object_pose_std)
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
     with _beside(before):
@@ -116,6 +116,7 @@ def identify(
         estimate = load.estimate().noted("the fit was repeated with a bias that drifts")
         late = after(log, estimate, aligned, recording)
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
+    estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late))
     if unmeasured:
         estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())
@@ -124,7 +125,7 @@ def identify(
         before = before if isinstance(parts, Parts) else (*before, *parts.findings)
         if not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
-    estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late)
+    estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late, *of_sensor)
     return _in_recording_sign(replace(estimate, delays_s=dict(aligned.delays_s)).noted(*aligned.notes), recording)
 
 

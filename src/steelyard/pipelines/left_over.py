@@ -22,6 +22,8 @@ MEDIAN = 0.6745
 def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = None) -> tuple[MotionLog, Array]:
     """Return the rows of the recording, put right as `identify` does, and what is left (N, 6) of their wrenches.
 
+    Channels that do not measure leave nothing.
+
     tool  what was taken away from the answer, and is in the log
     """
     recording, _ = examine(recording)
@@ -32,7 +34,7 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
     if "bias-drift" in estimate.codes() and log.time is not None:
         left = left - _line(scaled_time(log), left)
-    return log, left
+    return log, np.where(log.dead, 0.0, left)
 
 
 def of_another_fit(estimate: Estimate, left: Array) -> bool:

@@ -6,5 +6,15 @@ from steelyard.sanity.contact import untouched
 from steelyard.sanity.density import impossible_density
 from steelyard.sanity.gravity import fitted_gravity, levelled
 from steelyard.sanity.rows import dead_channels
+from steelyard.sanity.sensor_matrix import examine_sensor
 
-__all__ = ["after", "dead_channels", "examine", "fitted_gravity", "impossible_density", "levelled", "untouched"]
+__all__ = [
+    "after",
+    "dead_channels",
+    "examine",
+    "examine_sensor",
+    "fitted_gravity",
+    "impossible_density",
+    "levelled",
+    "untouched",
+]

@@ -8,7 +8,8 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.conventions import examine_conventions
-from steelyard.sanity.rows import examine_rows
+from steelyard.sanity.rows import dead_channels, examine_rows
+from steelyard.sanity.silent import without_silent
 from steelyard.sanity.units import examine_units
 
 # A motion is told from its neighbours in time.
@@ -24,9 +25,12 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     _require_rows(recording)
     read, recording = recording.findings, replace(recording, findings=())
     recording, rows = examine_rows(recording)
+    recording = replace(recording, dead=dead_channels(recording))
     recording, units = examine_units(recording)
     recording, conventions = examine_conventions(recording)
-    return recording, (*read, *rows, *units, *conventions)
+    # Misread rotations leave a channel unexplained, too.
+    recording, silent = (recording, ()) if conventions else without_silent(recording)
+    return recording, (*read, *rows, *units, *conventions, *silent)
 
 
 def _require_rows(recording: Recording) -> None:

@@ -25,6 +25,15 @@ HEAVIEST = 100.0
 EXPLAINED = 0.5
 
 
+def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
+    """Return the mass that the force shows by acceleration, then by weight, their jackknife std, and the share left."""
+    seen = replace(view, acceleration=None).seen(gravity, rotation)
+    slowed = view.seen(np.zeros(3), rotation).pull
+    columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)
+    masses, spread, left = solve(columns * seen.heard(1), seen.wrench[:, 3:], view.block)
+    return masses[:2], spread[:2], left
+
+
 def compensated(view: Glance, gravity: Array, rotation: Array | None) -> tuple[Finding, ...]:
     """Return `weight-compensated` where the force shows more mass by acceleration than by weight.
 
@@ -32,10 +41,7 @@ def compensated(view: Glance, gravity: Array, rotation: Array | None) -> tuple[F
     """
     if view.acceleration is None or rotation is None:
         return ()
-    seen = replace(view, acceleration=None).seen(gravity, rotation)
-    slowed = view.seen(np.zeros(3), rotation).pull
-    columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)
-    masses, spread, left = solve(columns, seen.wrench[:, 3:], view.block)
+    masses, spread, left = both_masses(view, gravity, rotation)
     moved, weighed = float(masses[0]), float(np.sign(masses[0]) * masses[1])
     short = SHARE * abs(moved) - weighed
     sure = abs(moved) > SURE * spread[0] and short > SURE * float(np.hypot(SHARE * spread[0], spread[1]))

@@ -20,13 +20,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.misread import MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
-from steelyard.sanity.compensated import compensated
+from steelyard.sanity.compensated import both_masses, compensated
 from steelyard.sanity.glance import Glance, glance
 from steelyard.sanity.mirrored import Mirror, mirrored
-from steelyard.sanity.misread import MISREAD, Misread
-from steelyard.sanity.static_fit import StaticFit, beside, fit, solve
+from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
 from steelyard.sanity.units import scaled
 
@@ -193,10 +193,7 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
     """Return the sign of the mass that the measured acceleration shows; 0 where none is measured or it is too weak."""
     if view.acceleration is None or reading.rotation is None:
         return 0
-    seen = replace(view, acceleration=None).seen(reading.gravity, reading.rotation)
-    slowed = view.seen(np.zeros(3), reading.rotation).pull
-    columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)
-    masses, spread, _ = solve(columns, seen.wrench[:, 3:], view.block)
+    masses, spread, _ = both_masses(view, reading.gravity, reading.rotation)
     sure = abs(masses[0]) > 5 * spread[0] and 0.5 < abs(masses[0] / masses[1]) < 2
     return int(np.sign(masses[0])) if sure else 0
 

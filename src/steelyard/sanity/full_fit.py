@@ -105,17 +105,18 @@ def _solution(scatter: Array, size: int) -> Array:
 
 def _first_weights(log: MotionLog) -> Array:
     spread = np.maximum(log.wrench.var(0), _SMALLEST)
-    return np.broadcast_to(1 / spread, log.wrench.shape).copy()
+    return np.broadcast_to(~log.dead / spread, log.wrench.shape).copy()
 
 
 def _weights(rows: Rows, solution: Array) -> Array:
     """Return inverse variances (N, 6) of the residuals, by class of rows and kind of channel."""
     miss = rows.values - rows.columns @ solution
-    out = np.empty_like(miss)
+    out, heard = np.empty_like(miss), ~rows.log.dead
     for kind in np.unique(rows.log.noise_class):
         at = rows.log.noise_class == kind
         variance = (1.4826 * np.median(np.abs(miss[at]), 0)) ** 2 + 0.01 * miss[at].var(0)
-        out[at] = 1 / np.maximum(np.repeat(variance.reshape(2, 3).mean(1), 3), _SMALLEST**2)
+        mean = (variance * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1)
+        out[at] = heard / np.maximum(np.repeat(mean, 3), _SMALLEST**2)
     return out
 
 

@@ -40,6 +40,7 @@ class Glance:
     world         the wrench is in W axes
     accelerometer (N, 3) [m/s^2] what an accelerometer shows in its own axes, where there are rotations, too
     sign_free     `pull` comes from an accelerometer whose mount the force itself decided, so that a mass has no sign
+    dead          channels [tau, f] of S that do not measure; their wrench is zero
     """
 
     wrench: Array
@@ -51,6 +52,7 @@ class Glance:
     world: bool = False
     sign_free: bool = False
     accelerometer: Array | None = None
+    dead: tuple[bool, ...] = (False,) * 6
 
     def __len__(self) -> int:
         return len(self.wrench)
@@ -63,18 +65,18 @@ class Glance:
         """Return wrench and motion in S, low-passed, for a gravity in W (3,) [m/s^2] and rotations (N, 3, 3)."""
         if rotation is None:
             pull = self.pull if self.pull is not None else np.zeros((len(self), 3))
-            return Seen(self.smooth(self.wrench), self.smooth(pull))
+            return Seen(self.smooth(self.wrench), self.smooth(pull), dead=self.dead)
         own = gravity if self.acceleration is None else gravity - self.acceleration
         pull = _into_sensor(rotation, np.broadcast_to(own, (len(self), 3)))
         wrench = self.wrench
         if self.world:
             wrench = np.concatenate([_into_sensor(rotation, wrench[:, :3]), _into_sensor(rotation, wrench[:, 3:])], 1)
         if self.rate is None:
-            return Seen(wrench, pull)
+            return Seen(wrench, pull, dead=self.dead)
         lever, spin = _turning(rotation, self.rate)
         flat = np.concatenate([wrench, pull, lever.reshape(-1, 9), spin.reshape(-1, 18)], 1)
         parts = np.split(self.smooth(flat), [6, 9, 18], axis=1)
-        return Seen(parts[0], parts[1], parts[2].reshape(-1, 3, 3), parts[3].reshape(-1, 3, 6))
+        return Seen(parts[0], parts[1], parts[2].reshape(-1, 3, 3), parts[3].reshape(-1, 3, 6), self.dead)
 
 
 @dataclass(frozen=True, eq=False)
@@ -85,12 +87,18 @@ class Seen:
     pull    (N, 3) gravity less acceleration [m/s^2]
     lever   (N, 3, 3) what turning adds to the force per first moment of mass; None for tables
     spin    (N, 3, 6) what turning adds to the torque per entry of the inertia
+    dead    channels [tau, f] of S that do not measure; their wrench is zero
     """
 
     wrench: Array
     pull: Array
     lever: Array | None = None
     spin: Array | None = None
+    dead: tuple[bool, ...] = (False,) * 6
+
+    def heard(self, part: int) -> Array:
+        """Return one for each axis of the torque (0) or the force (1) that measures, zero for the others, (3, 1)."""
+        return np.array([[not d] for d in self.dead[3 * part : 3 * part + 3]], dtype=np.float64)
 
 
 def _into_sensor(rotation: Array, vectors: Array) -> Array:
@@ -213,7 +221,7 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
         return resampled(clock, values, grid)
 
     raw, world = _wrench(recording, stream)
-    wrench = on_grid(stream, raw)
+    wrench = np.where(recording.dead, 0.0, on_grid(stream, raw))
     rotation = next((on_grid(s, v) for s, _, v in channel(recording, "rotation") if s in used), None)
     pull = None
     if rotation is None:
@@ -227,7 +235,7 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     if rotation is not None:
         felt = next((on_grid(s, v) for s, _, v in channel(recording, "specific_force") if s in used), None)
     loose = rotation is None and _loose(recording)
-    return Glance(wrench, rotation, pull, acceleration, block, rate, world, loose, felt)
+    return Glance(wrench, rotation, pull, acceleration, block, rate, world, loose, felt, recording.dead)
 
 
 def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, rate: float) -> Array | None:

@@ -1,4 +1,4 @@
-"""Load change: from some time on, the robot holds another body; the sensor's bias stays."""
+"""Load change: from some time on, the robot holds another body, or the same one elsewhere; the bias stays."""
 
 from __future__ import annotations
 
@@ -17,16 +17,22 @@ SHORTEST = 1.0
 SHARE, DEVIATIONS = 0.08, 6.0
 # Another body must explain this much (chi-square) beyond what a jump of the bias would; and no lever beyond 1 m.
 BEYOND_BIAS, LONGEST_LEVER = 40.0, 1.0
+# A body of the same mass has slipped where its centre of mass moved further than this [m].
+SLIP = 0.003
 
 
 @dataclass(frozen=True, eq=False)
 class LoadChange:
-    """At `time` [s] the mass went from `before` to `after` [kg]; residual (F, 6) with both bodies."""
+    """At `time` [s] the mass went from `before` to `after` [kg], or the body slipped; residual (F, 6) with both bodies.
+
+    slip  [m] how far the centre of mass moved at the same mass, 0 where the mass changed
+    """
 
     time: float
     before: float
     after: float
     residual: Array
+    slip: float = 0.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,10 +73,12 @@ def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange |
     normal, right = run.normal(j, slice(0, 10))
     x = solve(normal, right)
     before, change = x[:10], x[-10:]
-    spread = np.sqrt(memory * np.linalg.inv(normal)[len(run.ridge), len(run.ridge)])
-    real = abs(change[0]) > max(SHARE * before[0], DEVIATIONS * float(spread))
+    first = len(run.ridge)
+    covariance = memory * np.linalg.inv(normal)[first : first + 4, first : first + 4]
+    slip = _slip(before, change, np.asarray(covariance, dtype=np.float64))
+    real = slip > 0 or abs(change[0]) > max(SHARE * before[0], DEVIATIONS * float(np.sqrt(covariance[0, 0])))
     possible = before[0] > 0 and before[0] + change[0] > 0
-    possible = possible and np.linalg.norm(change[1:4]) < LONGEST_LEVER * abs(change[0])
+    possible = possible and np.linalg.norm(change[1:4]) < LONGEST_LEVER * (before[0] if slip else abs(change[0]))
     if len(run.ridge) > 10:
         jump = run.cost(j, slice(10, 16)) - run.cost(j, slice(0, 10))
         possible = possible and jump / memory > BEYOND_BIAS
@@ -79,7 +87,17 @@ def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange |
     residual = slices.y - slices.A @ x[: len(run.ridge)]
     residual[j:] -= slices.A[j:, :, :10] @ change
     time = float(slices.time[j - 1] + slices.time[j]) / 2
-    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual)
+    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual, slip)
+
+
+def _slip(before: Array, change: Array, covariance: Array) -> float:
+    """Return how far the centre of mass moved [m] where that is sure and the mass stayed, else 0."""
+    if before[0] <= 0 or abs(change[0]) > SHARE * before[0]:
+        return 0.0
+    moved = change[1:4]
+    sure = float(moved @ np.linalg.solve(covariance[1:, 1:], moved)) > DEVIATIONS**2
+    shift = float(np.linalg.norm((before[1:4] + moved) / (before[0] + change[0]) - before[1:4] / before[0]))
+    return shift if sure and shift > SLIP else 0.0
 
 
 def _running(values: Array) -> Array:

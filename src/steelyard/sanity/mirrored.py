@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import permutations, product
 
 import numpy as np
@@ -10,6 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.sanity.glance import Glance
 from steelyard.sanity.static_fit import beside, solve
+from steelyard.sanity.tilt import force_and_weight
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,12 +32,10 @@ _REFLECTIONS = _reflections()
 
 
 def mirrored(view: Glance, gravity: Array, mass: float) -> Mirror | None:
-    """Return the exchange of axes and signs that explains the force best, None without rotations."""
-    if view.rotation is None:
+    """Return the exchange of axes and signs that explains the force best; None without rotations or all forces."""
+    if view.rotation is None or any(view.dead[3:]):
         return None
-    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
-    force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
-    down = -pull * (np.sign(mass) or 1.0)
+    seen, force, down = force_and_weight(view, gravity, mass)
     # force = X m down: the trace with X is largest for the right one.
     X = max(_REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
     _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)

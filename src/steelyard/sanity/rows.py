@@ -14,6 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
+from steelyard.spatial import cross_matrix
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
@@ -100,20 +101,23 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     return _kept(stream, ~frozen) if frozen.any() else stream, tuple(found)
 
 
-def dead_channels(recording: Recording) -> Mask:
+def dead_channels(recording: Recording) -> tuple[bool, ...]:
     """Return which channels (6,) [tau, f] of the wrench never change while their neighbours do.
 
     Where the wrench is not given in the axes of S, a dead channel is none of the six, and none is returned.
     """
-    dead = np.zeros(6, np.bool_)
+    dead = np.array(recording.dead)
     for stream in (s for s in recording.streams if "force" in s.channels and s.time is not None):
         turned = stream.mount is not None and stream.mount.rotation is not None
         if turned or len(stream) < 4 * FROZEN_ROWS:
             continue
         for k, quantity in enumerate(("torque", "force")):
             if quantity in stream.channels and stream.frames.get(quantity, "S") == "S":
-                dead[3 * k : 3 * k + 3] = _dead(stream.channels[quantity])
-    return dead
+                dead[3 * k : 3 * k + 3] |= _dead(stream.channels[quantity])
+        if stream.mount is not None and stream.mount.position is not None:
+            # Moments about the S origin take from the force.
+            dead[:3] |= (cross_matrix(stream.mount.position) != 0) @ dead[3:]
+    return tuple(bool(d) for d in dead)
 
 
 def _dead(values: Array) -> Mask:
@@ -252,7 +256,8 @@ def _clipped_rows(column: Array, extreme: float) -> Mask:
     count, none = int(at.sum()), np.zeros(len(column), bool)
     if count < max(CLIPPED_ROWS, CLIPPED_SHARE * len(column)):
         return none
-    others, counts = np.unique(column[~at], return_counts=True)
+    # Both ends of the range may be clipped; neither is compared with the other.
+    others, counts = np.unique(column[(column > column.min()) & (column < column.max())], return_counts=True)
     if not len(others) or counts.max() * CLIPPED_RATIO > count:
         return none
     steps = np.abs(np.diff(column))

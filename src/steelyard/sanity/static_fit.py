@@ -50,9 +50,15 @@ class StaticFit:
 
 def fit(seen: Seen, block: Integers) -> StaticFit:
     """Fit f = -m pull + lever h' + bias and tau = pull x h + spin I + bias to a glance."""
-    mass, mass_std, force_share = solve(beside(-seen.pull[:, :, None], seen.lever), seen.wrench[:, 3:], block)
-    moment, moment_std, torque_share = solve(beside(cross_matrix(seen.pull), seen.spin), seen.wrench[:, :3], block)
+    turned, forced = columns(seen)
+    mass, mass_std, force_share = solve(forced * seen.heard(1), seen.wrench[:, 3:], block)
+    moment, moment_std, torque_share = solve(turned * seen.heard(0), seen.wrench[:, :3], block)
     return StaticFit(float(mass[0]), float(mass_std[0]), moment[:3], moment_std[:3], force_share, torque_share)
+
+
+def columns(seen: Seen) -> tuple[Array, Array]:
+    """Return what the torque (N, 3, 3 or 9) and the force (N, 3, 1 or 4) of a body are linear in."""
+    return beside(cross_matrix(seen.pull), seen.spin), beside(-seen.pull[:, :, None], seen.lever)
 
 
 def beside(columns: Array, more: Array | None) -> Array:

@@ -10,7 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.sanity.glance import Glance, Integers
+from steelyard.sanity.glance import Glance, Integers, Seen
 from steelyard.sanity.static_fit import beside, fit, leave_out, solve
 from steelyard.spatial import Rotation
 
@@ -63,9 +63,11 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
     if view.acceleration is not None:
         force = force + mass * view.seen(np.zeros(3), rotation).pull
     turned = np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)
-    columns = -still.smooth(turned).reshape(-1, 3, 3)
+    columns = -still.smooth(turned).reshape(-1, 3, 3) * seen.heard(1)
+    force = force * seen.heard(1)[:, 0]
+    lever = None if seen.lever is None else seen.lever * seen.heard(1)
     sign = np.sign(mass) or 1.0
-    weight, spread, shown = free_direction(columns, seen.lever, force, view.block, sign * gravity)
+    weight, spread, shown = free_direction(columns, lever, force, view.block, sign * gravity)
     if weight is None:
         return None
     found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
@@ -111,13 +113,18 @@ def angle_between(a: Array, b: Array) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
-def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
-    """Return the constant turn of S that explains the force best (Wahba), None without rotations."""
-    if view.rotation is None:
-        return None
+def force_and_weight(view: Glance, gravity: Array, mass: float) -> tuple[Seen, Array, Array]:
+    """Return what is seen, and about their means the force (N, 3) and what it should follow, of the sign of `mass`."""
     seen = replace(view, acceleration=None).seen(gravity, view.rotation)
     force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
-    down = -pull * (np.sign(mass) or 1.0)
+    return seen, force, -pull * (np.sign(mass) or 1.0)
+
+
+def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
+    """Return the constant turn of S that explains the force best (Wahba); None without rotations or all forces."""
+    if view.rotation is None or any(view.dead[3:]):
+        return None
+    seen, force, down = force_and_weight(view, gravity, mass)
     X = Rotation.aligning(force.T @ down).matrix
     axis = np.array([X[2, 1] - X[1, 2], X[0, 2] - X[2, 0], X[1, 0] - X[0, 1]]) / 2
     angle = float(np.arctan2(np.linalg.norm(axis), (np.trace(X) - 1) / 2))

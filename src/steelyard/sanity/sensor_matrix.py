@@ -1,0 +1,160 @@
+"""The sensor's own matrix: what no body can feel, a wrench turned in S or forces whose axes have unlike gains.
+
+At rest the force is m g whatever is held, so that 8 of the 9 numbers that take gravity to the force are the sensor's: a
+turn, which a mount that was not declared gives, and a stretch of its axes, which a calibration gives. The ninth, a gain
+that all axes share, looks like mass.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.people import parameter_jacobian
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.full_fit import FullFit, Rows
+from steelyard.spatial import Rotation, cross_matrix
+
+# A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many
+# standard deviations from none and leave so much less of the squared residual.
+TURN, UNLIKE, SURE = np.radians(1.0), 0.015, 8.0
+TURN_LEFT, UNLIKE_LEFT = 0.95, 0.99
+ELSEWHERE = {"base-tilted", "weight-compensated", "wrench-unexplained"}
+# The turn is linearised anew until it changes by less [rad].
+ROUNDS, SETTLED = 5, 1e-5
+_FEWEST_ROWS = 8
+
+
+@dataclass(frozen=True, eq=False)
+class SensorMatrix:
+    """How the sensor turns and stretches what is felt, with standard deviations by leaving out stretches of the log.
+
+    turn, turn_std        (3,) [rad] of the wrench about the axes of S
+    stretch, stretch_std  (3, 3) of the force, symmetric and without a trace: gains of the axes beside their mean
+    left                  squared residual beside that of a sensor without either
+    moved                 (4,) what mass [kg] and centre of mass [m] are less with it
+    """
+
+    turn: Array
+    turn_std: Array
+    stretch: Array
+    stretch_std: Array
+    left: float
+    moved: Array
+
+
+# Symmetric matrices (5, 3, 3) without a trace, which add up to any.
+_STRETCHES = np.array(
+    [
+        [[1, 0, 0], [0, 0, 0], [0, 0, -1]],
+        [[0, 0, 0], [0, 1, 0], [0, 0, -1]],
+        [[0, 1, 0], [1, 0, 0], [0, 0, 0]],
+        [[0, 0, 1], [0, 0, 0], [1, 0, 0]],
+        [[0, 0, 0], [0, 0, 1], [0, 1, 0]],
+    ],
+    np.float64,
+)
+
+
+def sensor_matrix(log: MotionLog) -> SensorMatrix | None:
+    """Return what the wrench says of the sensor; None for too short a log or channels that do not measure."""
+    if len(log) < _FEWEST_ROWS or log.dead.any():
+        return None
+    rows, _ = Rows.of(log)
+    plain, turn = rows.solve(), Rotation.identity()
+    phi, values = plain.solution[:10], rows.values
+    for _ in range(ROUNDS):
+        felt = rows.columns[:, :, :10] @ phi
+        right = replace(rows, values=_rotated(turn.inverse(), values))
+        fit = right.solve(np.concatenate([_turned(felt), _stretched(felt)], 2), jackknife=True)
+        turn, phi = turn @ Rotation.exp(fit.solution[16:19]), fit.solution[:10]
+        if np.linalg.norm(fit.solution[16:19]) < SETTLED:
+            break
+    stretch = np.tensordot(fit.solution[19:], _STRETCHES, 1)
+    spread = np.sqrt(np.tensordot(fit.spread[19:] ** 2, _STRETCHES**2, 1))
+    left = fit.left / plain.left if plain.left else 1.0
+    return SensorMatrix(turn.log(), fit.spread[16:19], stretch, spread, left, _people(plain) - _people(fit))
+
+
+def _rotated(turn: Rotation, wrench: Array) -> Array:
+    """Return wrenches (N, 6), forces and torques turned."""
+    return turn.apply(wrench.reshape(-1, 3)).reshape(-1, 6)
+
+
+def _turned(felt: Array) -> Array:
+    """Return what a small turn about each axis adds to wrenches (N, 6), (N, 6, 3)."""
+    return np.concatenate([-cross_matrix(felt[:, :3]), -cross_matrix(felt[:, 3:])], 1)
+
+
+def _stretched(felt: Array) -> Array:
+    """Return what each stretch adds to wrenches (N, 6), (N, 6, 5)."""
+    force = np.einsum("kij,nj->nik", _STRETCHES, felt[:, 3:])
+    return np.concatenate([np.zeros_like(force), force], 1)
+
+
+def _people(fit: FullFit) -> Array:
+    return np.concatenate([fit.solution[:1], fit.solution[1:4] / fit.solution[0]])
+
+
+def examine_sensor(
+    log: MotionLog, recording: Recording, estimate: Estimate, known: tuple[Finding, ...]
+) -> tuple[Estimate, tuple[Finding, ...]]:
+    """Return `sensor-turned` or `gains-differ` where the wrench shows them, and the estimate with bars that hold them.
+
+    known  what was found before: a tilted base or a wrench that nothing explains is not looked at again
+    """
+    stream = next((s for s in recording.streams if "force" in s.channels), None)
+    if stream is None or "W" in stream.frames.values() or {f.code for f in known} & ELSEWHERE:
+        return estimate, ()
+    found = sensor_matrix(log)
+    if found is None:
+        return estimate, ()
+    turned = _sure(found.turn, found.turn_std, TURN, found.left < TURN_LEFT)
+    unlike = _sure(found.stretch, found.stretch_std, UNLIKE, found.left < UNLIKE_LEFT)
+    findings = (*_turn(found, stream) * turned, *_gains(found) * unlike)
+    return (_widened(estimate, found), findings) if findings else (estimate, ())
+
+
+def _sure(value: Array, std: Array, least: float, better: bool) -> bool:
+    """Whether a number is large and so many standard deviations from none, and the log is fitted better with them."""
+    return better and bool(((np.abs(value) > least) & (np.abs(value) > SURE * std)).any())
+
+
+def _turn(found: SensorMatrix, stream: Stream) -> tuple[Finding, ...]:
+    given = stream.mount.rotation if stream.mount is not None else None
+    right = Rotation.exp(-found.turn) if given is None else Rotation.exp(-found.turn) @ given
+    numbers = ", ".join(f"{v:.4f}" for v in right.log() + 0.0)
+    size, spread = np.linalg.norm(found.turn), np.linalg.norm(found.turn_std)
+    message = (
+        f"The wrench is turned by {np.degrees(size):.2g} ± {np.degrees(spread):.1g} degrees against what a body gives "
+        f"in these poses: '{stream.name}' looks mounted by the rotation vector ({numbers}) rad in S. The answer takes "
+        "S as it was given; its bars hold what that changes."
+    )
+    return (Finding.of("sensor-turned", message),)
+
+
+def _gains(found: SensorMatrix) -> tuple[Finding, ...]:
+    gains, axes = np.linalg.eigh(found.stretch)
+    along = [", ".join(f"{v:.2f}" for v in axis * np.sign(axis[np.abs(axis).argmax()]) + 0.0) for axis in axes.T]
+    message = (
+        f"Forces along ({along[2]}) of S read {100 * (gains[2] - gains[0]):.2g} % more than along ({along[0]}), "
+        "whatever is held: gains of the sensor's axes differ, or one leaks into another. Error bars hold this, and a "
+        "common gain as large, which looks like mass."
+    )
+    return (Finding.of("gains-differ", message),)
+
+
+def _widened(estimate: Estimate, found: SensorMatrix) -> Estimate:
+    """Return the estimate with bars that hold what the sensor's matrix moves mass and centre by, and a common gain."""
+    phi = estimate.parameters.vector
+    moved = parameter_jacobian(phi)[:, :4] @ found.moved
+    # Three gains with this spread have a mean that is known no better; of torques as of forces, which alone show mass.
+    gain = np.sqrt(np.square(found.stretch).sum() / 2 / 3)
+    of_force, of_torque = gain * np.eye(10)[0] * phi[0], gain * np.append(0.0, phi[1:])
+    more = sum(np.outer(v, v) for v in (moved, of_force, of_torque))
+    return replace(estimate, covariance=estimate.covariance + more)

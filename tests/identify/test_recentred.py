@@ -1,0 +1,101 @@
+"""Mass and centre follow the log where shape and grasp are uncertain: against dense matrices, and on made logs."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard.identify.effective import Effective
+from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.people import people_jacobian
+from steelyard.identify.recentred import recentred
+from steelyard.identify.shape_error import MEASURED, ShapeError
+from steelyard.inertia import InertialParameters, solids
+from steelyard.parts.parts import Parts
+from steelyard.simulate.handling import handling_log
+from steelyard.spatial import Pose, Rotation
+
+BODY = solids.box(0.1, 0.06, 0.04, 0.8).in_frame(Pose(Rotation.exp([0.1, 0.4, 0.2]), np.array([0.02, -0.03, 0.15])))
+GRASP = ShapeError(grasp_m=0.003, grasp_rad=0.03, com_m=1e-4, inertia_share=3e-3)
+
+DENSITIES = np.array([700.0, 7800.0, 1100.0])
+HAMMER = Parts(
+    np.arange(3),
+    np.stack(
+        [
+            solids.box(*size, 1.0).in_frame(Pose(Rotation.identity(), np.array(centre))).vector
+            for size, centre in (
+                ([0.03, 0.03, 0.22], [0, 0, 0.15]),
+                ([0.12, 0.04, 0.04], [0.01, 0, 0.28]),
+                ([0.035, 0.035, 0.05], [0, 0, 0.03]),
+            )
+        ]
+    ),
+)
+
+
+def told(truth: InertialParameters, std: float) -> Effective:
+    """Return a log that knows mass, centre and inertia to a multiple `std` of sizes natural for a hand tool."""
+    people = people_jacobian(truth.vector)
+    sizes = std * np.array([0.1, *[0.01] * 3, *[1e-4] * 6])
+    information = people.T @ np.diag(1 / sizes**2) @ people
+    return Effective(information, information @ truth.vector, np.zeros(0), np.zeros((0, 10)))
+
+
+def shifted(by: float) -> InertialParameters:
+    return InertialParameters.from_com(float(BODY.mass), BODY.com + by * np.array([1, -1, 0.5]), BODY.inertia_com)
+
+
+def test_a_precise_log_decides_and_a_vague_one_does_not() -> None:
+    truth, error = shifted(0.005), GRASP.with_grasp(BODY)
+    near = recentred(told(truth, 1e-3), BODY, error)
+    np.testing.assert_allclose(near.body.com, truth.com, atol=2e-5)
+    assert (
+        np.sqrt(np.diag(people_jacobian(BODY.vector) @ near.error @ people_jacobian(BODY.vector).T))[1:4].max() < 2e-5
+    )
+    far = recentred(told(truth, 1e3), BODY, error)
+    np.testing.assert_allclose(far.body.com, BODY.com, atol=1e-7)
+    np.testing.assert_allclose(far.error, error, atol=1e-5 * np.abs(error).max())
+    np.testing.assert_allclose(near.body.inertia_com, BODY.inertia_com)
+
+
+def test_it_is_the_conditional_mean_of_mass_and_centre() -> None:
+    """e ~ N(0, G) and a log of mass and centre with covariance P: mean and covariance of e given both."""
+    data, error = told(shifted(0.002), 0.3), GRASP.with_grasp(BODY) + 1e-6 * np.diag([1, *[0] * 9])
+    people = people_jacobian(BODY.vector)[:4]
+    P = (people @ np.linalg.inv(data.information) @ people.T)[:4, :4]
+    G = people @ error @ people.T
+    gain = G @ np.linalg.inv(G + P)
+    found = recentred(data, BODY, error)
+    moved = np.append(found.body.mass - BODY.mass, found.body.com - BODY.com)
+    np.testing.assert_allclose(moved, gain @ people @ (data.best - BODY.vector), rtol=1e-6, atol=1e-12)
+    np.testing.assert_allclose(people @ found.error @ people.T, G - gain @ G, rtol=1e-6, atol=1e-14)
+    assert np.linalg.eigvalsh(found.error).min() > -1e-12 * np.abs(found.error).max()
+
+
+def test_its_slope_is_that_of_the_move() -> None:
+    data, error = told(shifted(0.002), 0.3), GRASP.with_grasp(BODY)
+    step = 1e-4 * data.pull
+    there = recentred(replace(data, pull=data.pull + step), BODY, error).body
+    here = recentred(data, BODY, error)
+    np.testing.assert_allclose(there.vector - here.body.vector, here.gain @ step, rtol=1e-2, atol=1e-9)
+
+
+@pytest.mark.parametrize(("metres", "degrees"), [(5e-4, 0.3), (3e-3, 2.0)])
+@pytest.mark.parametrize("noise", ["low", "high"])
+def test_an_uncertain_grasp_leaves_the_centre_to_the_log(metres: float, degrees: float, noise: str) -> None:
+    parts, rng = HAMMER, np.random.default_rng(0)
+    given = replace(MEASURED, grasp_m=metres, grasp_rad=np.radians(degrees))
+    score, error, alone = [], [], []
+    for seed in range(8):
+        X = Pose(Rotation.exp(rng.normal(size=3) * given.grasp_rad), rng.normal(size=3) * metres)
+        truth = parts.whole(parts.volume * DENSITIES).in_frame(X)
+        log = handling_log(truth, "paper", noise=noise, seed=seed)
+        found = PartMasses(parts, bias="none", shape_error=given).identify(log)
+        score.append((found.com - truth.com) / found.std[1:4])
+        error.append(np.linalg.norm(found.com - truth.com))
+        alone.append(np.linalg.norm(parts.whole(parts.volume * DENSITIES).com - truth.com))
+    assert np.sqrt(np.mean(np.square(score))) < 1.5
+    assert np.median(error) < 0.5 * np.median(alone)

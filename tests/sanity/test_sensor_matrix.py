@@ -1,0 +1,122 @@
+"""What only the sensor can do to a wrench: a turn that no mount says, gains that differ by axis."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard.identify.estimate import Estimate
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Mount, Recording
+from steelyard.pipelines.held_object import identify
+from steelyard.sanity.sensor_matrix import SURE, sensor_matrix
+from steelyard.simulate import hammer
+from steelyard.simulate.logs import simulate_log
+from steelyard.spatial import Rotation
+
+TURN = np.radians([1.0, -1.0, 1.5])
+
+
+@pytest.fixture(scope="module")
+def recording() -> Recording:
+    return hammer.recording(0).recording
+
+
+@pytest.fixture(scope="module")
+def answer(recording: Recording) -> Estimate:
+    return identify(recording)
+
+
+def misread(recording: Recording, turn: np.ndarray, gains: tuple[float, ...] = (1, 1, 1)) -> Recording:
+    """Return the recording of a sensor that is turned and whose forces have these gains."""
+    R = Rotation.exp(turn).matrix
+
+    def felt(quantity: str, values: np.ndarray) -> np.ndarray:
+        if quantity not in ("force", "torque"):
+            return values
+        return np.asarray((values * gains if quantity == "force" else values) @ R.T)
+
+    streams = (replace(s, channels={q: felt(q, v) for q, v in s.channels.items()}) for s in recording.streams)
+    return replace(recording, streams=tuple(streams))
+
+
+def off(found: Estimate, right: Estimate) -> float:
+    """Return how many standard deviations mass and centre of mass are off at most."""
+    gap = np.append(found.mass - right.mass, found.com - right.com)
+    return float(np.abs(gap / found.std[:4]).max())
+
+
+def made(motion: str, noise: str, seed: int, turn: np.ndarray, gains: tuple[float, ...] = (1, 1, 1)) -> MotionLog:
+    log, _ = simulate_log("drill", motion, noise, seed, shuffled=False)
+    R = Rotation.exp(turn).matrix
+    return replace(log, wrench=np.hstack([log.wrench[:, :3] @ R.T, log.wrench[:, 3:] * gains @ R.T]))
+
+
+@pytest.mark.parametrize("motion", ["stop_go", "dyn_slow", "dyn_fast"])
+@pytest.mark.parametrize("noise", ["low", "moderate", "high"])
+@pytest.mark.parametrize("seed", range(3))
+def test_a_good_sensor_shows_nothing(motion: str, noise: str, seed: int) -> None:
+    found = sensor_matrix(made(motion, noise, seed, np.zeros(3)))
+    assert (np.abs(found.turn) < SURE * found.turn_std).all()
+    assert (np.abs(found.stretch) <= SURE * found.stretch_std).all()
+
+
+@pytest.mark.parametrize(("motion", "noise"), [("stop_go", "high"), ("dyn_slow", "low"), ("dyn_fast", "moderate")])
+def test_turn_and_gains_are_measured(motion: str, noise: str) -> None:
+    turned = sensor_matrix(made(motion, noise, 0, TURN))
+    np.testing.assert_allclose(turned.turn, TURN, atol=np.radians(0.25))
+    stretched = sensor_matrix(made(motion, noise, 0, np.zeros(3), (1.03, 1.0, 1.0)))
+    np.testing.assert_allclose(np.diag(stretched.stretch), [0.02, -0.01, -0.01], atol=0.005)
+
+
+@pytest.mark.parametrize("turn", [TURN, np.radians([0.0, 8.0, 0.0])])
+def test_a_turned_sensor_is_told_though_it_disturbs_delays(
+    recording: Recording, answer: Estimate, turn: np.ndarray
+) -> None:
+    found = identify(misread(recording, turn))
+    (finding,) = (f for f in found.findings if f.code == "sensor-turned")
+    assert off(found, answer) < 3
+    said = float(finding.message.split(" turned by ")[1].split(" ±")[0])
+    assert said == pytest.approx(np.degrees(np.linalg.norm(turn)), rel=0.1)
+
+
+@pytest.mark.parametrize("turn", np.radians([[0.0, 0.0, 2.0], [3.0, 0.0, 4.0]]))
+def test_a_turned_sensor_is_told_with_the_mount_that_mends_it(
+    recording: Recording, answer: Estimate, turn: np.ndarray
+) -> None:
+    assert not answer.codes() & {"sensor-turned", "gains-differ"}
+    wrong = misread(recording, turn)
+    found = identify(wrong)
+    (finding,) = (f for f in found.findings if f.code == "sensor-turned")
+    assert off(found, answer) < 3
+    vector = [float(v) for v in re.search(r"rotation vector \((.*?)\) rad", finding.message)[1].split(",")]
+    np.testing.assert_allclose(vector, -turn, atol=np.radians(0.2))
+    mounted = (replace(s, mount=Mount(Rotation.exp(vector))) if "force" in s.channels else s for s in wrong.streams)
+    mended = identify(replace(wrong, streams=tuple(mounted)))
+    assert mended.codes() == answer.codes()
+    assert off(mended, answer) < 4
+
+
+def test_a_mount_that_is_wrong_is_given_anew(recording: Recording) -> None:
+    given = Rotation.exp(np.radians([0.0, 0.0, 3.0]))
+    streams = (replace(s, mount=Mount(given)) if "force" in s.channels else s for s in recording.streams)
+    found = identify(replace(recording, streams=tuple(streams)))
+    (finding,) = (f for f in found.findings if f.code == "sensor-turned")
+    vector = [float(v) for v in re.search(r"rotation vector \((.*?)\) rad", finding.message)[1].split(",")]
+    np.testing.assert_allclose(vector, 0, atol=np.radians(0.2))
+
+
+@pytest.mark.parametrize("gains", [(1.03, 1.0, 1.0), (1.0, 1.0, 1.05), (1.0, 0.96, 1.0)])
+def test_gains_that_differ_are_told_and_in_the_bars(
+    recording: Recording, answer: Estimate, gains: tuple[float, ...]
+) -> None:
+    found = identify(misread(recording, np.zeros(3), gains))
+    assert "gains-differ" in found.codes()
+    assert "sensor-turned" not in found.codes()
+    assert off(found, answer) < 2.5
+    (finding,) = (f for f in found.findings if f.code == "gains-differ")
+    said = float(finding.message.split(" read ")[1].split(" %")[0])
+    assert said == pytest.approx(100 * (max(gains) - min(gains)), rel=0.15)
