@@ -49,13 +49,18 @@ def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
     if max(map(abs, lags.values()), default=0.0) < NEAR_S:
         return log, team, {}
     try:
-        moved = log.with_recordings(*(_punctual(recording, lags) for recording in log.recordings))
+        moved = begun_from(log, lags)
         again = of(moved)
     except (BadValue, CannotAnswer, np.linalg.LinAlgError):
         return log, team, {}
     if float(np.log(team.fit.noise / again.fit.noise).sum()) < np.log(BETTER):
         return log, team, {}
     return moved, again, lags
+
+
+def begun_from(log: TeamLog, lags: Mapping[str, float]) -> TeamLog:
+    """Return the log with every robot's stamps moved by the seconds that they are late; others are punctual."""
+    return log.with_recordings(*(_punctual(recording, lags) for recording in log.recordings))
 
 
 def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:

@@ -11,9 +11,9 @@ from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import exp
+from steelyard.team.bias_models import SHOWN
 from steelyard.team.estimate import BodyEstimate, TeamEstimate
 from steelyard.team.hinged_rows import COUNT, EXCHANGED, SECOND, SEVEN, WHOLE
-from steelyard.team.payload_fit import SHOWN
 
 # Seven parameters of the whole in its ten: first moments across the hinge, second moments of mass, products.
 FROM_TEN = np.zeros((SECOND, WHOLE))

@@ -13,9 +13,8 @@ from itertools import pairwise
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, ladder_shares, shown_of, without_gain
 from steelyard.team.hinged_rows import BIAS, COUNT, Bands, Sums, noisy
-from steelyard.team.payload_fit import BIAS as BIAS_LADDER
-from steelyard.team.payload_fit import GAIN, Models, ladder_shares, shown_of
 from steelyard.team.payload_model import ROUNDING, Normal
 
 ROUNDS = 12
@@ -37,6 +36,7 @@ class HingedPayload:
     """Parameters (17,) in H with covariance (17, 17), and how they came about.
 
     lost      directions (17, L) in units of `scale` that the rows do not show
+    gainless  share of the evidence that gains do not err
     kept      (17, 17) inverse information in the directions that they do
     """
 
@@ -47,6 +47,7 @@ class HingedPayload:
     kept: Array
     condition: float
     gain: float
+    gainless: float
     chi2: float
     kinds: tuple[Kind, ...]
     weights: tuple[Array, ...]
@@ -86,7 +87,8 @@ def fit_hinged_payload(
     axes  (6 N,) noise of every push in units of a force axis': 1, `size` for moments of six-axis wrists, else 0
     size  of the team [m]
     """
-    ladder = np.array([(b, g) for b in BIAS_LADDER for g in (GAIN if with_gain else GAIN[:1])])
+    # Biases are those of every recording alone here: one that lasts for the session is asked of rigid payloads only.
+    ladder = ladder_of(1, with_gain)
     unit = sums.seven * axes
     V = unit @ unit.T
     V[range(7), range(7)] += 1e-6 * np.diag(V)
@@ -103,9 +105,10 @@ def fit_hinged_payload(
         phi, best = weight @ models.phi, int(np.argmax(weight))
         if number == 0:
             scale = _units(max(abs(float(phi[0])), 1e-3), size)
+        beside = models.recordings(best)
         starts = np.cumsum([0, *(len(kind.parts) for kind in kinds)])
         renewed = tuple(
-            _judged(kind, W, V, models, best, int(s)) for kind, W, s in zip(kinds, weights, starts[:-1], strict=True)
+            _judged(kind, W, V, beside, int(s)) for kind, W, s in zip(kinds, weights, starts[:-1], strict=True)
         )
         change = max(float(np.abs(np.log(n.force / k.force)).max()) for n, k in zip(renewed, kinds, strict=True))
         # Weights and kinds that are told belong together, however it ends.
@@ -120,10 +123,10 @@ def fit_hinged_payload(
     root = scale[:, None] * vectors[:, shown]
     rows = 7 * sum(float(p.rows.sum()) for k in kinds for p in k.parts)
     condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
-    blind = tuple(tuple(models.blind[best, a:b]) for a, b in pairwise(starts))
+    blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
     return HingedPayload(
         phi, covariance, vectors[:, ~shown], scale, (root / values[shown]) @ root.T,
-        condition, float(np.sqrt(weight @ ladder[:, 1] ** 2)),
+        condition, gain_spread(weight, ladder), without_gain(weight, ladder),
         float(models.chi2[best]) / max(rows - COUNT, 1.0), kinds, weights, blind, sums,
     )  # fmt: skip
 
@@ -152,15 +155,15 @@ def _normal(part: Bands, kind: Kind, W: Array, sums: Sums, started: bool) -> Nor
         if started:
             noise += rows * np.einsum("ijp,ik,jl,klq->pq", N, weight, motion, N, optimize=True)
     each = np.concatenate([sums.first, sums.second]) * (_forces(sums) * part.mean)
-    return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each @ each.T)
+    return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each)
 
 
-def _judged(kind: Kind, W: Array, V: Array, models: Models, best: int, start: int) -> Kind:
+def _judged(kind: Kind, W: Array, V: Array, beside: Recordings, start: int) -> Kind:
     """Return the kind with the noise of force axes renewed: one step of expectation maximisation per band."""
     seen, size = np.zeros(len(kind.force)), np.zeros(len(kind.force))
-    phi = models.phi[best]
+    phi = beside.phi
     for k, part in enumerate(kind.parts):
-        solution, doubt = models.solution(best, start + k), models.doubt(best, start + k)
+        solution, doubt = beside.solution(start + k), beside.doubt(start + k)
         values, vectors = np.linalg.eigh(doubt)
         factor = vectors * np.sqrt(np.maximum(values, 0.0))
         for band, z in enumerate(part.z):

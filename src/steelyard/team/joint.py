@@ -28,6 +28,9 @@ from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
 from steelyard.team.hinged_team import identify_two_bodies
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
+from steelyard.team.misread_forces import with_one_reading
+from steelyard.team.misread_poses import require_well_read
+from steelyard.team.misread_twists import require_one_velocity_unit
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
@@ -73,12 +76,14 @@ class JointTeam:
         self._require_wrists(log)
         if needs_twists(log):
             log, moving, begun = self._fitted(log, TwistTeam.of)
+            if moving.rough:
+                require_one_velocity_unit(log, moving)
             grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
             left = moving.fit.left
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
-            log, standing, begun = self._fitted(log, PoseTeam.of)
+            log, standing, begun = self._standing(log)
             grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
             late, order, left = _against(standing.late, log.reference), 2, standing.fit.left
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
@@ -86,6 +91,7 @@ class JointTeam:
             if jointed is not None:
                 return jointed
             if standing.rough:
+                require_well_read(log)
                 require_own_files(log)
             found = [*standing.findings, *rigidity_findings(split, log.names)]
             made, path = standing.rows(log, self.highest_hz)
@@ -93,21 +99,31 @@ class JointTeam:
         placed = balance_frame(grasps).inverse() @ grasps
         require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)
-        D, turned = with_one_sign(groups, summing(placed), log.names)
+        groups, read, judged = with_one_reading(groups, summing(placed), log.names)
+        D, turned = with_one_sign(groups, summing(placed), log.names, judged)
         size = team_size(grasps, spread)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
         _require_one_clock(payload.chi2)
         team = _without_wrists(assembled(log, grasps, spread, payload, D, _added(late, begun)), self.wrists)
         found += [
+            *(finding for finding in read if not (turned and finding.code == "wrench-unexplained")),
             *turned,
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *bad_robots(log.names, noise),
-            *gains(payload.gain),
+            *gains(payload.gain, payload.gainless),
             *open_parameters(team.identified, team.evidence.rank),
         ]
         return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
+
+    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, dict[str, float]]:
+        """Return log, fit of poses and clocks like `_fitted`; raises BadValue where one robot's poses are misread."""
+        try:
+            return self._fitted(log, PoseTeam.of)
+        except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+            require_well_read(log)
+            raise
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, dict[str, float]]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""
@@ -136,7 +152,7 @@ class JointTeam:
             *team.findings,
             *(finding for finding in standing if finding.code in ("robot-left", "robot-joined")),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
-            *gains(payload.gain),
+            *gains(payload.gain, payload.gainless),
             *open_parameters(team.identified, team.evidence.rank, COUNT),
         ]
         return replace(team, findings=tuple(found))

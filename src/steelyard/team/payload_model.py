@@ -1,9 +1,10 @@
 """The wrench equation of a team with everything that is not the payload: force bias and gain of every recording.
 
 Of recording r, at every row, D s - L(phi) x = b_r + noise: s what the robots say they push, D its sum at B, x the
-motion. The bias b_r is that of every force axis ~ N(0, s_b^2), and the error of its gain ~ N(0, s_g^2) times the mean
-force on it; it is integrated out, so that what it hides is not pretended. Gains are not fitted as factors of the
-measured force: noise would then explain itself.
+motion. The bias b_r is that of every force axis, c ~ N(0, s_c^2) all session long and d_r ~ N(0, s_b^2) of the
+recording, and the error of its gain ~ N(0, s_g^2), lasting or drawn anew, times the mean force on it. It is integrated
+out, so that what it hides is not pretended. Constant biases sum to six numbers, since grasps do not move in the
+payload. Gains are not fitted as factors of the measured force: noise would then explain itself.
 """
 
 from __future__ import annotations
@@ -46,14 +47,14 @@ class Normal:
     """Normal equations of one recording in [phi (10), bias (6)].
 
     H, g      of what was measured          noise  (10, 10) what the motion's noise adds to H on average
-    constant  the weighted square of the wrench     pulled  (6, 6) bias per squared gain
+    constant  the weighted square of the wrench     pulls  (6, 3 N) bias per gain of every force axis
     """
 
     H: Array
     g: Array
     noise: Array
     constant: float
-    pulled: Array
+    pulls: Array
 
 
 def gain_columns(D: Array) -> tuple[Integers, Array]:
@@ -93,7 +94,7 @@ def normal(part: Spectra, D: Array, W: Array, motion_noise: Array) -> Normal:
     force, unit = gain_columns(D)
     total = S.sum(0)
     mean = total[12 + force, -1] / max(float(total[-1, -1]), 1e-300)
-    return Normal(H, g, noise, constant, (unit * mean**2) @ unit.T)
+    return Normal(H, g, noise, constant, unit * mean)
 
 
 def residual_scatter(part: Spectra, D: Array, solution: Array, covariance: Array) -> Array:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -144,7 +145,7 @@ class PoseTeam:
         noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
         return found.renewed(apart, raw.seen[:, found.slip.robot], raw, noise)
 
-    @property
+    @cached_property
     def rough(self) -> bool:
         """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
         path = self.fit.team.motion

@@ -19,16 +19,19 @@ from steelyard.team.payload_model import Group
 FALLS = 4.0
 
 
-def with_one_sign(groups: Sequence[Group], D: Array, names: Sequence[str]) -> tuple[Array, tuple[Finding, ...]]:
+def with_one_sign(
+    groups: Sequence[Group], D: Array, names: Sequence[str], judged: bool = True
+) -> tuple[Array, tuple[Finding, ...]]:
     """Return D (6, 6 N), the sum of pushes at B, with a robot's sign turned where its forces ask for it, and why.
 
-    Raises CannotAnswer where the forces of all then pull the payload down.
+    Signs are left as they are unless they are to be `judged`. Raises CannotAnswer where the forces of all then pull the
+    payload down.
     """
     total = [part.scatter.sum(0) for group in groups for part in group.parts]
     forces = D[3:].reshape(3, -1, 6)
     lifted = np.sum([np.einsum("aix,ixa->i", forces, S[12:-1, 3:6].reshape(-1, 6, 3)) for S in total], axis=0)
     each = np.sum([_beside_one_another(S, forces) for S in total], axis=0)
-    wrong, found = odd_one_out(each, lifted, names)
+    wrong, found = odd_one_out(each, lifted, names) if judged else (None, ())
     if wrong is not None:
         D, lifted = D.copy(), lifted.copy()
         D[:, 6 * wrong : 6 * wrong + 6] *= -1
@@ -48,8 +51,13 @@ def odd_one_out(each: Array, lifted: Array, names: Sequence[str]) -> tuple[int |
         return None, ()
     # Of two robots each asks for it: it is the one that pulls down.
     wrong = int(asking[np.argmin(lifted[asking])])
-    text = f"What '{names[wrong]}' and the others push against one another cancels only with its sign turned; it was."
-    return wrong, (Finding.of("wrench-sign-flipped", text),)
+    return wrong, (sign_finding(names[wrong]),)
+
+
+def sign_finding(name: str) -> Finding:
+    """Return the finding of a robot whose forces had the other sign."""
+    text = f"What '{name}' and the others push against one another cancels only with its sign turned; it was."
+    return Finding.of("wrench-sign-flipped", text)
 
 
 def _beside_one_another(S: Array, forces: Array) -> Array:

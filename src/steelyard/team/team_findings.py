@@ -18,6 +18,8 @@ LATE_S, LATE_STD = 1e-3, 3.0
 BAD = 20.0
 # A gain error is worth a word from this share.
 GAIN = 3e-3
+# And only where so little of the evidence is left for gains without error: a chance draw is no sign of one.
+GAINLESS = 0.1
 # A direction is called by an axis where it is within this cosine of it.
 ALONG = 0.9
 # Steps [standard deviations] that a fit may leave untaken without a word.
@@ -101,9 +103,9 @@ def bad_robots(names: Sequence[str], noise: Array) -> Iterator[Finding]:
             )
 
 
-def gains(gain: float) -> Iterator[Finding]:
-    """Yield common-gain-unseen where the recordings show that force gains err."""
-    if gain > GAIN:
+def gains(gain: float, gainless: float) -> Iterator[Finding]:
+    """Yield common-gain-unseen where the recordings speak against gains without error (`gainless`, their share)."""
+    if gain > GAIN and gainless < GAINLESS:
         yield Finding.of(
             "common-gain-unseen",
             f"Force gains err by about {100 * gain:.1f} % from axis to axis; an error that all robots share would look "

@@ -56,6 +56,14 @@ class TwistTeam:
         size = np.sqrt(square.reshape(2, 3).sum(1) / (3 * rows))
         return bool((self.fit.noise > LOUD * size).any())
 
+    @property
+    def share(self) -> Array:
+        """Noise (N, 2) as a share of each robot's twists (rms), turning and moving."""
+        square = sum((part.twist**2 * part.seen[..., None]).sum(0).reshape(-1, 2, 3).sum(2) for part in self.parts)
+        rows = sum(part.seen.sum(0) for part in self.parts)
+        size = np.sqrt(square / (3 * np.maximum(rows, 1))[:, None])
+        return np.asarray(self.fit.noise / np.maximum(size, 1e-300))
+
     def down(self) -> Array | None:
         """Return the mean direction of gravity (3,) in R, None where nobody can tell it."""
         told = [(_down(part, self.fit.grasps)) for part in self.parts]

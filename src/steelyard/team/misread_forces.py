@@ -1,0 +1,272 @@
+"""One robot whose forces are in another unit, or whose axes have another order or other signs than they should.
+
+Read rightly, what robots push against one another cancels, and what is left carries one body. Of one robot at a time
+every reading is tried on sums of products that are there already: a factor times a signed permutation X of its axes
+changes the sum of forces by R (X - 1) f. What a mass and a first moment that move as the grasps do leave of the sum
+must fall with biases left out of it, and with forces taken to be free of bias: either alone misses what the other sees.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.identify.regressor import basis
+from steelyard.logs.log import Integers
+from steelyard.team.payload_model import Group
+from steelyard.team.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
+from steelyard.team.signs import sign_finding
+
+# Both variances that are left must together, on average, fall by this factor each.
+FALLS = 4.0
+# What is left, biases and all, must be below this share of the variance of all forces: gains of 10 % leave less.
+MISSES = 0.01
+# A reading is clear where the next best leaves so many times as much of both together.
+CLEAR = 2.0
+# What is no motion's must not rise by more than this factor: else motion or gravity are wrong, not forces.
+RISES = 2.0
+# A robot is named without a reading where more than this share is left as given.
+UNFIT = 0.02
+# Lengths that a turn leaves as they are, to within this factor.
+LIKE_A_TURN = 1.25
+# Share of the variance of forces that is rounding.
+ROUNDING = 1e-18
+# What each reading changes (R, 9).
+CHANGES = (READINGS - np.eye(3)).reshape(len(READINGS), 9)
+
+
+@dataclass(frozen=True, eq=False)
+class _Left:
+    """What one body leaves of the sum of forces, and how that changes with each robot's reading in its own axes.
+
+    variance  as given     slope  (N, 9)     curvature  (N, 9, 9)     size  (N,) of what each robot pushes
+    """
+
+    variance: float
+    slope: Array
+    curvature: Array
+    size: Array
+
+    @property
+    def misfit(self) -> float:
+        """Share of all forces that is left as given."""
+        return self.variance / max(float(self.size.sum()), 1e-300)
+
+    def any_map(self) -> tuple[Array, Array]:
+        """Return the least (N,) that any linear map of each robot's force leaves, and that map (N, 3, 3)."""
+        change = -np.stack([_inverse(Q) @ g for Q, g in zip(self.curvature, self.slope, strict=True)])
+        return self.variance + (self.slope * change).sum(1), np.eye(3) + change.reshape(-1, 3, 3)
+
+    def shares(self) -> tuple[Array, Array]:
+        """Return what each reading (N, R) leaves against what is left as given, and its share of all forces likewise.
+
+        The share is the same where all forces are made larger alike.
+        """
+        left = self.variance + 2 * self.slope @ CHANGES.T
+        left += ((CHANGES @ self.curvature) * CHANGES).sum(-1)
+        all_forces = self.size.sum() + (FACTORS**2 - 1) * self.size[:, None]
+        least = ROUNDING * float(self.size.sum())
+        ratio = np.maximum(left, least) / max(self.variance, least)
+        return ratio, ratio * self.size.sum() / np.maximum(all_forces, least)
+
+
+def with_one_reading(
+    groups: Sequence[Group], D: Array, names: Sequence[str]
+) -> tuple[tuple[Group, ...], tuple[Finding, ...], bool]:
+    """Return the groups with one robot's wrench read as it fits the others', why, and whether signs are left to judge.
+
+    D  (6, 6 N) sums the pushes at B
+    """
+    groups = tuple(groups)
+    S = _scatter(groups)
+    given = _left(S, D)
+    # Nothing fits better, and not much is left: so it is with most logs.
+    if not np.maximum(*given.shares()).min() < 1.0 and given.misfit < UNFIT:
+        return groups, (), True
+    both = (given, _left(_without_bias(groups), D))
+    shares = [one.shares() for one in both]
+    score = shares[0][1] * shares[1][1]
+    fallen = np.prod([np.maximum(*one) for one in shares], axis=0)
+    near = np.flatnonzero(score < CLEAR * score.min())
+    equal = [divmod(int(k), len(READINGS)) for k in near[np.argsort(score.flat[near])]]
+    robot, number = equal[0]
+    fits = min(fallen[one] for one in equal) < FALLS**-2 and given.misfit * shares[0][1][robot, number] < MISSES
+    if not fits or _unlike(groups, D, robot, READINGS[number]):
+        return groups, _odd_one(groups, D, names, both), True
+    if len(equal) > 1:
+        by_sign = any(k == SIGN for _, k in equal)
+        return groups, () if by_sign else (_undecided(equal, names),), by_sign
+    reading = _with_torque(S, D, robot, number)
+    read = tuple(_reread(group, robot, reading.wrench()) for group in groups)
+    return read, (_finding(names[robot], reading, score[robot, number]),), True
+
+
+def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequence[_Left]) -> tuple[Finding, ...]:
+    """Return the finding of a robot whose forces fit turned by some angle, though with no reading."""
+    if both[0].misfit < UNFIT:
+        return ()
+    any_map = [one.any_map() for one in both]
+    fallen = np.prod([left / max(one.variance, 1e-300) for one, (left, _) in zip(both, any_map, strict=True)], axis=0)
+    robot, *others = (int(i) for i in np.argsort(fallen))
+    X = any_map[0][1][robot]
+    fits = fallen[robot] < FALLS**-2 and any_map[0][0][robot] < MISSES * float(both[0].size.sum())
+    # A map that is no turn may stand for a large bias, or for gravity that is wrong.
+    u, sizes, v = np.linalg.svd(X)
+    turns = np.linalg.det(X) > 0 and sizes[-1] > 1 / LIKE_A_TURN and sizes[0] < LIKE_A_TURN
+    clear = fits and turns and fallen[others[0]] > CLEAR * fallen[robot]
+    if not clear or _unlike(groups, D, robot, X):
+        return ()
+    angle = np.degrees(np.arccos(np.clip((np.trace(u @ v) - 1) / 2, -1, 1)))
+    text = (
+        f"What '{names[robot]}' pushes fits neither the others nor one body, in no unit and no order of its axes, but "
+        f"would turned by about {angle:.0f} deg. Nothing was changed, and the answer is not to be trusted."
+    )
+    remedy = f"Check mount and frame of the wrench of '{names[robot]}', and units, order and signs of its columns."
+    return (Finding("wrench-unexplained", text, remedy),)
+
+
+def _scatter(groups: Sequence[Group]) -> Array:
+    """Return the scatter of all recordings and bands."""
+    return np.asarray(sum(part.scatter.sum(0) for group in groups for part in group.parts))
+
+
+def _without_bias(groups: Sequence[Group]) -> Array:
+    """Return the scatter with a constant left out of every motion, and one of all that is at rest."""
+    out = []
+    for group in groups:
+        each = [part.scatter.sum(0) for part in group.parts]
+        out += [_centred(S) for S in ([np.sum(each, axis=0)] if group.parts[0].still else each)]
+    return np.asarray(np.sum(out, axis=0))
+
+
+def _centred(S: Array) -> Array:
+    """Return a scatter with its constant left out."""
+    return S - np.outer(S[-1], S[-1]) / max(float(S[-1, -1]), 1e-300)
+
+
+def _left(S: Array, D: Array) -> _Left:
+    """Return what mass and first moment leave of the sum of forces."""
+    own, E = _forces(S), basis()[:4, 3:].reshape(12, 12)
+    total, count = D[3:, own - 12], len(own) // 3
+    both, seen = S[own[:, None], own], (E @ S[:12, own]).reshape(4, -1)
+    inverse = _inverse((E @ S[:12, :12]).reshape(4, 36) @ E.reshape(4, 36).T)
+    pushed, along = total @ both, seen @ total.ravel()
+    fitted = inverse @ along
+    slope = pushed - (fitted @ seen).reshape(3, -1)
+    variance = float((pushed * total).sum() - fitted @ along)
+    # In each robot's own axes.
+    back = np.moveaxis(total.reshape(3, count, 3), 0, 2)
+    mine = (back[:, None] @ np.moveaxis(seen.reshape(4, 3, count, 3), 2, 0)).reshape(count, 4, 9)
+    pairs = both.reshape(count, 3, count, 3)
+    blocks = pairs[range(count), :, range(count)]
+    curvature = np.zeros((count, 3, 3, 3, 3))
+    for axis in range(3):
+        curvature[:, axis, :, axis] = blocks
+    nine = curvature.reshape(count, 9, 9) - np.swapaxes(mine, 1, 2) @ inverse @ mine
+    sloped = back @ np.moveaxis(slope.reshape(3, count, 3), 1, 0)
+    return _Left(variance, sloped.reshape(count, 9), nine, np.trace(blocks, axis1=1, axis2=2))
+
+
+def _inverse(G: Array) -> Array:
+    """Return the pseudoinverse of normal equations, which may not show everything."""
+    values, axes = np.linalg.eigh(G)
+    kept = values > 1e-9 * values[-1]
+    return np.asarray((axes[:, kept] / values[kept]) @ axes[:, kept].T)
+
+
+def _forces(S: Array) -> Integers:
+    """Return which columns of a scatter are forces."""
+    pushes = np.arange(len(S) - 13)
+    return np.asarray(12 + pushes[pushes % 6 >= 3], dtype=np.int64)
+
+
+def _turned(S: Array, robot: int, wrench: Array) -> Array:
+    """Return scatters (..., Z, Z) with one robot's wrench mapped by (6, 6), or its force by (3, 3)."""
+    X, own = np.eye(S.shape[-1]), slice(18 + 6 * robot - len(wrench), 18 + 6 * robot)
+    X[own, own] = wrench
+    return np.asarray(X @ S @ X.T)
+
+
+def _reread(group: Group, robot: int, wrench: Array) -> Group:
+    parts = tuple(
+        replace(part, scatter=_turned(part.scatter, robot, wrench), judged=_turned(part.judged, robot, wrench))
+        for part in group.parts
+    )
+    return replace(group, parts=parts)
+
+
+def _unlike(groups: Sequence[Group], D: Array, robot: int, X: Array) -> bool:
+    """Return whether robots push more against one another with one's force mapped by X (3, 3) than as given.
+
+    What any motion whatever leaves of the sum of forces is judged, as for signs.
+    """
+    given, read = 0.0, 0.0
+    for group in groups:
+        S = _scatter([group])
+        turned = _turned(S, robot, X)
+        a, b = (_unexplained(D[3:], np.eye(12), one) for one in (S, turned))
+        given, read = given + a, read + b
+    return read > RISES * given
+
+
+def _unexplained(K: Array, E: Array, S: Array) -> float:
+    """Return what the motion and a constant leave of rows K (k, 6 N) of the pushes.
+
+    E  (p, k, 12) is what parameters make of the motion, or (12, 12): any motion explains any row
+    """
+    S = _centred(S)
+    pushed = K @ S[12:-1, 12:-1] @ K.T
+    seen = K @ S[12:-1, :12]
+    if E.ndim == 2:
+        return float(np.trace(pushed - seen @ _inverse(S[:12, :12]) @ seen.T))
+    G = np.einsum("pix,xy,qiy->pq", E, S[:12, :12], E, optimize=True)
+    along = np.tensordot(E, seen, ([1, 2], [0, 1]))
+    return float(np.trace(pushed) - along @ _inverse(G) @ along)
+
+
+def _with_torque(S: Array, D: Array, robot: int, number: int) -> Reading:
+    """Return the reading with that of the torque by which moments balance, as it is given where none is clear."""
+    given, *others = torques_beside(number)
+    own = slice(12 + 6 * robot, 15 + 6 * robot)
+    if not np.trace(S[own, own]) > 0:
+        axes = AXES[number % len(AXES)]
+        return Reading(number, axes if np.linalg.det(axes) > 0 else given.torque)
+    if number == SIGN:
+        return Reading(number, -given.torque)
+    E = basis()[1:, :3]
+    left = [_unexplained(D[:3], E, _turned(S, robot, one.wrench())) for one in (given, *others)]
+    best = int(np.argmin(left))
+    return (given, *others)[best] if CLEAR * left[best] < left[0] else given
+
+
+def _finding(name: str, reading: Reading, score: float) -> Finding:
+    """Return the finding of forces that were put right."""
+    if reading.number == SIGN:
+        return sign_finding(name)
+    text = (
+        f"What '{name}' and the others push carries one body, and cancels besides, only with its forces taken as "
+        f"{reading.words()}: that leaves {_percent(float(np.sqrt(score)))} of the variance that is left as given. "
+        "They were taken so."
+    )
+    return Finding("force-unit", text, reading.remedy(name))
+
+
+def _undecided(equal: Sequence[tuple[int, int]], names: Sequence[str]) -> Finding:
+    """Return the finding of forces that fit with more than one reading."""
+    who = list(dict.fromkeys(robot for robot, _ in equal))
+    robots = " or ".join(f"'{names[robot]}'" for robot in who)
+    ways = [f"those of '{names[robot]}' as {Reading(number, np.eye(3)).words()}" for robot, number in equal[:3]]
+    text = (
+        f"What robots push does not fit one body as given, and would with the forces of {robots} read otherwise: "
+        f"{'; or '.join(ways)}{' or in other ways' if len(equal) > 3 else ''}. Nothing was changed, and the answer is "
+        "not to be trusted."
+    )
+    return Finding("force-unit", text, f"Check unit, order, signs and frame of the force columns of {robots}.")
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"

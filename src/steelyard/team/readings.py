@@ -1,0 +1,106 @@
+"""How one robot's forces may have been read: a unit, times an order and signs of the axes; and what to say of it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import permutations, product
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.recording import STANDARD_GRAVITY
+
+# Units taken for newtons: force, and the torque that goes with it, in SI.
+_POUND, _INCH = 4.4482216152605, 0.0254
+_UNITS = {"kgf": (STANDARD_GRAVITY, STANDARD_GRAVITY), "lbf": (_POUND, _POUND * _INCH), "kN": (1e3, 1e3)}
+# As given; what makes newtons of units taken for them; what undoes newtons taken for such units.
+_NAMES = ("N", *_UNITS, *["N"] * len(_UNITS))
+_SIZES = np.array([(1.0, 1.0), *_UNITS.values(), *((1 / f, 1 / t) for f, t in _UNITS.values())])
+
+
+def _axes() -> Array:
+    """Return every order and sign of three axes (48, 3, 3), as they are first."""
+    return np.stack(
+        [
+            np.eye(3)[list(order)] * np.array(signs)
+            for order in permutations(range(3))
+            for signs in product((1.0, -1.0), repeat=3)
+        ]
+    )
+
+
+AXES = _axes()
+# Every reading (R, 3, 3) of a force, as it is first, and how many times larger each makes it (R,).
+FACTORS = np.repeat(_SIZES[:, 0], len(AXES))
+READINGS = FACTORS[:, None, None] * np.tile(AXES, (len(_SIZES), 1, 1))
+# The one that turns the sign.
+SIGN = int(np.argmin(np.abs(READINGS + np.eye(3)).sum((1, 2))))
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """Reading `number` of the force, and what makes torque of what is given (3, 3)."""
+
+    number: int
+    torque: Array
+
+    @property
+    def axes(self) -> Array:
+        """Order and signs (3, 3) of the force's axes."""
+        return np.asarray(AXES[self.number % len(AXES)])
+
+    @property
+    def unit(self) -> int:
+        """Which unit, 0 for what is given."""
+        return self.number // len(AXES)
+
+    def wrench(self) -> Array:
+        """Return (6, 6): from torque and force as given to what they are."""
+        out = np.zeros((6, 6))
+        out[:3, :3], out[3:, 3:] = self.torque, READINGS[self.number]
+        return out
+
+    def words(self) -> str:
+        """Return what was done to the force."""
+        said, size = [], float(_SIZES[self.unit, 0])
+        if self.unit:
+            unit = next(u for u, (f, _) in _UNITS.items() if np.isclose(max(size, 1 / size), f))
+            also = " (or mN as N)" if unit == "kN" else ""
+            said.append(f"{unit} read as N" if size > 1 else f"N read as {unit}{also}")
+        if self.number % len(AXES):
+            axes = zip(("Fx", "Fy", "Fz"), _columns(self.axes), strict=True)
+            said.append(", ".join(f"{is_} = {given}" for is_, given in axes if is_ != given))
+        return " and ".join(said)
+
+    def remedy(self, name: str) -> str:
+        """Return what to change in the description of robot `name`."""
+        out, mixed = [], bool(self.number % len(AXES))
+        size = abs(float(np.linalg.det(self.torque))) ** (1 / 3)
+        turned = bool(np.allclose(self.torque, size * self.axes))
+        if self.unit:
+            also = "" if np.isclose(size, 1.0) else ', and that of its "torque"'
+            out.append(
+                f'Set the unit of the "force" of \'{name}\' to what its numbers are in, "{_NAMES[self.unit]}"{also}.'
+            )
+        if mixed and turned and np.linalg.det(self.axes) > 0:
+            numbers = ", ".join(f"{v:.0f}" for v in self.axes.ravel() + 0.0)
+            out.append(f"Give the wrench stream of '{name}' mount = {{ rotation = [{numbers}], form = \"matrix\" }}.")
+        elif mixed:
+            what = "force and torque" if turned else "force"
+            order = ", ".join(c.replace("F", "") for c in _columns(self.axes))
+            out.append(f"Give the columns of {what} of '{name}' in the order and with the signs {order}.")
+        return " ".join(out)
+
+
+def torques_beside(number: int) -> tuple[Reading, ...]:
+    """Return the readings of torque that may go with one of the force; that it is right as given is the first."""
+    axes = AXES[number % len(AXES)]
+    turned = [np.eye(3), axes, *([-axes] if np.linalg.det(axes) < 0 else [])]
+    sizes = dict.fromkeys((1.0, float(_SIZES[number // len(AXES), 1])))
+    return tuple(Reading(number, size * X) for size in sizes for X in turned[: 1 if number % len(AXES) == 0 else None])
+
+
+def _columns(axes: Array) -> list[str]:
+    """Return the given column that each axis is, with its sign."""
+    largest = np.abs(axes).argmax(1)
+    return [f"{'-' if axes[i, k] < 0 else ''}F{'xyz'[k]}" for i, k in enumerate(largest)]
