@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -15,6 +15,7 @@ from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours, areas
 from steelyard.shape.ties import Ties
 from steelyard.shape.tree import Tree
+from steelyard.shape.walls import Wall
 from steelyard.shape.winding import Sight
 
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
@@ -26,7 +27,7 @@ _SIGN_STEPS = 10
 _FREE = 4  # steps before signs are driven to plus or minus one
 _SWEEPS, _KEPT = 4, 0.3
 _LAST_SWEEPS, _LAST_KEPT = 10, 2.0  # of the last look at signs: a normal turns where at least two ties deny it
-_LINKED = 3.0  # links of a point that lies on a sheet
+_LINKED, _WALLED = 3.0, 0.5  # links of a point that lies on a sheet; the same where the thickness of walls is known
 _CERTAIN = 0.3  # of a sign
 _EDGE = 0.5  # width, in spacings, of the field that gives the normals off the sheets
 _EDGE_STEPS = 6
@@ -64,8 +65,19 @@ def oriented(cloud: Cloud) -> Oriented:
     normals = cloud.normals
     if normals is None:
         sight = Sight.of(tree, tree)
-        normals = on_sheets(xyz, consistent(sight, spacing), near, delaunay, sight, spacing)
+        normals = on_sheets(xyz, consistent(sight, spacing), near, delaunay, sight, spacing, None)
     return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing)
+
+
+def walled(surface: Oriented) -> Oriented | None:
+    """Return a surface whose sides were found anew from the thickness of its walls; None where they have no one."""
+    xyz, near, delaunay, spacing = surface.xyz, surface.near, surface.delaunay, surface.spacing
+    wall = Wall.of(xyz, surface.normals, *sheet_planes(xyz, near.index, SLOPE), delaunay, spacing)
+    if wall is None:
+        return None
+    sight = Sight.of(surface.tree, surface.tree)
+    normals = on_sheets(xyz, surface.normals, near, delaunay, sight, spacing, wall)
+    return replace(surface, normals=normals, area=areas(near, normals))
 
 
 def consistent(sight: Sight, spacing: float) -> Array:
@@ -86,16 +98,21 @@ def consistent(sight: Sight, spacing: float) -> Array:
     return np.asarray(tree.back(_units(dipoles)).T, np.float64)
 
 
-def on_sheets(xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sight: Sight, spacing: float) -> Array:
+def on_sheets(
+    xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sight: Sight, spacing: float, wall: Wall | None
+) -> Array:
     """Return unit normals (N, 3), those of points on flat pieces of surface decided piece by piece.
 
     In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
     toward a winding number of 1/2 at every point and spread along each sheet and across to those that face it, in
-    turn. Points off them, as on edges, are then found anew, with the sheets as they are.
+    turn. Points off them, as on edges, are then found anew, with the sheets as they are. Where all walls are of one
+    thickness, what lies between sheets so far apart is in the solid.
     """
     tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
     plane, link = sheet_planes(xyz, near.index, SLOPE)
     ties = Ties.of(xyz, plane, near.index, link, delaunay, spacing)
+    if wall:
+        ties = ties.told(wall.outward(plane))
     sign = ties.spread(np.sign((plane * first).sum(1)), _SWEEPS, _KEPT)
     discs = Discs.on(tree, plane, np.full(len(xyz), _SPREAD_AREA * spacing**2), DEPTH, _JUMP * spacing).response(sight)
     for step in range(_SIGN_STEPS):
@@ -104,9 +121,11 @@ def on_sheets(xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sig
         sign = ties.spread(np.clip(sign, -1, 1), _SWEEPS, _KEPT)
         if step >= _FREE:
             sign = np.clip(2 * sign, -1, 1)
-    flat = (np.abs(link).sum(1) > _LINKED) & (np.abs(sign) > _CERTAIN)
+    flat = (np.abs(link).sum(1) > (_WALLED if wall else _LINKED)) & (np.abs(sign) > _CERTAIN)
     normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
     ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), delaunay, spacing)
+    if wall:
+        ties = ties.told(wall.outward(normals))
     normals *= ties.settled(_LAST_SWEEPS, _LAST_KEPT)[:, None]
     return _off_sheets(normals, flat, areas(near, normals), sight, _EDGE * spacing)
 

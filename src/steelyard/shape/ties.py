@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numba
@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.shape.complex import Complex
 from steelyard.shape.mesh import Integers
 
-_STEEP = 0.35  # cosine between an edge and a normal, at both ends, above which the edge leaves the surface there
+STEEP = 0.35  # cosine between an edge and a normal, at both ends, above which the edge leaves the surface there
 _SEEN = 0.3  # cosine between a point's plane and a facet of the hull above which the facet shows its outer side
 
 
@@ -48,6 +48,10 @@ class Ties:
         seen *= (np.abs(seen) > _SEEN) * np.minimum(twice / spacing**2, 1)[:, None]
         outward = np.asarray(np.bincount(near.hull.ravel(), seen.ravel(), len(xyz)), float)
         return cls(index, link, start, other, faced, outward)
+
+    def told(self, outward: Array) -> Ties:
+        """Return the same ties, where something else says too how much (N,) each normal leaves the solid."""
+        return replace(self, outward=self.outward + outward)
 
     def spread(self, values: Array, sweeps: int, kept: float) -> Array:
         """Return values (N,) pulled toward what their ties say in `sweeps`; `kept` weighs a point's own."""
@@ -86,7 +90,7 @@ def _faced(xyz: Array, normals: Array, start: Integers, other: Integers) -> tupl
                 here += normals[i, d] * away
                 there -= normals[j, d] * away
             least = min(abs(here), abs(there))
-            if square > 0 and least * least > _STEEP * _STEEP * square:
+            if square > 0 and least * least > STEEP * STEEP * square:
                 kept[count] = j
                 faced[count] = np.sign(here * there) * least / np.sqrt(square)
                 count += 1

@@ -11,11 +11,11 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
-from steelyard.shape.cloud import Cloud
+from steelyard.shape.cloud import Cloud, Flags
 from steelyard.shape.discs import Discs
 from steelyard.shape.islands import without_islands
 from steelyard.shape.mesh import Integers
-from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links
+from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links, walled
 from steelyard.shape.sheets import sheet_planes, stacked
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.ties import Ties
@@ -27,6 +27,8 @@ _JUMP = 0.01  # of a spacing: height over which the jump through a disc is sprea
 # Doubt (see `_doubt` and `_contradictions`) above which walls could not be told from gaps. Found on made sheets: nearly
 # all whose volume comes out wrong lie above it, and few of the others.
 _BLURRED = 0.41
+_UNCLEAR = 0.38  # doubt above which one thickness of the walls is looked for
+_LEFT = 0.5  # of the volume, at least, or it was not the walls' thickness that was found
 _SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
@@ -63,6 +65,24 @@ class Solid:
     inside: Integers | None = None
 
 
+@dataclass(frozen=True, eq=False)
+class _Filled:
+    """Which cells of a complex lie inside.
+
+    mesh    all T cells
+    score   (T,) above zero where the surface says inside
+    inside  (T,) whether each is, without free groups
+    solid   those that are
+    doubt   how little they look like a solid (see `_doubt` and `_contradictions`)
+    """
+
+    mesh: TetMesh
+    score: Array
+    inside: Flags
+    solid: TetMesh
+    doubt: float
+
+
 def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     """Return the closed volume behind the points of a surface, with or without normals; nothing is thickened.
 
@@ -87,6 +107,19 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> tuple[Solid, TetMesh]:
     """Return the closed volume of points that need no more work, in their canonical frame and order, and all cells."""
     surface, turned = _oriented(used)
+    found = _filled(used, surface)
+    against = 0.0 if used.normals is None else _against(surface, found.solid)
+    if against > _TURNED:
+        text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
+        return _enclosed(replace(used, normals=None), (*findings, Finding.of("normals-flipped", text)))
+    if used.normals is None and found.doubt > _UNCLEAR:
+        surface, found = _by_walls(used, surface, found)
+    made = _solid(used, surface, found.solid, found.score[found.inside], found.doubt, (*findings, *turned))
+    return replace(made, inside=np.flatnonzero(found.inside)), found.mesh
+
+
+def _filled(used: Cloud, surface: Oriented) -> _Filled:
+    """Return the cells that lie behind a surface. Raises BadValue where there are none."""
     mesh, centres, votes = cells_of(used.xyz, surface)
     found = _winding_number(surface, centres)
     score = found - 0.5 + votes
@@ -95,27 +128,42 @@ def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> tuple[Solid, TetMes
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
     inside = without_islands(mesh, score > 0, _SPAN * surface.spacing * used.diagonal)
-    solid = mesh.chosen(inside)
-    against = _against(surface, solid)
-    if used.normals is not None and against > _TURNED:
-        text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
-        return _enclosed(replace(used, normals=None), (*findings, Finding.of("normals-flipped", text)))
     doubt = _doubt(mesh.volumes, found, votes)
     if doubt > _CLEAR:
         doubt += _contradictions(surface)
-    made = _solid(used, surface, solid, score[inside], doubt, (*findings, *turned))
-    return replace(made, inside=np.flatnonzero(inside)), mesh
+    return _Filled(mesh, score, inside, mesh.chosen(inside), doubt)
+
+
+def _by_walls(used: Cloud, surface: Oriented, found: _Filled) -> tuple[Oriented, _Filled]:
+    """Return the surface and its cells found anew from the one thickness of its walls, or as they are if it has none.
+
+    Doubt stays: what a thickness tells is likely, not seen.
+    """
+    again = walled(surface)
+    if again is None:
+        return surface, found
+    again = _outward(again)
+    emptied = _filled(used, again)
+    if emptied.solid.volume < _LEFT * found.solid.volume:
+        return surface, found
+    return again, replace(emptied, doubt=max(found.doubt, emptied.doubt))
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
     """Return the cloud's surface elements; normals that came with it and all point inward are turned."""
     surface = oriented(cloud)
-    # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
-    if surface.delaunay.flux(surface.xyz, surface.normals, surface.spacing) >= 0:
-        return surface, ()
+    turned = _outward(surface)
+    if turned is surface or cloud.normals is None:
+        return turned, ()
     text = "All normals that came with the cloud point into the solid; they were turned."
-    found = (Finding.of("normals-flipped", text),) if cloud.normals is not None else ()
-    return replace(surface, normals=-surface.normals), found
+    return turned, (Finding.of("normals-flipped", text),)
+
+
+def _outward(surface: Oriented) -> Oriented:
+    """Return the surface, all of it turned if it is inside out."""
+    # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
+    inside_out = surface.delaunay.flux(surface.xyz, surface.normals, surface.spacing) < 0
+    return replace(surface, normals=-surface.normals) if inside_out else surface
 
 
 def cells_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
