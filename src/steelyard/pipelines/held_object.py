@@ -34,6 +34,7 @@ from steelyard.parts.parts import Parts
 from steelyard.sanity import (
     after,
     examine,
+    examine_masses,
     examine_sensor,
     fitted_gravity,
     impossible_density,
@@ -115,6 +116,7 @@ def identify(
         load = replace(load, bias=replace(load.bias, drift=True))
         estimate = load.estimate().noted("the fit was repeated with a bias that drifts")
         late = after(log, estimate, aligned, recording)
+    late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late))
     if unmeasured:
