@@ -88,3 +88,28 @@ def test_a_delay_that_is_given_is_believed():
     made = in_one_file(0.02)
     given = replace(made, streams=(replace(made.streams[0], delay=0.0),))
     assert not align(given).findings
+
+
+def through(follows, seed=0, step=0.002):
+    """Return a recording whose wrench w reads w + follows * w'' [s^2]: below zero a soft arm, above a filter."""
+    swing = Swing(seed, angle=1.4)
+    made = recording(swing, seed=seed, imu=False, position=True, force_std=0.02, torque_std=0.001, angle_std=2e-5)
+    wrench = made.streams[0]
+    before, now, later = (swing.log(wrench.time + d).wrench for d in (-step, 0.0, step))
+    more = follows * (later - 2 * now + before) / step**2
+    channels = {"force": wrench.channels["force"] + more[:, 3:], "torque": wrench.channels["torque"] + more[:, :3]}
+    return replace(made, streams=(replace(wrench, channels=channels), *made.streams[1:]))
+
+
+@pytest.mark.parametrize(
+    ("follows", "words"), [(-5e-4, "its first mode near 7 Hz"), (1e-3, "a slow filter of the force")]
+)
+def test_bars_hold_what_a_soft_arm_or_a_slow_filter_does(follows, words):
+    estimate = identify(through(follows))
+    assert any(words in note for note in estimate.notes)
+    off = np.append(estimate.mass - float(BODY.mass), (estimate.inertia_com - BODY.inertia_com)[np.triu_indices(3)])
+    assert (np.abs(off) < 3 * estimate.std[[0, 4, 5, 6, 7, 8, 9]]).all()
+
+
+def test_a_stiff_arm_widens_nothing():
+    assert not any("bends" in note for note in identify(through(0.0)).notes)
