@@ -18,7 +18,7 @@ from steelyard.spatial import cross_matrix
 
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
 # distance [m], and leaves less of the squared residual.
-SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.98
+SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
 # Noise of an acceleration lowers the mass that it shows by its share of the variance; so many times that is allowed.
 # Where centres lie is judged below the second share only.
 NOISE, CALM = 3.0, 0.05
