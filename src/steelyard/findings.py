@@ -12,6 +12,7 @@ REMEDIES: dict[str, str] = {
     "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
     "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
     "weight-compensated": "Set the payload in the controller, or in the sensor's driver, to zero, and record again.",
+    "motion-mismatch": "Check that the position is that of S, its unit, the unit of time, and filters of the force.",
     "wrench-unexplained": "Check order and signs of columns, angles, clocks, and a payload set in the controller.",
     "force-unit": "Check the force and torque units of the wrench stream.",
     "length-in-mm": 'Set the unit that the numbers have: "mm" (or "m") for positions, "N*mm" (or "N*m") for torques.',

@@ -11,6 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs import alignment_findings as say
+from steelyard.logs.bandwidth import rigid_up_to
 from steelyard.logs.conditioning import noise_std, sampling_rate, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
@@ -148,9 +149,12 @@ def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
     sensor = None
     if feeling is not None and "linear_acceleration" not in moving.channels:
         sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
-    used = {*moving.streams, *([sensor.name] if sensor is not None else [])} - {wrench_stream.name}
+    used = {*moving.streams, *([sensor.name] if sensor is not None else [])}
+    if cutoff is None or source.delay is not None or "specific_force" in source.channels:
+        used -= {source.name}
     known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
-    sought = [s.name for s in streams if s.name in used and s.delay is None] if options.estimate_delays else []
+    late = [s.name for s in recording.streams if s.name in used and s.delay is None]
+    sought = late if options.estimate_delays else []
     felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
     known = {n: d for n, d in known.items() if n not in sought}
     return _Prepared(
@@ -190,12 +194,16 @@ def _align_timed(given: _Prepared) -> Aligned:
     time, felt = _rows(given)
     touched = inside(time, taps)
     clocks, delayed = _clocks(given, time[~touched], felt.rows(~touched))
+    rigid = _rigid(given, time[~touched], felt.rows(~touched), clocks)
+    if rigid is not None:
+        lower = _align_timed(_prepare(given.recording, replace(given.options, cutoff_hz=rigid)))
+        return replace(lower, notes=(*lower.notes, say.swings(rigid)))
     kept = ~touched & given.covered(time, clocks.delays_s)
     if kept.sum() < _FEWEST_ROWS:
         raise CannotAnswer(f"only {int(kept.sum())} rows are left after alignment; record a longer stretch.")
     log, motion = _log(given, time[kept], felt.rows(kept), clocks)
     findings = (
-        *say.delay_findings(clocks, delayed),
+        *say.delay_findings(clocks, delayed, given.felt.stream),
         *say.mount_findings(given.imu, clocks.mounting),
         *say.planar_finding(log.gravity),
         *say.tap_findings(taps, float(given.clock[0]), int(touched.sum()), len(time)),
@@ -284,6 +292,15 @@ def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[st
         again = refine(fixed, {**clocks.delays_s, **none})
         found = _with_interpolation(given, again.delays_std_s)
         clocks = replace(again, delays_std_s={**clocks.delays_std_s, **{n: found[n] for n in late}})
+
+
+def _rigid(given: _Prepared, time: Array, felt: Felt, clocks: Clocks) -> float | None:
+    """Return the low-pass [Hz] that poses need beside a structure that swings; an accelerometer swings with it."""
+    ok = given.covered(time, clocks.delays_s)
+    if given.cutoff is None or given.imu is not None or not given.kinematics.differentiates or ok.sum() < _FEWEST_ROWS:
+        return None
+    motion = given.kinematics.at(time[ok], clocks.delays_s)
+    return rigid_up_to(sampling_rate(time), given.cutoff, felt.rows(ok).in_sensor(motion.rotation), motion)
 
 
 def _with_interpolation(given: _Prepared, stds: Mapping[str, float]) -> dict[str, float]:

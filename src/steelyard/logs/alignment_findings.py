@@ -14,17 +14,27 @@ _TURNED = np.radians(5)
 _LOOSE_M, _LOOSE_RAD = 0.1, 0.1
 
 
-def delay_findings(clocks: Clocks, names: tuple[str, ...]) -> tuple[Finding, ...]:
-    """Return `stream-delayed` for each of the named streams."""
-    return tuple(
-        Finding.of(
-            "stream-delayed",
-            f"The stamps of '{n}' are {'late' if clocks.delays_s[n] > 0 else 'early'} by "
-            f"{abs(clocks.delays_s[n]) * 1e3:.2f} ± {clocks.delays_std_s[n] * 1e3:.2f} ms against the wrench "
-            "(corrected here).",
-        )
-        for n in names
-    )
+def delay_findings(clocks: Clocks, names: tuple[str, ...], wrench: str) -> tuple[Finding, ...]:
+    """Return `stream-delayed` for each of the named streams; `wrench` is the one that holds the wrench."""
+    return tuple(_delayed(n, clocks.delays_s[n], clocks.delays_std_s[n], n == wrench) for n in names)
+
+
+def _delayed(name: str, delay: float, std: float, own: bool) -> Finding:
+    size = f"{abs(delay) * 1e3:.2f} ± {std * 1e3:.2f} ms"
+    if not own:
+        side = "late" if delay > 0 else "early"
+        text = f"The stamps of '{name}' are {side} by {size} against the wrench (corrected here)."
+        return Finding.of("stream-delayed", text)
+    late, early = ("motion", "wrench") if delay > 0 else ("wrench", "motion")
+    text = f"In the rows of '{name}' the {late} is {size} later than the {early} (corrected here)."
+    given = f"delay = {{ value = {1e3 * delay:.2f}, unit = 'ms' }}"
+    remedy = f"Describe the motion as a second [[stream]] of this file, with {given}."
+    return Finding("stream-delayed", text, remedy)
+
+
+def swings(rigid: float) -> str:
+    """Return the note on a structure that swings from `rigid` [Hz] on."""
+    return f"above {rigid:g} Hz the wrench does not follow the poses, as where an arm swings: it was low-passed there"
 
 
 def mount_findings(imu: Imu | None, mounting: Mounting | None) -> tuple[Finding, ...]:

@@ -75,6 +75,11 @@ class Kinematics:
         order = ("linear_acceleration", "linear_velocity", "position")
         return next((q for q in order if q in self.channels), "none")
 
+    @property
+    def differentiates(self) -> bool:
+        """Whether an acceleration comes from poses or velocities by differentiation."""
+        return self.source not in ("none", "linear_acceleration")
+
     def at(self, time: Array, delays: Delays) -> Motion:
         """Return the motion at `time` (M,) [s] of the common clock; delays [s] say how late each stream's
         stamps are."""

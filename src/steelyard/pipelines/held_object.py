@@ -33,7 +33,9 @@ from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
 from steelyard.sanity import (
     after,
+    allow_softness,
     examine,
+    examine_masses,
     examine_sensor,
     fitted_gravity,
     impossible_density,
@@ -54,6 +56,8 @@ LARGEST = 2.0
 BALL = 0.5 / np.sqrt(5)
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"
+# Where an acceleration comes from that does not see the arm's structure bend.
+ENCODERS = ("position", "linear_velocity")
 # Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
 FEWEST_POSES = 4
 
@@ -115,8 +119,11 @@ def identify(
         load = replace(load, bias=replace(load.bias, drift=True))
         estimate = load.estimate().noted("the fit was repeated with a bias that drifts")
         late = after(log, estimate, aligned, recording)
+    late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late))
+    if aligned.acceleration_from in ENCODERS and parts is None:
+        estimate = allow_softness(log, estimate)
     if unmeasured:
         estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())

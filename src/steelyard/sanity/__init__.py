@@ -7,11 +7,15 @@ from steelyard.sanity.density import impossible_density
 from steelyard.sanity.gravity import fitted_gravity, levelled
 from steelyard.sanity.rows import dead_channels
 from steelyard.sanity.sensor_matrix import examine_sensor
+from steelyard.sanity.soft_arm import allow_softness
+from steelyard.sanity.two_masses import examine_masses
 
 __all__ = [
     "after",
+    "allow_softness",
     "dead_channels",
     "examine",
+    "examine_masses",
     "examine_sensor",
     "fitted_gravity",
     "impossible_density",

@@ -26,6 +26,8 @@ DRIFT_WEIGHT, DRIFT_ARM, DRIFT_SHARE = 0.02, 0.1, 0.8
 # The prior dominates where it brings a standard deviation below half of what the data alone give.
 PRIOR_SHARE = 0.5
 _FEWEST_ROWS = 8
+# Rows come 2.5 times as often as the low-pass has Hz, which leaves this share of white noise up to half their rate.
+PASSED = 0.8
 
 
 def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recording) -> tuple[Finding, ...]:
@@ -38,7 +40,7 @@ def after(log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recor
     rotation = rotation_of(log, aligned)
     tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
     drift = () if tilted else bias_drift(log)
-    noise = max((_white(s.time, v) for s, _, v in channel(recording, "force")), default=0.0)
+    noise = max((_passed(log, s.time, v) for s, _, v in channel(recording, "force")), default=0.0)
     size = implausible(estimate, float(np.linalg.norm(recording.gravity)), noise)
     return (*seen, *tilted, *drift, *_noise_level(estimate, recording), *_prior(estimate), *size)
 
@@ -117,6 +119,14 @@ def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...
     message = "; ".join(out)
     known = "" if chi2 is None else f" (chi^2 per degree of freedom {chi2:.2g})"
     return (Finding.of("noise-level-off", f"{message[0].upper()}{message[1:]}{known}."),)
+
+
+def _passed(log: MotionLog, time: Array | None, values: Array) -> float:
+    """Return the white noise of a timed channel per axis that the low-pass leaves in the rows; zero for tables."""
+    if time is None or log.time is None or len(log) < 2:
+        return 0.0
+    share = PASSED * float(np.median(np.diff(time)) / np.median(np.diff(log.time)))
+    return _white(time, values) * float(np.sqrt(min(1.0, share)))
 
 
 def _white(time: Array | None, values: Array) -> float:

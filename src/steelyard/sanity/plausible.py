@@ -20,7 +20,7 @@ def implausible(estimate: Estimate, gravity: float, noise: float = 0.0) -> tuple
     """Return `force-unit`, `length-in-mm` or `wrench-unexplained` where mass, size or residual are no body's.
 
     gravity  its size [m/s^2]
-    noise    of the raw force from sample to sample [N], zero where the log has no clock
+    noise    of the force from row to row [N], zero where the log has no clock
     """
     mass = estimate.mass
     if mass > HEAVIEST:

@@ -1,0 +1,50 @@
+"""Bandwidth: up to which frequency arm and load move as the poses say.
+
+Encoders do not see an arm's structure swing after a stop. The wrench does, and taken for noise of the motion such
+swinging inflates the inertia.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.delays import features, free_residual
+from steelyard.logs.kinematics import Motion
+from steelyard.logs.stillness import Numbers
+
+# [Hz] where the bands begin that are judged; the last ends where the low-pass does.
+BANDS = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0)
+# A structure swings where so many times more is left per Hz than in the quietest band above, and more than explained.
+CLEAR = 4.0
+
+
+def rigid_up_to(rate: float, cutoff: float, wrench: Array, motion: Motion) -> float | None:
+    """Return the frequency [Hz] from which on the wrench (N, 6) no longer follows the motion, None where it does.
+
+    rate     [Hz] of the rows
+    cutoff   [Hz] of their low-pass
+
+    Noise is as strong at higher frequencies, and that of an acceleration stronger; what swings is not. Moments and
+    forces are judged apart.
+    """
+    edges = np.array([*(b for b in BANDS if b < cutoff), cutoff])
+    if len(edges) < 2:
+        return None
+    left = free_residual(wrench, features(motion, None))
+    band = np.searchsorted(edges, np.fft.rfftfreq(len(left), 1 / rate), "right") - 1
+    low = np.inf
+    for part in (slice(0, 3), slice(3, 6)):
+        unlike, alike = (_per_hz(values[:, part], band, edges) for values in (left, wrench - left))
+        floor = np.minimum.accumulate(unlike[::-1])[::-1]
+        swings = np.flatnonzero((unlike > alike) & (unlike > CLEAR * floor))
+        low = min(low, edges[swings[0]] if len(swings) else np.inf)
+    return float(low) if low < cutoff else None
+
+
+def _per_hz(values: Array, band: Numbers, edges: Array) -> Array:
+    """Return the mean variance per Hz of evenly sampled `values` (N, D) in each band."""
+    window = np.hanning(len(values))[:, None]
+    power = (np.abs(np.fft.rfft((values - values.mean(0)) * window, axis=0)) ** 2).sum(1)
+    inside = (band >= 0) & (band < len(edges) - 1)
+    return np.bincount(band[inside], power[inside], len(edges) - 1) / np.diff(edges)
