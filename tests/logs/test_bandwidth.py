@@ -10,6 +10,7 @@ from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
+from steelyard.simulate import hammer
 
 
 def swinging(hz, size=4.0, seed=0):
@@ -47,6 +48,11 @@ def test_noise_alone_lowers_nothing(seed):
             angle_std=2e-4 * noise,
         )  # fmt: skip
         assert not lowered(align(made))
+
+
+@pytest.mark.parametrize("seed", range(2))
+def test_a_low_pass_that_ends_where_a_band_begins(seed):
+    assert not lowered(align(hammer.recording(seed).recording))  # poses at 25 Hz: a low-pass at 10
 
 
 @pytest.mark.parametrize("seed", range(2))

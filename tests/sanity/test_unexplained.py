@@ -75,7 +75,20 @@ def test_it_is_said_with_the_refusal_too(made: Recording) -> None:
         held_object.identify(forces(made, np.diag([1.0, -1, 1])))
 
 
-def test_a_wrench_that_no_body_explains_is_told(made: Recording) -> None:
-    found = sy.identify(forces(made, np.diag([1.0, 1, 0.2])))
+def noisy(recording: Recording, std: float) -> Recording:
+    """Return the recording with more white noise of the force [N]."""
+    rng = np.random.default_rng(0)
+
+    def more(quantity: str, values: np.ndarray) -> np.ndarray:
+        return values + std * rng.normal(size=values.shape) if quantity == "force" else values
+
+    streams = tuple(replace(s, channels={q: more(q, v) for q, v in s.channels.items()}) for s in recording.streams)
+    return replace(recording, streams=streams)
+
+
+@pytest.mark.parametrize("std", [0.0, 0.5])
+def test_a_wrench_that_no_body_explains_is_told(made: Recording, std: float) -> None:
+    found = sy.identify(noisy(forces(made, np.diag([1.0, 1, 0.2])), std))
     assert "wrench-unexplained" in found.codes()
+    assert "wrench-unexplained" not in sy.identify(noisy(made, std)).codes()
     assert "wrench-unexplained" not in sy.identify(made).codes()

@@ -13,8 +13,8 @@ from steelyard.logs.delays import features, free_residual
 from steelyard.logs.kinematics import Motion
 from steelyard.logs.stillness import Numbers
 
-# [Hz] where the bands begin that are judged; the last ends where the low-pass does.
-BANDS = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0)
+# [Hz] where the bands begin that are judged; the last ends where the low-pass does, at this multiple at least.
+BANDS, NARROWEST = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0), 1.25
 # A structure swings where so many times more is left per Hz than in the quietest band above, and more than explained.
 CLEAR = 4.0
 
@@ -28,7 +28,7 @@ def rigid_up_to(rate: float, cutoff: float, wrench: Array, motion: Motion) -> fl
     Noise is as strong at higher frequencies, and that of an acceleration stronger; what swings is not. Moments and
     forces are judged apart.
     """
-    edges = np.array([*(b for b in BANDS if b < cutoff), cutoff])
+    edges = np.array([*(b for b in BANDS if NARROWEST * b < cutoff), cutoff])
     if len(edges) < 2:
         return None
     left = free_residual(wrench, features(motion, None))
