@@ -28,6 +28,7 @@ from steelyard.sanity.glance import Glance, glance
 from steelyard.sanity.mirrored import Mirror, mirrored
 from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
+from steelyard.sanity.torques import examine_torques
 from steelyard.sanity.units import scaled
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
@@ -77,7 +78,9 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
         reading = _reading(view, "", flipped.gravity, reading.rotation)
     recording = flipped
     found.extend(findings)
-    recording, findings = _lengths(recording, reading.fit)
+    findings = () if found else examine_torques(view, recording.gravity, reading.rotation)
+    if not findings:
+        recording, findings = _lengths(recording, reading.fit)
     found.extend(findings)
     if best is None and reading.rotation is not None:
         recording, findings = _level(recording, view, reading)

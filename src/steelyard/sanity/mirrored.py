@@ -28,7 +28,7 @@ def _reflections() -> Array:
     return np.stack([X for X in signed if np.linalg.det(X) < 0])
 
 
-_REFLECTIONS = _reflections()
+REFLECTIONS = _reflections()
 
 
 def mirrored(view: Glance, gravity: Array, mass: float) -> Mirror | None:
@@ -37,10 +37,15 @@ def mirrored(view: Glance, gravity: Array, mass: float) -> Mirror | None:
         return None
     seen, force, down = force_and_weight(view, gravity, mass)
     # force = X m down: the trace with X is largest for the right one.
-    X = max(_REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
+    X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
     _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
+    return Mirror(in_words(X, "F"), share)
+
+
+def in_words(X: Array, letter: str) -> str:
+    """Say what columns must be read as whose numbers are X times those meant: "Fx = -Fy, Fy = .."."""
     said = []
-    for row, name in zip(X.T, "xyz", strict=True):  # down_k = sum_i X_ik force_i
+    for row, name in zip(X.T, "xyz", strict=True):  # meant_k = sum_i X_ik read_i
         k = int(np.argmax(np.abs(row)))
-        said.append(f"F{name} = {'-' if row[k] < 0 else ''}F{'xyz'[k]}")
-    return Mirror(", ".join(said), share)
+        said.append(f"{letter}{name} = {'-' if row[k] < 0 else ''}{letter}{'xyz'[k]}")
+    return ", ".join(said)

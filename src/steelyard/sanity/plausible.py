@@ -42,6 +42,7 @@ def implausible(estimate: Estimate, gravity: float, noise: float = 0.0) -> tuple
         return ()
     text = (
         f"The body is denser than any metal: {mass:.3g} kg within {1e3 * np.sqrt(max(half_trace, 0) / mass):.2g} mm. "
-        "The torques are too small for the forces, as those in N m are that were declared as N*mm."
+        "The torques are too small for the forces, as those in N m are that were declared as N*mm, or forces in N that "
+        "were declared as kgf."
     )
     return (Finding.of("length-in-mm", text),)

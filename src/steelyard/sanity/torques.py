@@ -1,0 +1,97 @@
+"""Torques that do not belong to the forces: columns of another order or sign, the other sign, another unit.
+
+At rest a torque is h x g for some first moment h of mass, so that most orders of its columns show. In motion the force
+shows h, too: how it follows the turning, beside the h of the torque, tells sign and unit.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.sanity.glance import Glance, Seen
+from steelyard.sanity.mirrored import REFLECTIONS, in_words
+from steelyard.sanity.static_fit import columns, solve
+
+# Forces must fit so well before torques are judged; torques fit badly, or well, if they leave such shares.
+FORCE, BAD, WELL = 0.1, 0.3, 0.1
+# Another order must leave this share of what the order as given leaves.
+MUCH_BETTER = 0.1
+_FEWEST_ROWS = 6
+# The ratio of both first moments must be known so well, and they lie so nearly along one line.
+SURE, ALONG = 0.05, 0.2
+# It is a unit's if it is within this share of one, beside three standard deviations.
+NEAR = 0.02
+# What forces read too large by beside torques, and what explains it. Thousands show by where the centre of mass lies.
+UNITS = (
+    (4.44822, "forces in N are read as lbf"),
+    (1 / 4.44822, "forces in lbf are read as N"),
+    (9.80665, "forces in N are read as kgf, or torques in kgf*m as N*m"),
+    (1 / 9.80665, "forces in kgf are read as N, or torques in N*m as kgf*m"),
+    (1 / 0.112985, "torques in N*m are read as lbf*in"),
+    (0.112985, "torques in lbf*in are read as N*m"),
+    (100.0, "torques in N*m are read as N*cm"),
+    (0.01, "torques in N*cm are read as N*m"),
+)
+REMEDY = "Check order and signs of the torque columns in the description."
+
+
+def examine_torques(view: Glance, gravity: Array, rotation: Array | None) -> tuple[Finding, ...]:
+    """Return `force-unit` where torques, read otherwise, belong to the forces, and as given do not."""
+    if any(view.dead) or len(view) < _FEWEST_ROWS:
+        return ()
+    seen = view.seen(gravity, rotation)
+    turned, forced = columns(seen)
+    force, force_std, force_share = solve(forced, seen.wrench[:, 3:], view.block)
+    moment, _, share = solve(turned, seen.wrench[:, :3], view.block)
+    if force_share > FORCE:
+        return ()
+    felt = force[1:4] if seen.lever is not None else np.zeros(3)
+    if share > BAD:
+        return _ordered(view, seen, turned, share, felt)
+    spread = float(np.linalg.norm(force_std[1:4])) if seen.lever is not None else np.inf
+    return _compared(felt, spread, moment[:3]) if share < WELL else ()
+
+
+def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array) -> tuple[Finding, ...]:
+    """Return what says in which order and sign torque columns fit; `felt` (3,) is the first moment by the force."""
+    tried = [(X, *solve(turned, seen.wrench[:, :3] @ X, view.block)) for X in REFLECTIONS]
+    X, moment, _, left = min(tried, key=lambda found: found[3])
+    if left > MUCH_BETTER * share:
+        return ()
+    # Either sign fits as well: the force decides, or else fewer changes are likelier.
+    side = float(moment[:3] @ felt) or float(X.sum())
+    text = (
+        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {_percent(left)} of "
+        f"their variance is left unexplained instead of {_percent(share)}; the answer does not assume this."
+    )
+    return (Finding("force-unit", text, REMEDY),)
+
+
+def _compared(felt: Array, spread: float, moment: Array) -> tuple[Finding, ...]:
+    """Return what first moments (3,) by force and by torque say of each other's sign and unit."""
+    size = float(np.linalg.norm(moment))
+    if spread > SURE * float(np.linalg.norm(felt)) or size == 0:
+        return ()
+    ratio, std = float(felt @ moment) / size**2, spread / size
+    if np.linalg.norm(felt - ratio * moment) > ALONG * np.linalg.norm(felt):
+        return ()
+    if abs(ratio + 1) < 0.1 + 3 * std:
+        text = (
+            "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
+            "other side of S. The answer does not assume this."
+        )
+        return (Finding("force-unit", text, REMEDY),)
+    for factor, words in UNITS:
+        if abs(ratio / factor - 1) < NEAR + 3 * std / abs(ratio) and abs(ratio - 1) > 5 * std:
+            text = (
+                f"Forces are {ratio:.3g} ± {std:.2g} times too large beside the torques, as when {words}. The answer "
+                "does not assume this: mass or centre of mass is wrong by as much."
+            )
+            return (Finding.of("force-unit", text),)
+    return ()
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

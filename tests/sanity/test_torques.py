@@ -1,0 +1,74 @@
+"""Torques that do not belong to the forces: another order or sign of columns, the other sign, another unit."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from synthetic import Kind, write
+from traps import edited
+
+from steelyard.io import read_recording
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity import examine
+
+KINDS = {"hammer": Kind(noise=0.5), "box": Kind("box_tool", 0.2, 2), "drill": Kind("drill", 1.0, 5)}
+LBF, KGF = 4.44822, 9.80665
+
+
+@pytest.fixture(scope="module", params=KINDS)
+def made(request: pytest.FixtureRequest, tmp_path_factory: pytest.TempPathFactory) -> Recording:
+    recording = read_recording(write(tmp_path_factory.mktemp("torques"), KINDS[request.param]))
+    streams = tuple(s for s in recording.streams if "specific_force" not in s.channels)
+    return Recording(streams, recording.gravity, recording.wrench_sign)
+
+
+def named(recording: Recording) -> str:
+    (found,) = examine(recording)[1]
+    assert found.code == "force-unit"
+    return found.message
+
+
+def test_torques_that_belong_to_the_forces_are_silent(made: Recording) -> None:
+    assert examine(made)[1] == ()
+
+
+@pytest.mark.parametrize(
+    ("matrix", "words"),
+    [
+        ([[0, 1, 0], [1, 0, 0], [0, 0, 1]], "Tx = Ty, Ty = Tx, Tz = Tz"),
+        ([[0, 0, 1], [0, 1, 0], [1, 0, 0]], "Tx = Tz, Ty = Ty, Tz = Tx"),
+        ([[1, 0, 0], [0, -1, 0], [0, 0, 1]], "Tx = Tx, Ty = -Ty, Tz = Tz"),
+        ([[0, 1, 0], [0, 0, 1], [1, 0, 0]], "Tx = Tz, Ty = Tx, Tz = Ty"),
+    ],
+)
+def test_columns_in_another_order(made: Recording, matrix: list[list[int]], words: str) -> None:
+    read = edited(made, torque=lambda v: v @ np.array(matrix, float).T)
+    assert f"read as {words}: so" in named(read)
+
+
+def test_the_other_sign(made: Recording) -> None:
+    assert "sign opposite to that of the forces" in named(edited(made, torque=np.negative))
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"),
+    [(LBF, "in N are read as lbf"), (1 / KGF, "in kgf are read as N"), (KGF, "in N are read as kgf")],
+)
+def test_forces_in_another_unit(made: Recording, factor: float, words: str) -> None:
+    assert words in named(edited(made, force=lambda v: factor * v))
+
+
+def still(order: list[int]) -> Recording:
+    """Return twelve still poses whose torque columns stand in this order."""
+    rng = np.random.default_rng(3)
+    pull = rng.normal(size=(12, 3))
+    pull *= 9.81 / np.linalg.norm(pull, axis=1)[:, None]
+    torque = np.cross([0.01, -0.02, 0.09], -pull) + 1e-4 * rng.normal(size=(12, 3))
+    force = -1.3 * pull + 1e-2 * rng.normal(size=(12, 3))
+    channels = {"force": force, "torque": torque[:, order], "gravity": pull}
+    return Recording((Stream("poses", channels),), np.array([0, 0, -9.81]), 1)
+
+
+def test_a_table_of_still_poses_tells_the_order() -> None:
+    assert examine(still([0, 1, 2]))[1] == ()
+    assert "read as Tx = Ty, Ty = Tx, Tz = Tz" in named(still([1, 0, 2]))
