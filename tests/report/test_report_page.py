@@ -204,6 +204,25 @@ def test_what_is_missing_is_left_out(estimate: Estimate) -> None:
     assert "Against the truth" not in page.words
 
 
+def test_signs_are_explained_once_and_only_those_that_are_drawn(full: Report) -> None:
+    signs = "the answer two standard deviations either side the truth"
+    words = Page(render(full)).words
+    for said in ("± is one standard deviation", signs):
+        assert words.count(said) == 1, said
+    alone = Page(render(replace(full, truth=None))).words
+    assert "± is one standard deviation" in alone
+    assert signs not in alone
+    assert "one standard deviation" not in Page(render(replace(full, estimate=exact(full.estimate)))).words
+
+
+def exact(estimate: Estimate) -> Estimate:
+    return replace(estimate, covariance=np.zeros((10, 10)))
+
+
+def test_numbers_above_a_plot_say_what_they_are(full: Report) -> None:
+    assert Page(render(full)).words.count("rms") == 2
+
+
 def test_inertia_that_is_not_fixed_is_not_shown(full: Report, estimate: Estimate) -> None:
     open_estimate = replace(estimate, identified=np.arange(10) < 4)
     words = Page(render(replace(full, estimate=open_estimate, rivals={}))).words

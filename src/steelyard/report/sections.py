@@ -11,7 +11,7 @@ from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
 from steelyard.report.numbers import decimals, fixed, general, inertia_unit, mass_unit, measured, principal
 from steelyard.report.palette import hexadecimal
-from steelyard.report.plots import interval, residual_plot
+from steelyard.report.plots import interval, interval_signs, residual_plot
 from steelyard.team.estimate import TeamEstimate
 
 _ENTRIES = ("mass", "x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")
@@ -48,7 +48,14 @@ def headline(report: Report) -> Html:
         for k, axis in enumerate("xyz")
     ]
     com = _card("Centre of mass", tag("dl", *rows), tag("p", _place(seen), class_="aside"))
-    return tag("div", mass, com, _moments_card(report), class_="cards")
+    return joined(tag("div", mass, com, _moments_card(report), class_="cards"), _signs(report))
+
+
+def _signs(report: Report) -> Html:
+    """Return what ± means on this page, and the signs of the intervals where a truth is drawn on them."""
+    stated = bool((report.estimate.std > 0).any())
+    drawn = interval_signs() if stated and report.truth is not None else []
+    return tag("p", tag("span", "± is one standard deviation."), *drawn, class_="signs") if stated else Html("")
 
 
 def _place(seen: Estimate) -> str:
