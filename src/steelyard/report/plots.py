@@ -159,11 +159,11 @@ def interval_signs() -> list[Html]:
     ]
 
 
-def share_bar(share: float, kind: str = "") -> Html:
-    """Return a thin bar that fills `share` (0..1) of its cell."""
+def share_bar(share: float, colour: str) -> Html:
+    """Return a thin bar of a colour that fills `share` (0..1) of its cell."""
     width = f"{100 * min(max(share, 0.0), 1.0):.1f}%"
     return tag(
         "svg", tag("rect", width="100%", height=5, rx=2.5, class_="rail"),
-        tag("rect", width=width, height=5, rx=2.5, class_=f"fill {kind}".strip()),
+        tag("rect", width=width, height=5, rx=2.5, fill=colour),
         width="100%", height=5, class_="share", aria_hidden="true",
     )  # fmt: skip
