@@ -18,6 +18,7 @@ import numpy as np
 import pytest
 
 from steelyard.cli.main import VERBS, main
+from steelyard.cli.table import plus_minus
 from steelyard.inertia import InertialParameters
 from steelyard.io import read_result
 from steelyard.io.recording_files import write_recording
@@ -137,6 +138,11 @@ def test_the_table_holds_the_numbers_and_the_file_is_the_json(
     for finding in answer["findings"]:
         assert f"{finding['code']}: {finding['message']}" in run.out
         assert f"-> {finding['remedy']}" in run.out
+
+
+@pytest.mark.parametrize(("std", "said"), [(0.02, "1.000 ± 0.020 g"), (2.5e-11, "1.000000000 ± 2.5e-11 g")])
+def test_no_spread_is_rounded_to_nothing(std: float, said: str) -> None:
+    assert plus_minus(1.0, std, "g") == said
 
 
 def test_json_has_the_fixed_keys(answer: dict[str, Any]) -> None:
@@ -467,6 +473,7 @@ def test_demo(tmp_path: Path) -> None:
     assert 2 <= len(run.json["parts"]) <= 6
     text = page.read_text()
     assert "A hammer, scanned and weighed" in text
+    assert ">without the scan<" in text
     assert "http://" not in text.replace("http://www.w3.org", "")
     seen = steelyard("scan", kept / "views", "-o", tmp_path / "seen.ply", "--json")
     assert (seen.status, seen.json["views"], seen.json["findings"]) == (0, 36, [])

@@ -22,6 +22,7 @@ from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia.solids import box
 from steelyard.report import Report, Residuals, Truth, render, scene_of_solid, write_report
 from steelyard.report.markup import script_json, tag, text
+from steelyard.report.numbers import measured, spread
 from steelyard.report.scene import MOST_TRIANGLES
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.tets import TetMesh
@@ -104,7 +105,7 @@ def full(estimate: Estimate) -> Report:
 
 
 def test_the_numbers_stand_there(full: Report) -> None:
-    words = Page(render(full)).words.replace("\u202f", " ")
+    words = Page(render(full)).words.replace("\u202f", " ").replace("\u00a0", " ")
     assert "690.0 ± 1.0 g" in words  # 0.02 * 0.03 * 0.25 * 4600 kg
     for said in ("10.000 ±", "150.00 ±", "head", "500.0 ± 2.0 g", "truth 501.0 g", "steel?", "10 of 10", "12.3", "1234",
                  "1.02", "3 rows were left out.", "Nothing to do if knocks", "a note", "7.50 ms", "OLS"):  # fmt: skip
@@ -202,6 +203,61 @@ def test_what_is_missing_is_left_out(estimate: Estimate) -> None:
     assert page.count("script") == 1
     assert "Nothing to report" in page.words
     assert "Against the truth" not in page.words
+
+
+def test_signs_are_explained_once_and_only_those_that_are_drawn(full: Report) -> None:
+    signs = "the answer two standard deviations either side the truth"
+    words = Page(render(full)).words
+    for said in ("± is one standard deviation", signs):
+        assert words.count(said) == 1, said
+    alone = Page(render(replace(full, truth=None))).words
+    assert "± is one standard deviation" in alone
+    assert signs not in alone
+    assert "one standard deviation" not in Page(render(replace(full, estimate=exact(full.estimate)))).words
+
+
+def exact(estimate: Estimate) -> Estimate:
+    return replace(estimate, covariance=np.zeros((10, 10)))
+
+
+def test_no_line_breaks_between_a_number_and_its_unit() -> None:
+    words = Page(measured(401.0, 40.0, "kg mm²")).words
+    assert words == "401\u202f±\u202f40\u00a0kg\u00a0mm²"
+    assert not set(words) & set(" \t\n")
+
+
+def test_the_truth_has_the_digits_of_the_answer(full: Report) -> None:
+    sharp = replace(full.estimate, covariance=np.diag([3.6e-15, *[4e-16] * 3, *[1e-18] * 6]))
+    words = Page(render(replace(full, estimate=sharp))).words.replace("\u202f", " ").replace("\u00a0", " ")
+    assert "690.000000 ± 0.000060 g690.0000000.0 σ" in words
+    shown = re.findall(r"(\d+[.]\d+) ± [\d.]+ (?:mm|kg mm²)−?(\d+[.]\d+?)(?:0[.]0 σ)", words)
+    assert len(shown) == 9
+    assert all(found == truth for found, truth in shown)
+
+
+@pytest.mark.parametrize(
+    ("std", "said"), [(0.0999, "0.10"), (2.5e-6, "0.0000025"), (2.5e-11, "2.5e−11"), (0.0, "0.000"), (41.0, "41")]
+)
+def test_no_spread_is_rounded_to_nothing(std: float, said: str) -> None:
+    assert spread(std) == said
+
+
+def test_the_caption_is_below_the_picture_not_on_it(full: Report) -> None:
+    markup = render(full)
+    stage, after = markup.index('class="chips"'), markup.index('class="hint"')
+    assert markup[stage:after].count("</div>") == 2  # the chips and the stage are closed
+
+
+def test_the_bar_of_a_part_has_its_colour(full: Report) -> None:
+    elements = Page(render(full)).elements
+    fills = [a["fill"] for name, a in elements if name == "rect" and a.get("height") == "5" and "fill" in a]
+    swatches = [a["fill"] for name, a in elements if name == "rect" and a.get("width") == "12"]
+    assert fills == swatches
+    assert len(set(fills)) == 2
+
+
+def test_numbers_above_a_plot_say_what_they_are(full: Report) -> None:
+    assert Page(render(full)).words.count("rms") == 2
 
 
 def test_inertia_that_is_not_fixed_is_not_shown(full: Report, estimate: Estimate) -> None:

@@ -127,7 +127,7 @@ def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, 
     tared = replace(rows, wrench=rows.wrench - ordinary.wrench_bias)
     return {
         "with the scan": api.identify(log, scan=shape),
-        "without": api.identify(log),
+        "without the scan": api.identify(log),
         "OLS": ordinary,
         "GEO, uniform shape": ShapeGeodesic(uniform_body(shape.parts.in_frame(X_SW))).identify(tared),
     }

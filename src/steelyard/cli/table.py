@@ -12,6 +12,7 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 
 LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
+_MILLIONTH = 1e-6
 INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
@@ -28,7 +29,12 @@ def plus_minus(value: float, std: float, unit: str) -> str:
         return f"{value:.4g} ± ? {unit}"
     places = decimals(std)
     # Adding zero turns a minus zero, which rounding leaves, into a plain one.
-    return f"{round(value, places) + 0.0:.{places}f} ± {std:.{places}f} {unit}"
+    return f"{round(value, places) + 0.0:.{places}f} ± {spread(std)} {unit}"
+
+
+def spread(std: float) -> str:
+    """Return two figures of a standard deviation, in powers of ten below a millionth."""
+    return f"{std:.1e}" if 0 < std < _MILLIONTH else f"{std:.{decimals(std)}f}"
 
 
 def estimate_table(
@@ -72,7 +78,7 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
     jackknife = estimate.evidence.jackknife_people
     if jackknife is not None and truth is None:
         rows = [
-            (row[0], row[1], f"leave-one-out ± {j * s:.{decimals(j * s)}f}")
+            (row[0], row[1], f"leave-one-out ± {spread(j * s)}")
             for row, j, s in zip(rows, jackknife, scales, strict=False)
         ]
     return rows

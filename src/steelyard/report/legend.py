@@ -8,7 +8,7 @@ from steelyard.identify.estimate import PartMass
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import general, mass_unit, measured
+from steelyard.report.numbers import fixed, general, mass_unit, measured, places_of
 from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar
 from steelyard.report.projection import picture
@@ -33,13 +33,15 @@ def viewer(report: Report) -> Html:
         "div", still,
         tag("canvas", tabindex=0, hidden=True, role="img", aria_describedby="how",
             aria_label="The parts of the object in 3D"),
-        tag("div", class_="chips", aria_hidden="true"), tag("output", class_="hint", hidden=True),
+        tag("div", class_="chips", aria_hidden="true"),
         class_="stage",
     )  # fmt: skip
+    hint = tag("output", class_="hint", hidden=True)  # below the picture, where it covers none of it
+    view = tag("div", stage, hint, _controls(report, report.scene, known), class_="view")
     return tag(
         "section",
         tag("h2", "The object", class_="unseen"),
-        tag("div", tag("div", stage, _controls(report, report.scene, known), class_="view"), parts, class_="viewer"),
+        tag("div", view, parts, class_="viewer"),
         id="viewer", class_="object",
     )  # fmt: skip
 
@@ -118,12 +120,12 @@ def _part(report: Report, part: PartMass, colour: tuple[int, int, int], share: f
     if part.material:
         said += [" · ", tag("b", part.material)]
     if true is not None:
-        said.append(f" · truth {general(factor * true, 4)} {unit}")
+        said.append(f" · truth {fixed(factor * true, places_of(factor * part.mass, factor * part.std))} {unit}")
     return tag(
         "li",
         tag("label", _switch(part.label, name, drawn), _swatch(colour), tag("span", name, class_="name"),
             tag("span", measured(factor * part.mass, factor * part.std, unit), class_="mass")),
-        share_bar(share),
+        share_bar(share, hexadecimal(colour)),
         tag("p", *said, class_="aside"),
         data_label=part.label,
     )  # fmt: skip

@@ -10,7 +10,8 @@ from steelyard.inertia import forms
 from steelyard.report.markup import Html, tag
 from steelyard.spatial import Rotation
 
-_THIN = "\u202f"
+_MILLIONTH = 1e-6
+_THIN, _BOUND = "\u202f", "\u00a0"  # no line breaks at either
 
 
 def decimals(std: float) -> int:
@@ -39,13 +40,26 @@ def general(value: float | None, figures: int = 3) -> str:
     return f"{value:.{figures}g}".replace("-", "−") if abs(value) >= 1e6 or abs(value) < 1e-5 else fixed(value, places)
 
 
+def places_of(value: float, std: float) -> int:
+    """Return how many decimals of a value are shown, and so of the truth beside it; std 0 is a value given as exact."""
+    return decimals(std) if std > 0 else min(decimals(abs(value) / 1e3), 4) if value else 3
+
+
+def spread(std: float) -> str:
+    """Return two figures of a standard deviation, in powers of ten below a millionth."""
+    if 0 < std < _MILLIONTH:
+        return f"{std:.1e}".replace("-", "−")
+    return fixed(std, decimals(std))
+
+
 def measured(value: float, std: float, unit: str) -> Html:
     """Return value ± std with the unit."""
-    places = decimals(std) if std > 0 else min(decimals(abs(value) / 1e3), 4) if value else 3
-    bar = tag("span", f"{_THIN}±{_THIN}{fixed(std, places)}", class_="pm") if std > 0 else ""
+    bar = tag("span", f"{_THIN}±{_THIN}{spread(std)}", class_="pm") if std > 0 else ""
+    bound = f"{_BOUND}{unit}".replace(" ", _BOUND)
     return tag(
-        "span", tag("span", fixed(value, places), class_="v"), bar, tag("span", f" {unit}", class_="u"), class_="q"
-    )
+        "span", tag("span", fixed(value, places_of(value, std)), class_="v"), bar, tag("span", bound, class_="u"),
+        class_="q",
+    )  # fmt: skip
 
 
 def mass_unit(mass: float) -> tuple[float, str]:

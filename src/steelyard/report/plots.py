@@ -53,7 +53,8 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) ->
     ]
     return tag(
         "figure",
-        tag("figcaption", tag("h3", title), tag("ul", *named, class_="key", aria_label="root mean square per axis")),
+        tag("figcaption", tag("h3", title),
+            tag("ul", tag("li", "rms"), *named, class_="key", aria_label="root mean square per axis")),
         tag(
             "svg", *_grid(step, reach, unit), inner, *_time_axis(start, length),
             width="100%", height=_HEIGHT, class_="plot", role="img",
@@ -145,11 +146,24 @@ def interval(value: float, std: float, truth: float | None) -> Html:
     )  # fmt: skip
 
 
-def share_bar(share: float, kind: str = "") -> Html:
-    """Return a thin bar that fills `share` (0..1) of its cell."""
+def interval_signs() -> list[Html]:
+    """Return what the signs of an interval mean: each sign, and a word beside it."""
+    signs = {
+        "the answer": (10, tag("circle", cx=5, cy=9, r=4, class_="dot")),
+        "two standard deviations either side": (26, tag("line", x1=3, x2=23, y1=9, y2=9, class_="bar")),
+        "the truth": (6, tag("line", x1=3, x2=3, y1=1, y2=17, class_="truth")),
+    }
+    return [
+        tag("span", tag("svg", sign, width=width, height=18, class_="interval", aria_hidden="true"), " ", said)
+        for said, (width, sign) in signs.items()
+    ]
+
+
+def share_bar(share: float, colour: str) -> Html:
+    """Return a thin bar of a colour that fills `share` (0..1) of its cell."""
     width = f"{100 * min(max(share, 0.0), 1.0):.1f}%"
     return tag(
         "svg", tag("rect", width="100%", height=5, rx=2.5, class_="rail"),
-        tag("rect", width=width, height=5, rx=2.5, class_=f"fill {kind}".strip()),
+        tag("rect", width=width, height=5, rx=2.5, fill=colour),
         width="100%", height=5, class_="share", aria_hidden="true",
     )  # fmt: skip

@@ -9,9 +9,9 @@ from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import decimals, fixed, general, inertia_unit, mass_unit, measured, principal
+from steelyard.report.numbers import fixed, general, inertia_unit, mass_unit, measured, places_of, principal
 from steelyard.report.palette import hexadecimal
-from steelyard.report.plots import interval, residual_plot
+from steelyard.report.plots import interval, interval_signs, residual_plot
 from steelyard.team.estimate import TeamEstimate
 
 _ENTRIES = ("mass", "x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")
@@ -32,13 +32,7 @@ def headline(report: Report) -> Html:
     value = measured(factor * seen.mass, factor * float(seen.std[0]), unit)
     mass = _card(
         "Mass",
-        tag(
-            "p",
-            value,
-            class_="big long"
-            if len(str(round(factor * seen.mass))) + decimals(factor * float(seen.std[0])) > 5
-            else "big",
-        ),
+        tag("p", value, class_=_big(factor * seen.mass, factor * float(seen.std[0]))),
         interval(seen.mass, float(seen.std[0]), None if true is None else float(true[0])),
         _stack(report),
         tag("p", _share_of(float(seen.std[0]), seen.mass), class_="aside"),
@@ -48,7 +42,20 @@ def headline(report: Report) -> Html:
         for k, axis in enumerate("xyz")
     ]
     com = _card("Centre of mass", tag("dl", *rows), tag("p", _place(seen), class_="aside"))
-    return tag("div", mass, com, _moments_card(report), class_="cards")
+    return joined(tag("div", mass, com, _moments_card(report), class_="cards"), _signs(report))
+
+
+def _signs(report: Report) -> Html:
+    """Return what ± means on this page, and the signs of the intervals where a truth is drawn on them."""
+    stated = bool((report.estimate.std > 0).any())
+    drawn = interval_signs() if stated and report.truth is not None else []
+    return tag("p", tag("span", "± is one standard deviation."), *drawn, class_="signs") if stated else Html("")
+
+
+def _big(value: float, std: float) -> str:
+    """Return the class of a large number by how many digits have to stand in one line."""
+    digits = len(str(round(value))) + places_of(value, std)
+    return "big" if digits <= 5 else "big long" if digits <= 7 else "big longer"
 
 
 def _place(seen: Estimate) -> str:
@@ -199,9 +206,9 @@ def numbers(report: Report) -> Html:
             tag("td", measured(factor * values[k], factor * std[k], unit) if known else "not fixed by these data"),
         ]
         if true is not None:
-            places = 4 if k == 0 and factor == 1 else 2
+            shown = places_of(factor * values[k], factor * std[k])
             away = abs(values[k] - true[k]) / std[k] if std[k] > 0 and known else None
-            cells.append(tag("td", fixed(factor * true[k], places)))
+            cells.append(tag("td", fixed(factor * true[k], shown)))
             cells.append(tag("td", "" if away is None else f"{fixed(away, 1)} σ", class_="bad" if away and away > 3 else None))  # fmt: skip  # noqa: E501
         lines.append(tag("tr", *cells))
     heads = ("parameter", "found", *(("truth", "away") if true is not None else ()))

@@ -86,7 +86,7 @@ def _angles(grasp: GraspEstimate) -> Html:
     places = max(0, int(1 - np.floor(np.log10(std)))) if std > 0 else 2
     shown = ", ".join(fixed(float(a), places) for a in rpy_deg(grasp.pose.rotation))
     bar = tag("span", f" ± {fixed(std, places)}", class_="pm") if std > 0 else ""
-    return tag("span", tag("span", shown, class_="v"), bar, tag("span", "°", class_="u"))
+    return tag("span", tag("span", shown, class_="v"), bar, tag("span", "°", class_="u"), class_="angles")
 
 
 def _late(seen: TeamEstimate, name: str) -> Html:
