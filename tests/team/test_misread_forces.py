@@ -179,6 +179,14 @@ def test_a_sensor_turned_by_another_angle_is_named(robots: int) -> None:
     assert "turned by about 30 deg" in finding.message
 
 
+@pytest.mark.parametrize(("robots", "seed"), [(2, 1006), (3, 1002), (3, 1003), (3, 1008), (5, 1001)])
+def test_forces_in_axes_that_nobody_knows_are_not_compared(robots: int, seed: int) -> None:
+    two_poses = scene(robots=robots, kinds=("still",), still_turns=((0.1, 0, 0), (-0.06, 0.08, 0)))
+    found = JointTeam().identify(simulate_team(two_poses, seed).log)
+    assert "grasp-direction-lost" in found.codes()
+    assert not about_forces(found)
+
+
 def test_wrong_gravity_is_no_reading_of_forces() -> None:
     log = simulate_team(scene(motion_samples=800), 60).log
     tilted = tuple(replace(robot, gravity=np.array([-6.3, 0.0, -7.5])) for robot in log.robots)
