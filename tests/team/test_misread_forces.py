@@ -185,6 +185,7 @@ def test_forces_in_axes_that_nobody_knows_are_not_compared(robots: int, seed: in
     found = JointTeam().identify(simulate_team(two_poses, seed).log)
     assert "grasp-direction-lost" in found.codes()
     assert not about_forces(found)
+    assert "common-gain-unseen" not in found.codes()
 
 
 def test_wrong_gravity_is_no_reading_of_forces() -> None:

@@ -116,7 +116,7 @@ def identify(
         estimate = load.estimate().noted("the fit was repeated with a bias that drifts")
         late = after(log, estimate, aligned, recording)
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
-    estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late))
+    estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if unmeasured:
         estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())

@@ -103,7 +103,8 @@ class JointTeam:
         require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)
         size = team_size(grasps, spread)
-        groups, D, read = _with_forces_read(groups, summing(placed), log.names, spread.turn(size))
+        known = spread.turn(size) < COMPARABLE
+        groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
         _require_one_clock(payload.chi2)
@@ -113,7 +114,7 @@ class JointTeam:
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *bad_robots(log.names, noise),
-            *gains(payload.gain, payload.gainless),
+            *(gains(payload.gain, payload.gainless) if known else ()),
             *open_parameters(team.identified, team.evidence.rank),
         ]
         return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
@@ -168,13 +169,13 @@ class JointTeam:
 
 
 def _with_forces_read(
-    groups: tuple[Group, ...], D: Array, names: Sequence[str], turn: float
+    groups: tuple[Group, ...], D: Array, names: Sequence[str], known: bool
 ) -> tuple[tuple[Group, ...], Array, list[Finding]]:
     """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', and why.
 
-    turn  [rad] how unsure grasps are: forces along axes that nobody knows are not compared
+    known  whether grasps' rotations are: forces along axes that nobody knows are not compared
     """
-    if turn < COMPARABLE:
+    if known:
         groups, read, doubtful = with_one_reading(groups, D, names)
     else:
         read, doubtful = (), np.zeros(len(names), np.bool_)
