@@ -73,6 +73,12 @@ class _Left:
         ratio = np.maximum(left, least) / max(self.variance, least)
         return ratio, ratio * self.size.sum() / np.maximum(all_forces, least)
 
+    def left_out(self) -> Array:
+        """Return what is left (N,) without each robot's force, against what is left as given."""
+        none = -np.eye(3).ravel()
+        left = self.variance + 2 * self.slope @ none + self.curvature @ none @ none
+        return np.asarray(left / max(self.variance, ROUNDING * float(self.size.sum())))
+
     def by_sign(self) -> Mask:
         """Return of which robots (N,) less is left with the sign turned."""
         return np.asarray(self.shares()[0][:, SIGN] < 1.0)
@@ -99,6 +105,10 @@ def with_one_reading(
     equal = [divmod(int(k), len(READINGS)) for k in near[np.argsort(score.flat[near])]]
     robot, number = equal[0]
     fits = min(fallen[one] for one in equal) < FALLS**-2 and given.misfit * shares[0][1][robot, number] < MISSES
+    left = np.prod([share[0][robot, number] for share in shares])
+    without = np.prod([one.left_out()[robot] for one in both])
+    # A sensor that is merely loud is best left out, and every reading that makes it small seems right.
+    fits &= CLEAR * left < without
     if not fits or _unlike(groups, D, robot, READINGS[number]):
         return groups, _odd_one(groups, D, names, both), given.by_sign()
     if len(equal) > 1:
