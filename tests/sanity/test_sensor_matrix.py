@@ -9,13 +9,14 @@ import numpy as np
 import pytest
 
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia import solids
 from steelyard.logs.log import MotionLog
-from steelyard.logs.recording import Mount, Recording
+from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity.sensor_matrix import SURE, sensor_matrix
 from steelyard.simulate import hammer
 from steelyard.simulate.logs import simulate_log
-from steelyard.spatial import Rotation
+from steelyard.spatial import Pose, Rotation
 
 TURN = np.radians([1.0, -1.0, 1.5])
 
@@ -98,6 +99,41 @@ def test_a_turned_sensor_is_told_with_the_mount_that_mends_it(
     mended = identify(replace(wrong, streams=tuple(mounted)))
     assert mended.codes() == answer.codes()
     assert off(mended, answer) < 4
+
+
+def test_a_drift_hides_nothing(recording: Recording, answer: Estimate) -> None:
+    """A bias that grows by 2 N is most of the residual where nothing says that it may."""
+
+    def drifts(stream: Stream) -> Stream:
+        if "force" not in stream.channels:
+            return stream
+        force = stream.channels["force"] + np.linspace(0, 2, len(stream))[:, None]
+        return replace(stream, channels={**stream.channels, "force": force})
+
+    for turn, gains, code in ((np.zeros(3), (1.04, 1, 1), "gains-differ"), (2 * TURN, (1, 1, 1), "sensor-turned")):
+        wrong = misread(recording, turn, gains)
+        found = identify(replace(wrong, streams=tuple(map(drifts, wrong.streams))))
+        assert {"bias-drift", code} <= found.codes()
+        assert off(found, answer) < 3
+
+
+def test_bars_of_an_object_hold_what_a_turn_does_to_it_and_its_tool(monkeypatch: pytest.MonkeyPatch) -> None:
+    held = hammer.body()
+    tool = solids.box(0.1, 0.08, 0.12, 2000).in_frame(Pose(Rotation.identity(), np.array([0.0, 0.01, 0.06])))
+    monkeypatch.setattr(hammer, "body", lambda: tool)
+    alone = hammer.recording(1).recording
+    monkeypatch.setattr(hammer, "body", lambda: tool + held)
+    both = hammer.recording(2).recording
+    right = identify(both, tool=alone)
+    found = identify(misread(both, TURN), tool=alone)
+    assert "sensor-turned" in found.codes() - right.codes()
+    assert off(found, right) < 2
+
+
+def test_two_bursts_tell_no_spread() -> None:
+    log = made("stop_go", "low", 0, np.zeros(3))
+    first, last = log.time[0], log.time[-1]
+    assert sensor_matrix(log.rows((log.time < first + 0.3) | (log.time > last - 0.3))) is None
 
 
 def test_a_mount_that_is_wrong_is_given_anew(recording: Recording) -> None:

@@ -12,6 +12,7 @@ import steelyard.simulate.team_payload as team_payload
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_track import Track
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.team.estimate import TeamEstimate
@@ -177,6 +178,34 @@ def test_a_sensor_turned_by_another_angle_is_named(robots: int) -> None:
     assert finding.code == "wrench-unexplained"
     assert "What 'robot1' pushes fits neither" in finding.message
     assert "turned by about 30 deg" in finding.message
+
+
+@pytest.mark.parametrize(("robots", "seed"), [(2, 1006), (3, 1002), (3, 1003), (3, 1008), (5, 1001)])
+def test_forces_in_axes_that_nobody_knows_are_not_compared(robots: int, seed: int) -> None:
+    two_poses = scene(robots=robots, kinds=("still",), still_turns=((0.1, 0, 0), (-0.06, 0.08, 0)))
+    found = JointTeam().identify(simulate_team(two_poses, seed).log)
+    assert "grasp-direction-lost" in found.codes()
+    assert not about_forces(found)
+    assert "common-gain-unseen" not in found.codes()
+
+
+@pytest.mark.parametrize("robots", [2, 3, 4])
+def test_a_loud_sensor_is_no_unit(robots: int) -> None:
+    for seed in (1002, 1003):
+        log = simulate_team(scene(robots=robots, motion_samples=800), seed).log
+        loud = log.with_recordings(
+            *(
+                replace(r, tracks={**r.tracks, "robot1": shaken(r.tracks["robot1"], 30.0 if robots > 2 else 80.0)})
+                for r in log.recordings
+            )
+        )
+        assert not about_forces(JointTeam().identify(loud))
+
+
+def shaken(track: Track, level: float) -> Track:
+    force = track.channels["force"]
+    noise = level * np.random.default_rng(0).normal(size=force.shape)
+    return replace(track, channels={**track.channels, "force": force + noise})
 
 
 def test_wrong_gravity_is_no_reading_of_forces() -> None:

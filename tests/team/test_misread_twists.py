@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
@@ -49,3 +50,9 @@ def test_good_logs_pass(robots: int) -> None:
     for seed, late in ((100, 0.0), (101, 0.02), (102, 0.5)):
         log = made(robots, seed, late)
         require_one_velocity_unit(log, TwistTeam.of(log, late < 0.1))
+
+
+def test_velocities_that_are_all_zero_are_no_unit() -> None:
+    log = scaled(made(3, 100), "robot1", 0.0)
+    with np.errstate(all="raise"):
+        require_one_velocity_unit(log, TwistTeam.of(log, False))

@@ -121,7 +121,7 @@ def identify(
         late = after(log, estimate, aligned, recording)
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
-    estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late))
+    estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if aligned.acceleration_from in ENCODERS and parts is None:
         estimate = allow_softness(log, estimate)
     if unmeasured:

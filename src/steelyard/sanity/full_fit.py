@@ -39,7 +39,7 @@ class FullFit:
 
 @dataclass(frozen=True, eq=False)
 class Rows:
-    """A thinned log as a linear problem: columns (N, 6, 16), values (N, 6), weights (N, 6), block (N,)."""
+    """A thinned log as a linear problem: columns (N, 6, 16 or 22), values (N, 6), weights (N, 6), block (N,)."""
 
     log: MotionLog
     columns: Array
@@ -48,11 +48,16 @@ class Rows:
     block: Integers
 
     @classmethod
-    def of(cls, log: MotionLog) -> tuple[Rows, Integers]:
-        """Return the rows and which rows of the log they are; weights from the residuals of each class of rows."""
+    def of(cls, log: MotionLog, drift: bool = False) -> tuple[Rows, Integers]:
+        """Return the rows and which rows of the log they are; weights from the residuals of each class of rows.
+
+        drift  whether six more columns let the bias grow with time
+        """
         pick = np.unique(np.linspace(0, len(log) - 1, min(len(log), _MOST_ROWS)).astype(np.int64))
         thin = log.rows(pick)
         rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
+        if drift:
+            rows = replace(rows, columns=np.concatenate([rows.columns, rows.drifting()], 2))
         for _ in range(2):
             rows = replace(rows, weights=_weights(rows, rows.solve().solution))
         return rows, pick

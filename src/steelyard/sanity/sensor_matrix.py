@@ -17,7 +17,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.people import parameter_jacobian
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.full_fit import FullFit, Rows
+from steelyard.sanity.full_fit import Rows
 from steelyard.spatial import Rotation, cross_matrix
 
 # A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many
@@ -27,7 +27,8 @@ TURN_LEFT, UNLIKE_LEFT = 0.95, 0.99
 ELSEWHERE = {"base-tilted", "weight-compensated", "wrench-unexplained"}
 # The turn is linearised anew until it changes by less [rad].
 ROUNDS, SETTLED = 5, 1e-5
-_FEWEST_ROWS = 8
+# Leaving stretches out tells a spread from so many of them on.
+_FEWEST_ROWS, _FEWEST_BLOCKS = 8, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,7 +38,7 @@ class SensorMatrix:
     turn, turn_std        (3,) [rad] of the wrench about the axes of S
     stretch, stretch_std  (3, 3) of the force, symmetric and without a trace: gains of the axes beside their mean
     left                  squared residual beside that of a sensor without either
-    moved                 (4,) what mass [kg] and centre of mass [m] are less with it
+    moved                 (4,) what mass [kg] and its first moment [kg m] are less with it
     """
 
     turn: Array
@@ -61,24 +62,31 @@ _STRETCHES = np.array(
 )
 
 
-def sensor_matrix(log: MotionLog) -> SensorMatrix | None:
-    """Return what the wrench says of the sensor; None for too short a log or channels that do not measure."""
+def sensor_matrix(log: MotionLog, drift: bool = False) -> SensorMatrix | None:
+    """Return what the wrench says of the sensor; None for too short a log or channels that do not measure.
+
+    drift  whether the bias may grow with time
+    """
     if len(log) < _FEWEST_ROWS or log.dead.any():
         return None
-    rows, _ = Rows.of(log)
+    rows, _ = Rows.of(log, drift)
+    if rows.block.max() + 1 < _FEWEST_BLOCKS:
+        return None
     plain, turn = rows.solve(), Rotation.identity()
+    turns, stretches = (slice(len(plain.solution) + k, len(plain.solution) + n) for k, n in ((0, 3), (3, 8)))
     phi, values = plain.solution[:10], rows.values
     for _ in range(ROUNDS):
         felt = rows.columns[:, :, :10] @ phi
         right = replace(rows, values=_rotated(turn.inverse(), values))
         fit = right.solve(np.concatenate([_turned(felt), _stretched(felt)], 2), jackknife=True)
-        turn, phi = turn @ Rotation.exp(fit.solution[16:19]), fit.solution[:10]
-        if np.linalg.norm(fit.solution[16:19]) < SETTLED:
+        turn, phi = turn @ Rotation.exp(fit.solution[turns]), fit.solution[:10]
+        if np.linalg.norm(fit.solution[turns]) < SETTLED:
             break
-    stretch = np.tensordot(fit.solution[19:], _STRETCHES, 1)
-    spread = np.sqrt(np.tensordot(fit.spread[19:] ** 2, _STRETCHES**2, 1))
+    stretch = np.tensordot(fit.solution[stretches], _STRETCHES, 1)
+    spread = np.sqrt(np.tensordot(fit.spread[stretches] ** 2, _STRETCHES**2, 1))
     left = fit.left / plain.left if plain.left else 1.0
-    return SensorMatrix(turn.log(), fit.spread[16:19], stretch, spread, left, _people(plain) - _people(fit))
+    moved = plain.solution[:4] - fit.solution[:4]
+    return SensorMatrix(turn.log(), fit.spread[turns], stretch, spread, left, moved)
 
 
 def _rotated(turn: Rotation, wrench: Array) -> Array:
@@ -97,21 +105,19 @@ def _stretched(felt: Array) -> Array:
     return np.concatenate([np.zeros_like(force), force], 1)
 
 
-def _people(fit: FullFit) -> Array:
-    return np.concatenate([fit.solution[:1], fit.solution[1:4] / fit.solution[0]])
-
-
 def examine_sensor(
-    log: MotionLog, recording: Recording, estimate: Estimate, known: tuple[Finding, ...]
+    log: MotionLog, recording: Recording, estimate: Estimate, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[Estimate, tuple[Finding, ...]]:
     """Return `sensor-turned` or `gains-differ` where the wrench shows them, and the estimate with bars that hold them.
 
-    known  what was found before: a tilted base or a wrench that nothing explains is not looked at again
+    estimate  of what was held, or of what is left of it without the tool
+    known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
+    drift     whether the bias was taken to grow with time
     """
     stream = next((s for s in recording.streams if "force" in s.channels), None)
     if stream is None or "W" in stream.frames.values() or {f.code for f in known} & ELSEWHERE:
         return estimate, ()
-    found = sensor_matrix(log)
+    found = sensor_matrix(log, drift)
     if found is None:
         return estimate, ()
     turned = _sure(found.turn, found.turn_std, TURN, found.left < TURN_LEFT)
@@ -152,7 +158,8 @@ def _gains(found: SensorMatrix) -> tuple[Finding, ...]:
 def _widened(estimate: Estimate, found: SensorMatrix) -> Estimate:
     """Return the estimate with bars that hold what the sensor's matrix moves mass and centre by, and a common gain."""
     phi = estimate.parameters.vector
-    moved = parameter_jacobian(phi)[:, :4] @ found.moved
+    mass, first = found.moved[0], found.moved[1:]
+    moved = parameter_jacobian(phi)[:, :4] @ np.append(mass, (first - mass * estimate.com) / estimate.mass)
     # Three gains with this spread have a mean that is known no better; of torques as of forces, which alone show mass.
     gain = np.sqrt(np.square(found.stretch).sum() / 2 / 3)
     of_force, of_torque = gain * np.eye(10)[0] * phi[0], gain * np.append(0.0, phi[1:])

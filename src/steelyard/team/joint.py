@@ -52,6 +52,9 @@ from steelyard.team.twist_team import TwistTeam
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
 LEAST_CHI2 = -0.1
+# Forces are not compared along the axes of grasps whose rotation is known no better than this [rad]: what that leaves
+# of their sum is as much as a misreading.
+COMPARABLE = 0.1
 
 
 @dataclass(frozen=True)
@@ -99,20 +102,19 @@ class JointTeam:
         placed = balance_frame(grasps).inverse() @ grasps
         require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)
-        groups, read, judged = with_one_reading(groups, summing(placed), log.names)
-        D, turned = with_one_sign(groups, summing(placed), log.names, judged)
         size = team_size(grasps, spread)
+        known = spread.turn(size) < COMPARABLE
+        groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
         _require_one_clock(payload.chi2)
         team = _without_wrists(assembled(log, grasps, spread, payload, D, _added(late, begun)), self.wrists)
         found += [
-            *(finding for finding in read if not (turned and finding.code == "wrench-unexplained")),
-            *turned,
+            *read,
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *bad_robots(log.names, noise),
-            *gains(payload.gain, payload.gainless),
+            *(gains(payload.gain, payload.gainless) if known else ()),
             *open_parameters(team.identified, team.evidence.rank),
         ]
         return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
@@ -164,6 +166,21 @@ class JointTeam:
             raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
         for name, mass in self.wrists.items():
             check.not_negative(f"the mass of the wrist of '{name}'", mass)
+
+
+def _with_forces_read(
+    groups: tuple[Group, ...], D: Array, names: Sequence[str], known: bool
+) -> tuple[tuple[Group, ...], Array, list[Finding]]:
+    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', and why.
+
+    known  whether grasps' rotations are: forces along axes that nobody knows are not compared
+    """
+    if known:
+        groups, read, doubtful = with_one_reading(groups, D, names)
+    else:
+        read, doubtful = (), np.zeros(len(names), np.bool_)
+    D, signs = with_one_sign(groups, D, names, doubtful)
+    return groups, D, [*(one for one in read if not (signs and one.code == "wrench-unexplained")), *signs]
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:

@@ -16,7 +16,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.regressor import basis
-from steelyard.logs.log import Integers
+from steelyard.logs.log import Integers, Mask
 from steelyard.team.payload_model import Group
 from steelyard.team.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
 from steelyard.team.signs import sign_finding
@@ -73,11 +73,21 @@ class _Left:
         ratio = np.maximum(left, least) / max(self.variance, least)
         return ratio, ratio * self.size.sum() / np.maximum(all_forces, least)
 
+    def left_out(self) -> Array:
+        """Return what is left (N,) without each robot's force, against what is left as given."""
+        none = -np.eye(3).ravel()
+        left = self.variance + 2 * self.slope @ none + self.curvature @ none @ none
+        return np.asarray(left / max(self.variance, ROUNDING * float(self.size.sum())))
+
+    def by_sign(self) -> Mask:
+        """Return of which robots (N,) less is left with the sign turned."""
+        return np.asarray(self.shares()[0][:, SIGN] < 1.0)
+
 
 def with_one_reading(
     groups: Sequence[Group], D: Array, names: Sequence[str]
-) -> tuple[tuple[Group, ...], tuple[Finding, ...], bool]:
-    """Return the groups with one robot's wrench read as it fits the others', why, and whether signs are left to judge.
+) -> tuple[tuple[Group, ...], tuple[Finding, ...], Mask]:
+    """Return the groups with one robot's wrench read as it fits the others', why, and whose signs (N,) may be wrong.
 
     D  (6, 6 N) sums the pushes at B
     """
@@ -86,7 +96,7 @@ def with_one_reading(
     given = _left(S, D)
     # Nothing fits better, and not much is left: so it is with most logs.
     if not np.maximum(*given.shares()).min() < 1.0 and given.misfit < UNFIT:
-        return groups, (), True
+        return groups, (), given.by_sign()
     both = (given, _left(_without_bias(groups), D))
     shares = [one.shares() for one in both]
     score = shares[0][1] * shares[1][1]
@@ -95,14 +105,19 @@ def with_one_reading(
     equal = [divmod(int(k), len(READINGS)) for k in near[np.argsort(score.flat[near])]]
     robot, number = equal[0]
     fits = min(fallen[one] for one in equal) < FALLS**-2 and given.misfit * shares[0][1][robot, number] < MISSES
+    left = np.prod([share[0][robot, number] for share in shares])
+    without = np.prod([one.left_out()[robot] for one in both])
+    # A sensor that is merely loud is best left out, and every reading that makes it small seems right.
+    fits &= CLEAR * left < without
     if not fits or _unlike(groups, D, robot, READINGS[number]):
-        return groups, _odd_one(groups, D, names, both), True
+        return groups, _odd_one(groups, D, names, both), given.by_sign()
     if len(equal) > 1:
-        by_sign = any(k == SIGN for _, k in equal)
-        return groups, () if by_sign else (_undecided(equal, names),), by_sign
+        signs = given.by_sign() & any(k == SIGN for _, k in equal)
+        return groups, () if signs.any() else (_undecided(equal, names),), signs
     reading = _with_torque(S, D, robot, number)
     read = tuple(_reread(group, robot, reading.wrench()) for group in groups)
-    return read, (_finding(names[robot], reading, score[robot, number]),), True
+    found = (_finding(names[robot], reading, score[robot, number]),)
+    return read, found, _left(_scatter(read), D).by_sign()
 
 
 def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequence[_Left]) -> tuple[Finding, ...]:

@@ -49,6 +49,12 @@ class Spread:
         lost = self.blind / np.maximum(largest, 1e-300)
         return replace(self, full=self.full + lost @ lost.T)
 
+    def turn(self, size: float) -> float:
+        """Return the largest standard deviation [rad] of a grasp's rotation, for a team of this size [m]."""
+        full = self.with_lost(size).full.reshape(-1, 6, len(self.full) // 6, 6)
+        own = np.einsum("iaib->iab", full)[:, :3, :3]
+        return float(np.sqrt(max(np.linalg.eigvalsh(own).max(), 0.0)))
+
     def of(self, robot: int) -> Array:
         """Return the covariance (6, 6) of one grasp, rotation and position in R's axes."""
         part = slice(6 * robot, 6 * robot + 6)

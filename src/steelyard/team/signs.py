@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.log import Mask
 from steelyard.team.mass_and_com import require_lift
 from steelyard.team.payload_model import Group
 
@@ -20,18 +21,19 @@ FALLS = 4.0
 
 
 def with_one_sign(
-    groups: Sequence[Group], D: Array, names: Sequence[str], judged: bool = True
+    groups: Sequence[Group], D: Array, names: Sequence[str], doubtful: Mask
 ) -> tuple[Array, tuple[Finding, ...]]:
     """Return D (6, 6 N), the sum of pushes at B, with a robot's sign turned where its forces ask for it, and why.
 
-    Signs are left as they are unless they are to be `judged`. Raises CannotAnswer where the forces of all then pull the
-    payload down.
+    doubtful  (N,) whose signs may be wrong: those of others are left as they are
+
+    Raises CannotAnswer where the forces of all then pull the payload down.
     """
     total = [part.scatter.sum(0) for group in groups for part in group.parts]
     forces = D[3:].reshape(3, -1, 6)
     lifted = np.sum([np.einsum("aix,ixa->i", forces, S[12:-1, 3:6].reshape(-1, 6, 3)) for S in total], axis=0)
     each = np.sum([_beside_one_another(S, forces) for S in total], axis=0)
-    wrong, found = odd_one_out(each, lifted, names) if judged else (None, ())
+    wrong, found = odd_one_out(each, lifted, names, doubtful)
     if wrong is not None:
         D, lifted = D.copy(), lifted.copy()
         D[:, 6 * wrong : 6 * wrong + 6] *= -1
@@ -40,13 +42,17 @@ def with_one_sign(
     return D, found
 
 
-def odd_one_out(each: Array, lifted: Array, names: Sequence[str]) -> tuple[int | None, tuple[Finding, ...]]:
+def odd_one_out(
+    each: Array, lifted: Array, names: Sequence[str], doubtful: Mask | None = None
+) -> tuple[int | None, tuple[Finding, ...]]:
     """Return the robot whose sign must be turned, and why; None where all are right.
 
     each  (N, N) products of what the motion leaves of the robots' forces     lifted  (N,) how far each pushes up
+    doubtful  (N,) who is asked; all, if None
     """
     turned = each.sum() - 4 * (each.sum(1) - np.diag(each))
-    asking = np.flatnonzero(turned < each.sum() / FALLS)
+    asks = turned < each.sum() / FALLS
+    asking = np.flatnonzero(asks if doubtful is None else asks & doubtful)
     if not len(asking):
         return None, ()
     # Of two robots each asks for it: it is the one that pulls down.

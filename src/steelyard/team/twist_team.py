@@ -58,11 +58,11 @@ class TwistTeam:
 
     @property
     def share(self) -> Array:
-        """Noise (N, 2) as a share of each robot's twists (rms), turning and moving."""
+        """Noise (N, 2) as a share of each robot's twists (rms), turning and moving; all of what does not move."""
         square = sum((part.twist**2 * part.seen[..., None]).sum(0).reshape(-1, 2, 3).sum(2) for part in self.parts)
         rows = sum(part.seen.sum(0) for part in self.parts)
         size = np.sqrt(square / (3 * np.maximum(rows, 1))[:, None])
-        return np.asarray(self.fit.noise / np.maximum(size, 1e-300))
+        return np.asarray(np.divide(self.fit.noise, size, out=np.ones_like(size), where=size > 0))
 
     def down(self) -> Array | None:
         """Return the mean direction of gravity (3,) in R, None where nobody can tell it."""
