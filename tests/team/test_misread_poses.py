@@ -110,6 +110,17 @@ def test_one_recording_misread_is_named() -> None:
         assert words in message
 
 
+@pytest.mark.parametrize("way", ["cm", "mm", "inches"])
+def test_a_unit_shows_though_all_robots_turn_noisily(way: str) -> None:
+    """Noise of rotations is the same share whatever the unit: places alone fall to a quarter."""
+    spoil, words = SPOILED[way]
+    noisy = replace(NOISY, pose_rad=3e-3, pose_m=1e-3)
+    for robots, seed in ((3, 700), (4, 701), (5, 702)):
+        message = said(spoiled(made(robots, seed, noisy), "robot1", spoil))
+        assert "those of 'robot1' are misread (" in message
+        assert words in message
+
+
 def test_a_clock_half_a_second_late_hides_nothing() -> None:
     spoil, words = SPOILED["transposed"]
     log = made(late_s={1: 0.5}, kinds=("grasp", "motion"))

@@ -119,10 +119,10 @@ def _best(tried: Sequence[Try], given: _Judged, judge: _Judge) -> list[tuple[Try
     """Return the readings that make poses fit, best first: several where one is as good as another."""
     first = [judge(one.parts, False) for one in tried]
     order = sorted(range(len(tried)), key=lambda k: first[k].cost)[:MOST]
-    bar = min(min((j.cost for j in first), default=0.0) + np.log(NEAR), given.cost - np.log(BETTER))
-    near = [tried[k] for k in order if first[k].cost < bar]
+    bar = min((j.cost for j in first), default=0.0) + np.log(NEAR)
+    near = [tried[k] for k in order if first[k].cost < bar and first[k].beats(given, BETTER)]
     fitted = [(one, judge(one.parts, True)) for one in near]
-    able = [(one, j) for one, j in fitted if j.worst < FITS and j.cost < given.cost - np.log(CLOSES)]
+    able = [(one, j) for one, j in fitted if j.worst < FITS and j.beats(given, CLOSES)]
     able.sort(key=lambda pair: pair[1].cost)
     return [pair for pair in able if pair[1].cost < able[0][1].cost + np.log(AS_GOOD)]
 
@@ -133,7 +133,7 @@ def _suspects(parts: tuple[Stretch, ...], judge: _Judge, given: _Judged) -> list
     if count < MANY:
         return list(range(count))
     without = [judge.without(i)(_left_out(parts, i), False) for i in range(count)]
-    return [i for i, w in enumerate(without) if not w.fits or w.cost < given.cost - np.log(BETTER)]
+    return [i for i, w in enumerate(without) if not w.fits or w.beats(given, BETTER)]
 
 
 def _left_out(parts: tuple[Stretch, ...], robot: int) -> tuple[Stretch, ...]:
@@ -160,7 +160,7 @@ def _in_one(
             seen = part.seen.copy()
             seen[:, i] = False
             without = judge((*parts[:k], replace(part, seen=seen), *parts[k + 1 :]), False)
-            if without.fits and without.cost > given.cost - np.log(BETTER):
+            if without.fits and not without.beats(given, BETTER):
                 continue
             for reading in readings:
                 made = _read(part, i, reading)
@@ -198,6 +198,10 @@ class _Judged:
     def worst(self) -> float:
         """The largest share."""
         return float(self.share.max())
+
+    def beats(self, given: _Judged, factor: float) -> bool:
+        """Whether shares are smaller by a factor: all of them (rms), or the largest, as others are noisy either way."""
+        return self.cost < given.cost - np.log(factor) or self.worst < given.worst / factor
 
     @property
     def words(self) -> str:
