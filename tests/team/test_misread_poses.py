@@ -18,6 +18,7 @@ from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, Hinge, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
+from steelyard.team import misread_poses
 from steelyard.team.joint import JointTeam
 from steelyard.team.misread_poses import require_well_read
 
@@ -109,6 +110,17 @@ def test_one_recording_misread_is_named() -> None:
         assert words in message
 
 
+@pytest.mark.parametrize("way", ["cm", "mm", "inches"])
+def test_a_unit_shows_though_all_robots_turn_noisily(way: str) -> None:
+    """Noise of rotations is the same share whatever the unit: places alone fall to a quarter."""
+    spoil, words = SPOILED[way]
+    noisy = replace(NOISY, pose_rad=3e-3, pose_m=1e-3)
+    for robots, seed in ((3, 700), (4, 701), (5, 702)):
+        message = said(spoiled(made(robots, seed, noisy), "robot1", spoil))
+        assert "those of 'robot1' are misread (" in message
+        assert words in message
+
+
 def test_a_clock_half_a_second_late_hides_nothing() -> None:
     spoil, words = SPOILED["transposed"]
     log = made(late_s={1: 0.5}, kinds=("grasp", "motion"))
@@ -149,3 +161,18 @@ def test_a_robot_that_is_merely_noisy_is_not_called_misread() -> None:
         return R, p + np.random.default_rng(0).normal(0, 0.05, p.shape)
 
     require_well_read(spoiled(made(), "robot2", shaken))
+
+
+def test_a_large_noisy_team_is_judged_robot_by_robot(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Not reading by reading: of twelve whom nobody misread each is left out once, and no more."""
+    judged = []
+
+    def counted(parts: Any, robot: int) -> Any:
+        judged.append(robot)
+        return left_out(parts, robot)
+
+    left_out = misread_poses._left_out
+    monkeypatch.setattr(misread_poses, "_left_out", counted)
+    monkeypatch.setattr(misread_poses, "_read", lambda *_: pytest.fail("a reading was tried"))
+    require_well_read(made(12, noise=replace(NOISY, pose_rad=8e-3, pose_m=4e-3)))
+    assert judged == list(range(12))

@@ -32,6 +32,8 @@ FITS, CLOSES = 0.15, 4.0
 AS_GOOD, NEAR = 2.0, 20.0
 # Nor is a reading worth one whose start is not better than the fit of poses as given by this factor.
 BETTER = 2.0
+# Of a team of so many, only those are tried without whom the others fit better by that factor.
+MANY = 4
 # A payload that turns by less [rad] does not turn.
 STILL = 0.02
 
@@ -106,7 +108,8 @@ def require_well_read(log: TeamLog) -> None:
     # A fit may end beside the optimum: then its start is the better of the two.
     given = min((judge(parts, exact) for exact in (True, False)), key=lambda judged: judged.cost)
     readings = READINGS if judge.turns(parts) else SCALES
-    for tried in (_everywhere(parts, readings), _in_one(parts, readings, judge, given)):
+    suspects = _suspects(parts, judge, given)
+    for tried in (_everywhere(parts, suspects, readings), _in_one(parts, suspects, readings, judge, given)):
         best = _best(tuple(tried), given, judge)
         if best:
             raise BadValue(_words(best, names, [part.name for part in parts], given))
@@ -116,16 +119,31 @@ def _best(tried: Sequence[Try], given: _Judged, judge: _Judge) -> list[tuple[Try
     """Return the readings that make poses fit, best first: several where one is as good as another."""
     first = [judge(one.parts, False) for one in tried]
     order = sorted(range(len(tried)), key=lambda k: first[k].cost)[:MOST]
-    bar = min(min((j.cost for j in first), default=0.0) + np.log(NEAR), given.cost - np.log(BETTER))
-    near = [tried[k] for k in order if first[k].cost < bar]
+    bar = min((j.cost for j in first), default=0.0) + np.log(NEAR)
+    near = [tried[k] for k in order if first[k].cost < bar and first[k].beats(given, BETTER)]
     fitted = [(one, judge(one.parts, True)) for one in near]
-    able = [(one, j) for one, j in fitted if j.worst < FITS and j.cost < given.cost - np.log(CLOSES)]
+    able = [(one, j) for one, j in fitted if j.worst < FITS and j.beats(given, CLOSES)]
     able.sort(key=lambda pair: pair[1].cost)
     return [pair for pair in able if pair[1].cost < able[0][1].cost + np.log(AS_GOOD)]
 
 
-def _everywhere(parts: tuple[Stretch, ...], readings: Sequence[Reading]) -> Iterator[Try]:
-    for i in range(parts[0].seen.shape[1]):
+def _suspects(parts: tuple[Stretch, ...], judge: _Judge, given: _Judged) -> list[int]:
+    """Return the robots that may be misread: those without whom the others' poses fit better, or not at all."""
+    count = len(judge.names)
+    if count < MANY:
+        return list(range(count))
+    without = [judge.without(i)(_left_out(parts, i), False) for i in range(count)]
+    return [i for i, w in enumerate(without) if not w.fits or w.beats(given, BETTER)]
+
+
+def _left_out(parts: tuple[Stretch, ...], robot: int) -> tuple[Stretch, ...]:
+    """Return the recordings with the poses of the other robots only."""
+    others = np.delete(np.arange(parts[0].seen.shape[1]), robot)
+    return tuple(replace(part, poses=part.poses[:, others], seen=part.seen[:, others]) for part in parts)
+
+
+def _everywhere(parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading]) -> Iterator[Try]:
+    for i in robots:
         for reading in readings:
             read = [_read(part, i, reading) for part in parts]
             made = tuple(part for part in read if part is not None)
@@ -133,19 +151,21 @@ def _everywhere(parts: tuple[Stretch, ...], readings: Sequence[Reading]) -> Iter
                 yield Try(i, reading, None, made)
 
 
-def _in_one(parts: tuple[Stretch, ...], readings: Sequence[Reading], judge: _Judge, given: _Judged) -> Iterator[Try]:
+def _in_one(
+    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading], judge: _Judge, given: _Judged
+) -> Iterator[Try]:
     """Yield readings of one robot in one recording, where poses fit better without them, or not at all."""
     for k, part in enumerate(parts if len(parts) > 1 else ()):
-        for i in np.flatnonzero(part.seen.any(0)):
+        for i in (robot for robot in robots if part.seen[:, robot].any()):
             seen = part.seen.copy()
             seen[:, i] = False
             without = judge((*parts[:k], replace(part, seen=seen), *parts[k + 1 :]), False)
-            if without.fits and without.cost > given.cost - np.log(BETTER):
+            if without.fits and not without.beats(given, BETTER):
                 continue
             for reading in readings:
-                made = _read(part, int(i), reading)
+                made = _read(part, i, reading)
                 if made is not None:
-                    yield Try(int(i), reading, k, (*parts[:k], made, *parts[k + 1 :]))
+                    yield Try(i, reading, k, (*parts[:k], made, *parts[k + 1 :]))
 
 
 def _read(part: Stretch, i: int, reading: Reading) -> Stretch | None:
@@ -179,6 +199,10 @@ class _Judged:
         """The largest share."""
         return float(self.share.max())
 
+    def beats(self, given: _Judged, factor: float) -> bool:
+        """Whether shares are smaller by a factor: all of them (rms), or the largest, as others are noisy either way."""
+        return self.cost < given.cost - np.log(factor) or self.worst < given.worst / factor
+
     @property
     def words(self) -> str:
         """How far robots are apart."""
@@ -203,6 +227,11 @@ class _Judge:
             noise = np.full_like(size, np.nan)
         fits = bool(np.isfinite(noise).all())
         return _Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)
+
+    def without(self, robot: int) -> _Judge:
+        """Return the same for the other robots, whose first is the reference where it was the one left out."""
+        reference = 0 if robot == self.reference else self.reference - (robot < self.reference)
+        return _Judge(self.names[:robot] + self.names[robot + 1 :], reference)
 
     def turns(self, parts: tuple[Stretch, ...]) -> bool:
         """Return whether the payload turns, so that misread rotations show."""
