@@ -32,7 +32,7 @@ def bench() -> None:
     show_default=True,
     help="Rows of the long log.",
 )
-@click.option("--data", type=click.Path(path_type=Path), help="Accepted and not needed: the bench makes its data.")
+@click.option("--data", type=click.Path(path_type=Path), help="Has no effect: the bench makes its own data.")
 @_JSON
 def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> None:
     """Ten bodies, three motions, four noise levels: our methods and, where installed, the peers'."""

@@ -28,7 +28,7 @@ SEED = 0
 @click.argument("story", type=click.Choice(["held-object", "team"]), default="held-object")
 @click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the made noise.")
 @click.option(
-    "-o", "--output", type=click.Path(path_type=Path), show_default="report.html, of the team team.html",
+    "-o", "--output", type=click.Path(path_type=Path), show_default="report.html; team.html for team",
     help="The page to write.",
 )  # fmt: skip
 @click.option(

@@ -54,7 +54,7 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 )
 @click.option(
     "--pose-in-sensor",
-    metavar="TOML",
+    metavar="POSE",
     help="Where the object sits in the sensor: a file with [object] pose_in_sensor, or the table itself in quotes.",
 )
 @click.option(

@@ -28,7 +28,7 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     or a stream holds a quantity that this writer does not know.
     """
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
-    gravity = ", ".join(f"{g:g}" for g in recording.gravity)
+    gravity = ", ".join(f"{g + 0.0:g}" for g in recording.gravity)
     text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
     if recording.object_pose is not None:
         text.append(object_table(recording.object_pose, recording.object_pose_std))
@@ -43,7 +43,7 @@ def write_recording(recording: Recording, folder: Path) -> Path:
 def object_table(pose: Pose, std: tuple[float, float] | None = None) -> str:
     """Return the [object] table of a description: where the object's frame O sits in S; std in m and rad."""
     position, rotation = (
-        ", ".join(f"{v:.12g}" for v in values) for values in (pose.position, pose.rotation.matrix.ravel())
+        ", ".join(f"{v + 0.0:.12g}" for v in values) for values in (pose.position, pose.rotation.matrix.ravel())
     )
     spread = "" if std is None else f", std_mm = {1e3 * std[0]:.9g}, std_deg = {np.degrees(std[1]):.9g}"
     place = f'position = [{position}], unit = "m", rotation = [{rotation}], form = "matrix"{spread}'

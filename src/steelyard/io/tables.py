@@ -75,7 +75,7 @@ def find_file(name: str, folder: Path, data: Path | None) -> Path:
         if (each / name).exists():
             return each / name
     raise BadFile(
-        f'"{name}" was not found. Searched: {", ".join(map(str, folders))}. '
+        f'"{name}" was not found. Searched: {", ".join(str(each.absolute()) for each in folders)}. '
         "Correct the path, or give the folder of the data with --data DIR or STEELYARD_DATA."
     )
 
