@@ -213,7 +213,7 @@ def _require_mass(lost: Array) -> None:
     if np.linalg.norm(lost[0]) > UNWEIGHED:
         raise CannotAnswer(
             "motion and forces do not show the mass: noise of the motion is as large as what it tells beside a bias of "
-            "the forces. Record still poses in other attitudes, move faster, or measure the motion better."
+            "the forces. Turn the payload about two axes, farther or faster, or measure the motion better."
         )
 
 
