@@ -40,8 +40,7 @@ def stuck_forces(log: TeamLog) -> Iterator[Finding]:
         if recording.kind != "still":
             for name, track in recording.tracks.items():
                 force = _carried([track])
-                axes = np.ptp(force, axis=0) == 0 if len(force) >= FEWEST else np.zeros(3, np.bool_)
-                _noted(places[name], axes, f"'{recording.name}'", len(force))
+                _noted(places[name], _same(force), f"'{recording.name}'", len(force))
     resting = [recording for recording in log.recordings if recording.kind == "still"]
     where = " and ".join(f"'{r.name}'" for r in resting) if len(resting) < 3 else f"all {len(resting)} poses at rest"
     forces = {name: _carried([r.tracks[name] for r in resting if name in r.tracks]) for name in log.names}
@@ -58,15 +57,19 @@ def _stuck_at_rest(forces: Mapping[str, Array]) -> dict[str, Mask]:
     Coarse or exact numbers may well do so: the robot's other axes, or the others' where all its own stand still, must
     show noise. A force of nothing at all does not carry.
     """
-    lively = {name: [len(np.unique(axis)) > VALUES for axis in force.T] for name, force in forces.items()}
-    out = {}
-    for name, force in forces.items():
-        if len(force) < FEWEST:
-            continue
-        still = np.ptp(force, axis=0) == 0
-        noisy = any(map(any, lively.values())) if still.all() else any(lively[name])
-        out[name] = still & (noisy or not force.any())
+    out = {name: _same(force) for name, force in forces.items()}
+    for name, still in out.items():
+        if still.any() and forces[name].any():
+            beside = forces.values() if still.all() else [forces[name]]
+            still &= any(len(np.unique(axis)) > VALUES for force in beside for axis in force.T)
     return out
+
+
+def _same(force: Array) -> Mask:
+    """Return which axes (3,) of a force (T, 3) are the same in all of enough rows; the first rows mostly decide."""
+    if len(force) < FEWEST or (force[:FEWEST] != force[0]).any(0).all():
+        return np.zeros(3, np.bool_)
+    return np.asarray((force == force[0]).all(0))
 
 
 def _carried(tracks: Sequence[Track]) -> Array:
@@ -74,9 +77,9 @@ def _carried(tracks: Sequence[Track]) -> Array:
     rows = [np.zeros((0, 3))]
     for track in tracks:
         if track.has("force"):
-            valid = track.valid["force"]
-            rows.append(track.channels["force"][valid if track.carrying is None else valid & track.carrying])
-    return np.concatenate(rows)
+            valid = track.valid["force"] if track.carrying is None else track.valid["force"] & track.carrying
+            rows.append(track.channels["force"] if valid.all() else track.channels["force"][valid])
+    return rows[1] if len(rows) == 2 else np.concatenate(rows)
 
 
 def _noted(places: dict[str, list[tuple[str, int]]], axes: Mask, where: str, rows: int) -> None:
