@@ -76,6 +76,22 @@ def test_turns_about_the_vertical_alone_leave_the_answer_open(seed: int) -> None
         assert "grasp-direction-lost" in found.codes()
 
 
+@pytest.mark.parametrize("moving", [True, False], ids=["moving", "standing"])
+@pytest.mark.parametrize(
+    ("freedom", "seed"),
+    [(Freedom(Y, np.eye(3)), 101), (Freedom(Y, NONE), 100), (Freedom(Z, NONE), 100)],
+    ids=["one axis", "pivot", "vertical"],
+)
+def test_level_sensors_settle_turns_of_teams_with_twists(freedom: Freedom, seed: int, moving: bool) -> None:
+    loud = TeamNoise(force_white_N=0.5, rate_rad_s=3e-2, velocity_m_s=1e-2)
+    quiet = TeamNoise(force_white_N=0.5, rate_rad_s=8e-3, velocity_m_s=2e-3)
+    upright = freedom.rotation is Z
+    made = trial(seed, freedom, quiet if upright else loud, sensing="twists", bases_move=moving, kinds=("motion",))
+    found = JointTeam().identify(made.log)
+    assert bars_off(made, found).max() < 3.5
+    assert upright or abs(found.mass - 12.0) < 0.5
+
+
 def test_a_mass_that_is_open_is_said_to_be() -> None:
     found = JointTeam().identify(trial(100, Freedom(Z, NONE), kinds=("motion",)).log)
     text = next(one.message for one in found.findings if one.code == "inertia-not-identified")

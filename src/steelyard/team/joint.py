@@ -83,8 +83,8 @@ class JointTeam:
             log, moving, begun = self._fitted(log, TwistTeam.of)
             if moving.rough:
                 require_one_velocity_unit(log, moving)
-            grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
-            left = moving.fit.left
+            grasps, noise, late, left = moving.fit.grasps, moving.fit.noise, moving.late, moving.fit.left
+            spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
