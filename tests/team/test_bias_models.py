@@ -10,6 +10,7 @@ import pytest
 
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
+from steelyard.team import bias_models
 from steelyard.team.bias_models import Models, ladder_of
 from steelyard.team.joint import JointTeam
 from steelyard.team.payload_model import Normal
@@ -57,6 +58,25 @@ def test_a_common_bias_is_eliminated_as_dense_matrices_do_it(size: tuple[float, 
     assert np.allclose(np.concatenate(found.blind, axis=1), H[:P, P:] @ held, atol=1e-8)
     assert np.allclose(bias, held @ A[:, P:].T @ left, atol=1e-7)
     assert np.allclose(found.inner[1], held[B : 2 * B, B : 2 * B], atol=1e-9)
+
+
+def test_sizes_that_change_nothing_are_not_answered(monkeypatch: pytest.MonkeyPatch) -> None:
+    log = session(replace(QUIET, force_bias_N=0.3), 100).log
+    answered = []
+
+    def counted(full: Any, noise: Any, right: Any) -> Any:
+        answered.append(len(full))
+        return answers(full, noise, right)
+
+    answers = bias_models._answers
+    monkeypatch.setattr(bias_models, "_answers", counted)
+    some = JointTeam().identify(log)
+    fewer = max(answered)
+    monkeypatch.setattr(bias_models, "NOTHING", 0.0)
+    every = JointTeam().identify(log)
+    assert fewer < 0.3 * max(answered)
+    assert np.allclose(some.parameters.vector, every.parameters.vector, rtol=1e-8, atol=1e-8)
+    assert np.allclose(some.covariance, every.covariance, rtol=1e-4, atol=1e-12)
 
 
 def test_one_recording_has_no_common_bias() -> None:

@@ -15,7 +15,7 @@ from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
 from steelyard.team import pose_statistic
 from steelyard.team.adjoint import adjoint_inverse, exp
-from steelyard.team.definite import definite, inverses
+from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.pose_noise import _scores
 from steelyard.team.pose_rows import held
 from steelyard.team.pose_solver import SHOWN, Solver, unit
@@ -71,6 +71,7 @@ def test_inverses_and_determinants_of_a_stack(size: int) -> None:
     inverse, logdet = inverses(stack)
     np.testing.assert_allclose(inverse @ stack, np.broadcast_to(np.eye(size), stack.shape), atol=1e-10)
     np.testing.assert_allclose(logdet, np.linalg.slogdet(stack)[1], rtol=1e-12, atol=1e-12)
+    np.testing.assert_allclose(logarithms(stack[1]), logdet[1], rtol=1e-12, atol=1e-12)
     assert definite(stack[1]).tolist() == [True, True, False]
     with pytest.raises(np.linalg.LinAlgError):
         inverses(np.zeros((1, size, size)))

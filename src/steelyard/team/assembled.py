@@ -18,7 +18,7 @@ from steelyard.team.bias_models import SHOWN
 from steelyard.team.body_rows import balance_frame, reach
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
-from steelyard.team.payload_doubt import moved_by_gains, moved_by_grasps
+from steelyard.team.payload_doubt import lost_turns, moved_by_gains, moved_by_grasps
 from steelyard.team.payload_fit import PayloadFit
 from steelyard.team.pose_covariance import Spread
 
@@ -36,9 +36,12 @@ def assembled(
 ) -> TeamEstimate:
     """Return the estimate of a team whose grasps (N,) in R are known to within `spread`."""
     balance = balance_frame(grasps)
-    spread = spread.with_lost(team_size(grasps, spread))
-    moved = moved_by_grasps(payload, balance.inverse() @ grasps)
+    size, placed = team_size(grasps, spread), balance.inverse() @ grasps
+    spread = spread.with_lost(size)
+    moved = moved_by_grasps(payload, placed)
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
+    if spread.blind.size:
+        inner = inner + lost_turns(payload, placed, spread.unseen(size))
     body = InertialParameters(consistent(payload.parameters, payload.covariance, payload.scale)).in_frame(balance)
     change = frame_change(balance)
     estimates = {name: GraspEstimate(grasps[i], spread.of(i), spread.lost(i)) for i, name in enumerate(log.names)}

@@ -9,12 +9,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers, Mask
-from steelyard.team.definite import definite, inverses
+from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.payload_model import Normal
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
@@ -31,6 +32,8 @@ NO_COMMON, NO_LASTING = 1000.0, 1000.0
 GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
 # What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
 SHOWN = 0.3
+# Sizes with less than this share of the likeliest's have none: what they would add to a variance is rounding.
+NOTHING = 1e-15
 # Information below this share of the largest is rounding.
 RANK = 1e-11
 
@@ -44,12 +47,16 @@ def ladder_of(recordings: int, with_gain: bool) -> Array:
     return np.array([(common, bias, *gain) for common in COMMON for bias in OWN for gain in (*anew, *lasting)])
 
 
-def ladder_shares(models: Models, ladder: Array) -> Array:
-    """Return the share (L,) of every size on the ladder (L, 4) by evidence; none in the gain is the likeliest."""
-    chance = models.evidence + np.where(ladder[:, 2:].any(1), 0.0, np.log(NO_GAIN_ERROR))
+def ladder_shares(evidence: Array, ladder: Array) -> Array:
+    """Return the share (L,) of every size on the ladder (L, 4) by evidence; none in the gain is the likeliest.
+
+    What would change nothing has none.
+    """
+    chance = evidence + np.where(ladder[:, 2:].any(1), 0.0, np.log(NO_GAIN_ERROR))
     chance -= np.where(ladder[:, 0] > COMMON[0], np.log(NO_COMMON), 0.0)
     chance -= np.where(ladder[:, 3] > 0, np.log(NO_LASTING), 0.0)
     weight = np.exp(chance - chance.max())
+    weight[weight < NOTHING] = 0.0
     return np.asarray(weight / weight.sum())
 
 
@@ -92,7 +99,8 @@ class Recordings:
 class Models:
     """The answers at L sizes (`ladder_of`): P parameters, B of a bias, R recordings.
 
-    phi (L, P)     covariance, information (L, P, P)     evidence, chi2 (L,)
+    phi (L, P)     covariance, information (L, P, P)     chi2 (L,)
+    share   (L,) of every size by evidence; phi and covariance are zero where it is
     H, g    of the recordings (R, P + B, P + B), (R, P + B)
     narrow  (L', R, B, B) inverse spread of the biases drawn anew, one per kind, `kind` (L,) says which
     common  (L, B, B) V of the common bias, where there is more than one recording
@@ -101,7 +109,7 @@ class Models:
     phi: Array
     covariance: Array
     information: Array
-    evidence: Array
+    share: Array
     chi2: Array
     H: Array
     g: Array
@@ -117,7 +125,7 @@ class Models:
         pulls = np.stack([n.pulls for n in normals])
         mean = pulls.mean(0)
         anew, rest = (p @ p.swapaxes(1, 2) for p in (pulls, pulls - mean))
-        kinds, kind = np.unique(ladder[:, 1:], axis=0, return_inverse=True)
+        (kinds, kind), (shared, which) = _distinct(ladder.tobytes())
         bias, gain, lasting = np.square(kinds.T)[..., None, None, None]
         narrow, wide = inverses(bias * C + gain * anew + lasting * rest)
         inner, held = inverses(H[:, size:, size:] + narrow)
@@ -126,10 +134,10 @@ class Models:
         right = (g[:, :size].sum(0) - (blind @ g[:, size:, None])[..., 0].sum(1))[kind]
         taken = np.einsum("ri,lrij,rj->l", g[:, size:], inner, g[:, size:])[kind]
         told = (wide + held).sum(1)[kind]
-        common = np.square(ladder[:, 0])[:, None, None] * C + np.square(ladder[:, 3])[:, None, None] * (mean @ mean.T)
+        common = np.square(shared[:, 0])[:, None, None] * C + np.square(shared[:, 1])[:, None, None] * (mean @ mean.T)
         if len(normals) > 1 and ladder[:, 0].any():
             known, cross, pull = _common(H, g, inner @ narrow)
-            root = np.linalg.cholesky(common)
+            root = np.linalg.cholesky(common)[which]
             held, more = inverses(np.eye(len(C)) + root.swapaxes(1, 2) @ known[kind] @ root)
             held = root @ held @ root.swapaxes(1, 2)
             cross, pull = cross[kind], pull[kind][..., None]
@@ -142,9 +150,13 @@ class Models:
         ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(size)
         seen = (inverses(full + ridge)[0] @ (scale * right)[..., None])[..., 0]
         chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
-        evidence = -0.5 * (chi2 + inverses(np.eye(size) + full)[1] + told)
-        phi, covariance = _answers(full, sum((n.noise for n in normals), np.zeros((size, size))) * unit, scale * right)
-        return cls(scale * phi, unit * covariance, plain, evidence, np.asarray(chi2), H, g, narrow, kind, common)
+        evidence = -0.5 * (chi2 + logarithms(np.eye(size) + full) + told)
+        share = ladder_shares(evidence, ladder)
+        told_of = np.flatnonzero(share)
+        noise = sum((n.noise for n in normals), np.zeros((size, size))) * unit
+        phi, covariance = np.zeros((len(ladder), size)), np.zeros((len(ladder), size, size))
+        phi[told_of], covariance[told_of] = _answers(full[told_of], noise, (scale * right)[told_of])
+        return cls(scale * phi, unit * covariance, plain, share, np.asarray(chi2), H, g, narrow, kind, common[which])
 
     def recordings(self, model: int) -> Recordings:
         """Return the biases of all recordings in one model."""
@@ -161,6 +173,14 @@ class Models:
             mean = mean + share @ (common @ np.einsum("rij,ri->j", share, g_b))
             blind = blind + (H_pb @ share).sum(0) @ common @ share.swapaxes(1, 2)
         return Recordings(self.phi[model], self.covariance[model], inner, mean, blind)
+
+
+@lru_cache(maxsize=8)
+def _distinct(ladder: bytes) -> tuple[tuple[Array, Integers], tuple[Array, Integers]]:
+    """Return the kinds of own biases (L', 3) and of common ones (L'', 2) on a ladder, and which each size has (L,)."""
+    rows = np.frombuffer(ladder).reshape(-1, 4)
+    own, common = (np.unique(rows[:, chosen], axis=0, return_inverse=True) for chosen in ([1, 2, 3], [0, 3]))
+    return (own[0], own[1]), (common[0], common[1])
 
 
 def _common(H: Array, g: Array, share: Array) -> tuple[Array, Array, Array]:

@@ -22,6 +22,31 @@ def inverses(stack: Array) -> tuple[Array, Array]:
     return inverse.reshape(stack.shape), logdet.reshape(stack.shape[:-2])
 
 
+def logarithms(stack: Array) -> Array:
+    """Return the logarithms of the determinants (L,) of symmetric (L, n, n): a fifth of the work of `inverses`.
+
+    Where one is not positive definite, or not for sure, it is that of its general factors.
+    """
+    logdet = logarithms_by_pivots(stack)
+    doubtful = np.isnan(logdet)
+    if doubtful.any():
+        logdet[doubtful] = np.linalg.slogdet(stack[doubtful])[1]
+    return logdet
+
+
+@numba.njit(cache=True, error_model="numpy")
+def logarithms_by_pivots(stack: Array) -> Array:
+    """Return the logarithms of the determinants (L,), NaN where a matrix is not definite."""
+    out, root = np.zeros(len(stack)), np.empty(stack.shape[1:])
+    for k in range(len(stack)):
+        if not _factor(stack[k], root):
+            out[k] = np.nan
+            continue
+        for i in range(len(root)):
+            out[k] += 2 * np.log(root[i, i])
+    return out
+
+
 @numba.njit(cache=True, error_model="numpy")
 def definite(stack: Array) -> Mask:
     """Return which of symmetric matrices (L, n, n) are positive definite, by the signs of their pivots."""

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, ladder_shares, shown_of, without_gain
+from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, shown_of, without_gain
 from steelyard.team.hinged_rows import BIAS, COUNT, Bands, Sums, noisy
 from steelyard.team.payload_model import ROUNDING, Normal
 
@@ -101,7 +101,7 @@ def fit_hinged_payload(
         weights = tuple(_weights(kind, V, phi, started=number > 0) for kind in kinds)
         normals = [_normal(p, k, W, sums, number > 0) for k, W in zip(kinds, weights, strict=True) for p in k.parts]
         models = Models.of(normals, C, ladder, scale)
-        weight = ladder_shares(models, ladder)
+        weight = models.share
         phi, best = weight @ models.phi, int(np.argmax(weight))
         if number == 0:
             scale = _units(max(abs(float(phi[0])), 1e-3), size)

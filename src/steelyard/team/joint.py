@@ -55,6 +55,8 @@ LEAST_CHI2 = -0.1
 # Forces are not compared along the axes of grasps whose rotation is known no better than this [rad]: what that leaves
 # of their sum is as much as a misreading.
 COMPARABLE = 0.1
+# The mass is open where so much of it lies along what is not shown: mostly it is all of it or next to nothing.
+UNWEIGHED = 0.5
 
 
 @dataclass(frozen=True)
@@ -81,13 +83,14 @@ class JointTeam:
             log, moving, begun = self._fitted(log, TwistTeam.of)
             if moving.rough:
                 require_one_velocity_unit(log, moving)
-            grasps, spread, noise, late = moving.fit.grasps, moving.fit.spread, moving.fit.noise, moving.late
-            left = moving.fit.left
+            grasps, noise, late, left = moving.fit.grasps, moving.fit.noise, moving.late, moving.fit.left
+            spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
             log, standing, begun = self._standing(log)
-            grasps, spread, noise = standing.fit.team.grasps, grasp_covariance(standing.fit), standing.fit.noise
+            grasps, noise = standing.fit.team.grasps, standing.fit.noise
+            spread = replace(grasp_covariance(standing.fit), level=standing.level(log))
             late, order, left = _against(standing.late, log.reference), 2, standing.fit.left
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
             jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
@@ -108,6 +111,8 @@ class JointTeam:
         six_axis = np.array([not log.force_only(name) for name in log.names])
         payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
         _require_one_clock(payload.chi2)
+        if not any(one.code == "payload-not-rigid" for one in found):
+            _require_mass(payload.lost)
         team = _without_wrists(assembled(log, grasps, spread, payload, D, _added(late, begun)), self.wrists)
         found += [
             *read,
@@ -200,6 +205,15 @@ def _require_one_clock(chi2: float) -> None:
         raise CannotAnswer(
             f"motion and forces do not belong together: what noise of the motion makes of them is more than all that "
             f"was measured (chi^2 per degree of freedom {chi2:.3g}). Check units of time and rates of the streams."
+        )
+
+
+def _require_mass(lost: Array) -> None:
+    """Raise CannotAnswer where the mass lies along directions (10, L) that the rows do not show: it would be zero."""
+    if np.linalg.norm(lost[0]) > UNWEIGHED:
+        raise CannotAnswer(
+            "motion and forces do not show the mass: noise of the motion is as large as what it tells beside a bias of "
+            "the forces. Turn the payload about two axes, farther or faster, or measure the motion better."
         )
 
 

@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.regressor import basis
 from steelyard.spatial import Pose, cross_matrix
+from steelyard.team.body_rows import summing
 from steelyard.team.payload_fit import PayloadFit
 from steelyard.team.payload_model import gain_columns
 
@@ -16,15 +17,50 @@ SEEN = np.array([*range(12), -1])
 
 def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
     """Return d phi / d grasps (10, 6 N) for steps in each grasp's own axes; X_BG (N,) in the balance frame."""
-    count = len(X_BG.position)
-    turned = turned_by_step(X_BG)
-    right = np.zeros((6 * count, 10))
+    return _moved(fit, turned_by_step(X_BG))
+
+
+def lost_turns(fit: PayloadFit, X_BG: Pose, lost: Array) -> Array:
+    """Return the covariance (10, 10) that steps which the motion does not show add beyond their slope.
+
+    lost  (6 N, L) as in `Spread`, of the length that each may have
+    An angle that nobody knows may be any: along a circle D' s + D'' (1 - c) the slope may vanish where everything else
+    is off, and a slope of one radian has D'^2 in place of D'^2 / 2 + 3 D''^2 / 2. The fit may have called bias what
+    forces that are turned do not lift; so the mass is as unsure as it is from what they lift on average.
+    """
+    bends = _bends(X_BG, lost)
+    out = _squares(_moved(fit, bends[:, None]))
+    S = sum(part.scatter.sum(0) for group in fit.groups for part in group.parts)
+    up, pushed = S[-1, 3:6] / S[-1, -1], S[-1, 12:-1].reshape(-1, 6, 1) / S[-1, -1]
+    lift = up / (up @ up)
+    slope = (turned_by_step(X_BG) @ pushed[:, None])[..., 3:, 0] @ lift
+    bent = (bends @ pushed)[None, :, 3:, 0] @ lift
+    out[0, 0] += ((slope.ravel() @ lost) ** 2).sum() + _squares(bent)[0, 0]
+    return out
+
+
+def _bends(X_BG: Pose, lost: Array) -> Array:
+    """Return by how much the summing block (N, 6, 6) of each grasp bends, on average over steps along `lost`."""
+    screws = np.einsum("nkl,kab->nlab", lost.reshape(len(X_BG.position), 6, -1), turned_by_step(Pose.identity(1))[0])
+    return np.asarray(summing(X_BG).reshape(6, -1, 6).swapaxes(0, 1) @ (screws @ screws).sum(1))
+
+
+def _squares(each: Array) -> Array:
+    """Return the covariance (P, P) of bends (P, N), whose mean is not zero."""
+    return np.asarray(np.outer(each.sum(1), each.sum(1)) + 0.5 * each @ each.T)
+
+
+def _moved(fit: PayloadFit, changes: Array) -> Array:
+    """Return d phi (10, N C) of each of C changes of the block (6, 6) that sums what a grasp pushes, (N, C, 6, 6)."""
+    count, kinds = changes.shape[:2]
+    flat = changes.reshape(count, 6 * kinds, 6)
+    right = np.zeros((kinds * count, 10))
     for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
         for part, blind in zip(group.parts, blinds, strict=True):
             for W, S in zip(weights, part.scatter, strict=True):
                 pushes = S[SEEN, 12:-1].reshape(len(SEEN), count, 6).transpose(1, 2, 0)
-                change = turned.reshape(count, 36, 6) @ pushes
-                right += change.reshape(6 * count, -1) @ (W @ _levers(blind)).reshape(10, -1).T
+                change = flat @ pushes
+                right += change.reshape(kinds * count, -1) @ (W @ _levers(blind)).reshape(10, -1).T
     return np.asarray(_kept(fit) @ right.T)
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
-from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, ladder_shares, shown_of, without_gain
+from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, shown_of, without_gain
 from steelyard.team.payload_model import ROUNDING, Group, normal, residual_scatter
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
@@ -68,7 +68,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             for part in group.parts
         ]
         models = Models.of(normals, C, ladder, scale)
-        weight = ladder_shares(models, ladder)
+        weight = models.share
         phi, best = weight @ models.phi, int(np.argmax(weight))
         beside = models.recordings(best)
         renewed = tuple(_judged(g, D, beside, int(s)) for g, s in zip(groups, starts[:-1], strict=True))

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.spatial import cross_matrix
+from steelyard.spatial import cross, cross_matrix
 from steelyard.team.adjoint import adjoint
 from steelyard.team.pose_fit import PoseFit
 from steelyard.team.pose_statistic import OWN
@@ -33,21 +33,33 @@ class Spread:
     blind     (6 N, L) directions that the motion does not show
     late      (N,) standard deviations of the delays [s], None where they were not estimated
     turns     (N, 6, 6) from a grasp's own axes to those of R
+    level     (N, 3) direction of gravity in each grasp's own axes over how well [rad] its base and the reference's
+              agree on it, zero where they do not tell: it holds turns that the motion does not show
     """
 
     full: Array
     blind: Array
     late: Array | None
     turns: Array
+    level: Array | None = None
 
     def with_lost(self, size: float) -> Spread:
         """Return the spread with directions that are not shown as unsure as a team of this size [m] can be."""
         if not self.blind.size:
             return self
+        lost = self.unseen(size)
+        return replace(self, full=self.full + lost @ lost.T)
+
+    def unseen(self, size: float) -> Array:
+        """Return the directions (6 N, L) that are not shown, as long as they may be in a team of this size [m]."""
         turn = np.arange(len(self.blind)) % 6 < 3
         largest = np.maximum(np.abs(self.blind[turn]).max(0), np.abs(self.blind[~turn]).max(0) / size)
-        lost = self.blind / np.maximum(largest, 1e-300)
-        return replace(self, full=self.full + lost @ lost.T)
+        lost = np.asarray(self.blind / np.maximum(largest, 1e-300))
+        if self.level is None:
+            return lost
+        turns = lost.reshape(len(self.level), 6, -1)[:, :3].swapaxes(1, 2)
+        tips = cross(turns, np.broadcast_to(self.level[:, None], turns.shape)).swapaxes(1, 2).reshape(-1, lost.shape[1])
+        return np.asarray(lost @ np.linalg.cholesky(np.linalg.inv(np.eye(len(tips.T)) + tips.T @ tips)))
 
     def turn(self, size: float) -> float:
         """Return the largest standard deviation [rad] of a grasp's rotation, for a team of this size [m]."""
@@ -116,8 +128,8 @@ def _central(fit: PoseFit) -> Array:
 def _turned(rows: Array, central: Array) -> Array:
     """Return rows (..., 13 N) by parameters as rows by those with homes that turn about their grasp's middle."""
     out = rows.copy()
-    for i, cross in enumerate(central):
-        out[..., OWN * i + 6 : OWN * i + 9] += rows[..., OWN * i + 9 : OWN * i + 12] @ cross
+    for i, lever in enumerate(central):
+        out[..., OWN * i + 6 : OWN * i + 9] += rows[..., OWN * i + 9 : OWN * i + 12] @ lever
     return out
 
 

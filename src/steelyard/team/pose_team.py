@@ -38,6 +38,8 @@ FEW_ROWS, FEW_POSES = 1500, 4500
 # Sweeps over a row with which the motion follows grasps and homes from wherever it was.
 FOLLOWED = 2
 MOST_SLIPS = 3
+# Bases that are said to be level are so to within this [rad].
+LEVEL = 0.02
 # Noise above this share of the motion asks whether the payload is rigid.
 LOUD = 0.05
 
@@ -90,7 +92,7 @@ class PoseTeam:
         late = dict.fromkeys(log.names, 0.0)
         parts = edit(parts)
         data = TeamMotion(*all_poses(parts))
-        start = first_team(data, reference, log.names)
+        start = first_team(data, reference, log.names, _down(log))
         enough = min(FEW_ROWS, max(ENOUGH, FEW_POSES // data.count))
         few = slice(None, None, max(1, len(data.valid) // enough))
         fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
@@ -158,6 +160,16 @@ class PoseTeam:
         """Return gravity (3,) [m/s^2] in the reference home."""
         return mean_gravity(log, self.fit.team.homes)
 
+    def level(self, log: TeamLog) -> Array:
+        """Return the direction of gravity over how well it is known (N, 3), as in `Spread`."""
+        team, said = self.fit.team, _down(log)
+        mean = team.motion.rotation.inverse().matrix.mean(0)
+        seen = np.einsum("ab,nbc,nc->na", mean, team.homes.rotation.matrix, said)
+        own = seen[log.names.index(log.reference)]
+        apart = np.linalg.norm(seen - own, axis=1, keepdims=True)
+        told = said.any(1, keepdims=True) & own.any()
+        return np.where(told, team.grasps.rotation.inverse().apply(seen) / np.hypot(LEVEL, apart), 0.0)
+
     def residuals(self, raw: Stretch, start: int) -> Array:
         """Return rotation vector and position (T, N, 6) from where the team says to what was measured, used or not."""
         motion = self.fit.team.motion[np.minimum(start + np.arange(len(raw)), len(self.fit.team.motion.position) - 1)]
@@ -221,6 +233,12 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
             twist[half:-half] = between * (part.rate / (2 * half))
         out.append(-(twist @ J.reshape(-1, 6).T).reshape(len(part), -1, 6))
     return np.concatenate(out)
+
+
+def _down(log: TeamLog) -> Array:
+    """Return the direction of gravity (N, 3) in every home, zero where the base does not tell it."""
+    said = [np.zeros(3) if r.gravity is None else r.gravity / np.linalg.norm(r.gravity) for r in log.robots]
+    return np.array(said)
 
 
 def mean_gravity(log: TeamLog, homes: Pose) -> Array:

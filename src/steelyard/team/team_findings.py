@@ -118,9 +118,19 @@ def open_parameters(identified: Mask, rank: int, count: int = 10) -> Iterator[Fi
     if not identified[4:].all():
         yield Finding.of(
             "inertia-not-identified",
-            f"The rows fix {rank} of the {'ten' if count == 10 else count} parameters; the inertia is not given. Turn "
-            "the payload about all three axes, faster and slower.",
+            f"The rows fix {rank} of the {'ten' if count == 10 else count} parameters; the inertia is not given"
+            f"{_weighed(identified)}. Turn the payload about all three axes, faster and slower.",
         )
+
+
+def _weighed(identified: Mask) -> str:
+    """Return what is said of mass and centre of mass where they are open, too."""
+    if not identified[0]:
+        return ", and neither mass nor centre of mass is known: do not use them"
+    if not identified[1:4].all():
+        open_axes = [axis for axis, known in zip(AXES, identified[1:4], strict=True) if not known]
+        return f", and the centre of mass is not known along {_listed(open_axes).lower()}"
+    return ""
 
 
 def vertical(gravity: Array | None, poses: Pose | None) -> Array | None:

@@ -24,6 +24,7 @@ from steelyard.team.pose_covariance import Spread
 from steelyard.team.pose_fit import EXACT
 from steelyard.team.pose_noise import noise_of_scatter
 from steelyard.team.pose_solver import SHOWN
+from steelyard.team.pose_start import NOISE_SHARE
 from steelyard.team.twist_statistic import TwistScatter
 
 STEPS = 25
@@ -60,10 +61,14 @@ class TwistFit:
     left: float
 
 
-def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...]) -> TwistFit:
-    """Return the joint optimum. Raises CannotAnswer where two robots never spoke together."""
+def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> TwistFit:
+    """Return the joint optimum. Raises CannotAnswer where two robots never spoke together.
+
+    level  (N, 3, 3) sums of the direction of gravity in the reference grasp times that in each, zero where not told:
+           it decides where to start about axes that no turn shows
+    """
     merged = data.merged()
-    grasps = first_grasps(merged, reference, names)
+    grasps = first_grasps(merged, reference, names, level)
     unknown = np.concatenate([6 * i + np.arange(6) for i in range(data.count) if i != reference])
     noise = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), np.full((data.count, 2), 1e-2))
     for _ in range(STEPS):
@@ -103,8 +108,8 @@ def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[A
     return np.einsum("tab,tb->ta", np.broadcast_to(inverse, (len(twist), 6, 6)), pull), np.linalg.inv(each.sum(0))
 
 
-def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...]) -> Pose:
-    """Return the star of pairs with the reference, in closed form from the scatter."""
+def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> Pose:
+    """Return the star of pairs with the reference, in closed form from the scatter; `level` as in `fit_twists`."""
     turns, places = [], []
     for i in range(data.count):
         if i == reference:
@@ -117,23 +122,48 @@ def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...]) -> 
                 f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; "
                 "record them together."
             )
-        R, p = _pair(S)
+        R, p = _pair(S, np.zeros((3, 3)) if level is None else level[i])
         turns.append(R)
         places.append(p)
     return Pose(Rotation(np.stack(turns)), np.stack(places))
 
 
-def _pair(S: Array) -> tuple[Array, Array]:
+def _pair(S: Array, level: Array) -> tuple[Array, Array]:
     """Return rotation (3, 3) and position (3,) of the second robot's grasp in the first's from their scatter."""
     w_w, v_v = S[:3, 6:9], S[3:6, 9:12]
     values, axes = np.linalg.eigh(S[:3, :3])
     candidates = [Rotation.aligning(w_w).matrix, Rotation.aligning(v_v).matrix]
-    if values[1] < ONE_AXIS**2 * values[2]:
+    one = values[1] < ONE_AXIS**2 * values[2]
+    if level.any() and (one or values[1] < NOISE_SHARE * _turned(S, candidates[0]) / 3):
+        return _upright(S, level, candidates, axes[:, 2])
+    if one:
         for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS):
             candidates.append(Rotation.exp(angle * axes[:, 2]).matrix @ candidates[0])
     found = [_position(S, R) for R in candidates]
     best = int(np.argmin([cost for _, cost in found]))
     return candidates[best], found[best][0]
+
+
+def _upright(S: Array, level: Array, candidates: list[Array], axis: Array) -> tuple[Array, Array]:
+    """Return rotation and position where turns do not show the rotation, and gravity shows some of it."""
+    size, told = float(np.trace(S[:3, :3])), float(np.linalg.svd(level, compute_uv=False).sum())
+    turning = S[:3, 6:9] / max(size, 1e-300) + level / told
+    moving = S[3:6, 9:12] / max(float(np.trace(S[3:6, 3:6])), 1e-300)
+    upright = Rotation.aligning(turning).matrix
+    vertical = np.linalg.svd(level)[0][:, 0]
+    every = [*candidates, upright, Rotation.aligning(turning + moving).matrix]
+    for about in (axis, vertical):
+        turns = Rotation.exp(np.arange(1, TURNS)[:, None] * (2 * np.pi / TURNS) * about).matrix
+        every += list(turns @ upright)
+    found = [_position(S, R) for R in every]
+    tilted = [2 * (1 - float((R * level).sum()) / told) for R in every]
+    best = int(np.argmin([cost + tilt for (_, cost), tilt in zip(found, tilted, strict=True)]))
+    return every[best], found[best][0]
+
+
+def _turned(S: Array, R: Array) -> float:
+    """Return what a rotation leaves of the turns."""
+    return float(np.trace(S[:3, :3]) + np.trace(S[6:9, 6:9]) - 2 * np.trace(R @ S[6:9, :3]))
 
 
 def _position(S: Array, R: Array) -> tuple[Array, float]:
@@ -147,7 +177,7 @@ def _position(S: Array, R: Array) -> tuple[Array, float]:
     b = np.array([u_q[2, 1] - u_q[1, 2], u_q[0, 2] - u_q[2, 0], u_q[1, 0] - u_q[0, 1]])
     p = np.linalg.solve(A + (1e-3 * np.trace(A) + 1e-300) * np.eye(3) * 1e-3, b)
     left = float(np.trace(u_u) - 2 * p @ b + p @ A @ p)
-    turned = float(np.trace(S[:3, :3]) + np.trace(S[6:9, 6:9]) - 2 * np.trace(R @ S[6:9, :3]))
+    turned = _turned(S, R)
     return p, left / max(np.trace(S[3:6, 3:6]), 1e-300) + turned / max(np.trace(S[:3, :3]), 1e-300)
 
 

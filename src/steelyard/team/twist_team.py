@@ -21,6 +21,8 @@ from steelyard.team.twist_statistic import TwistScatter
 # Clocks are moved where their step is above this [s] and so many standard deviations.
 PUNCTUAL, DOUBTED = 2e-4, 4.0
 CLOCK_ROUNDS = 6
+# A level sensor, or a base that is said to be level, is so to within this [rad].
+LEVEL = 0.02
 # Noise above this share of the motion: robots disagree.
 LOUD = 0.1
 
@@ -40,7 +42,7 @@ class TwistTeam:
         late = dict.fromkeys(log.names, 0.0)
         for left in reversed(range(CLOCK_ROUNDS)):
             parts = twist_stretches(log, late)
-            fit = fit_twists(TwistScatter.of(parts), reference, log.names)
+            fit = fit_twists(TwistScatter.of(parts), reference, log.names, _level_pairs(parts, reference))
             settled = bool((np.abs(fit.delays) < np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)).all())
             # What is told of clocks is what the rows and the fit were made with.
             if not (clocks and left) or settled:
@@ -73,6 +75,16 @@ class TwistTeam:
         mean = rows.mean(0)
         return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
 
+    def level(self, reference: int) -> Array:
+        """Return the line of gravity over how well it is known (N, 3), as in `Spread`."""
+        pairs = _level_pairs(self.parts, reference)
+        seen = np.linalg.svd(pairs[reference])[0][:, 0] @ pairs
+        size = np.linalg.norm(pairs, axis=(1, 2))
+        # Of unit vectors, half the squared distance is one less their product.
+        apart = 1 - np.einsum("nab,nab->n", self.fit.grasps.rotation.matrix, pairs) / np.maximum(size, 1e-300)
+        known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
+        return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
+
     def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
 
@@ -94,6 +106,16 @@ class TwistTeam:
                 "[team] gravity for a level base that stands."
             )
         return out, into @ covariance @ into.T
+
+
+def _level_pairs(parts: tuple[TwistStretch, ...], reference: int) -> Array:
+    """Return sums (N, 3, 3) of the direction of gravity in the reference grasp times that in each."""
+    out = np.zeros((parts[0].level.shape[1], 3, 3))
+    for part in parts:
+        size = np.linalg.norm(part.down, axis=2, keepdims=True)
+        unit = np.divide(part.down, size, out=np.zeros_like(part.down), where=(size > 0) & part.level[..., None])
+        out += np.einsum("ta,tnb->nab", unit[:, reference], unit)
+    return out
 
 
 def _down(part: TwistStretch, X_BG: Pose) -> tuple[Array, Mask]:
