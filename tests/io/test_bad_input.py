@@ -14,7 +14,7 @@ import pytest
 
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue, MissingDependency
 from steelyard.io import read_recording
-from steelyard.io.description import EXAMPLE
+from steelyard.io.example import EXAMPLE
 
 HEADER = "t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz\n"
 ROW = "{},1,2,3,0.1,0.2,0.3,1,0,0,0\n"

@@ -81,4 +81,5 @@ def _recording(
         object_pose_std=None if placed is None else placed.std,
         name=path.stem,
         findings=findings,
+        notes=description.notes,
     )

@@ -133,7 +133,8 @@ def identify(
         if not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late, *of_sensor)
-    return _in_recording_sign(replace(estimate, delays_s=dict(aligned.delays_s)).noted(*aligned.notes), recording)
+    estimate = replace(estimate, delays_s=dict(aligned.delays_s)).noted(*recording.notes, *aligned.notes)
+    return _in_recording_sign(estimate, recording)
 
 
 @contextmanager
