@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from steelyard.findings import REMEDIES, Finding
+from steelyard.findings import AT_REST, REMEDIES, UNMEASURED, Finding
 
 ROOT = Path(__file__).parents[1]
 FAQ = (ROOT / "docs" / "findings.md").read_text()
@@ -28,6 +28,10 @@ def test_codes_are_words_and_remedies_are_sentences(code: str) -> None:
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", code)
     assert REMEDIES[code].endswith(".")
     assert Finding.of(code, "Numbers.") == Finding(code, "Numbers.", REMEDIES[code])
+
+
+def test_other_remedies_are_those_of_known_codes() -> None:
+    assert set(AT_REST) | set(UNMEASURED) <= set(REMEDIES)
 
 
 def test_every_page_is_in_the_navigation() -> None:
