@@ -9,11 +9,12 @@ from typing import Any
 
 import click
 
-from steelyard.cli.console import print_json, progress_bar, say
+from steelyard.cli.console import print_json, progress_bar, say, say_if_compiling
+from steelyard.cli.groups import Group
 from steelyard.errors import BadValue
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
 def workshop() -> None:
     """Make the embedded data set: twenty families of workshop tools with exact truth."""
 
@@ -28,9 +29,15 @@ def workshop() -> None:
     help="Random variants of each family (sizes, materials, colours) instead of the nominal tools.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of variants and clouds.")
-@click.option("--tools", multiple=True, help="Only these families (repeat the option).")
+@click.option("--tools", multiple=True, help="Only these families, such as hammer (repeat the option).")
 @click.option("--graded", is_flag=True, help="The graded families: tools with parts that are not homogeneous.")
-@click.option("--motion", type=click.Choice(["paper", "slow", "static"]), default="paper", show_default=True)
+@click.option(
+    "--motion",
+    type=click.Choice(["paper", "slow", "static"]),
+    default="paper",
+    show_default=True,
+    help="Motion of the log: the paper's brisk one, one below 0.25 m/s everywhere, or still poses only.",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def build(
     folder: Path, variants: int, seed: int, tools: tuple[str, ...], graded: bool, motion: str, as_json: bool
@@ -42,6 +49,7 @@ def build(
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED
 
+    say_if_compiling()
     begun = time.perf_counter()
     build_tool, families = (build_graded, GRADED) if graded else (build_even, FAMILIES)
     for name in tools:  # all of them before the first is written
