@@ -18,6 +18,11 @@ def test_every_finding_has_one_entry_and_every_entry_a_finding() -> None:
     assert sorted(entry.splitlines()[0] for entry in ENTRIES) == sorted(REMEDIES)
 
 
+def test_the_table_at_the_top_links_every_entry_in_order() -> None:
+    linked = re.findall(r"^\| \[`([a-z-]+)`\]\(#\1\) \| \S", FAQ, flags=re.MULTILINE)
+    assert linked == [entry.splitlines()[0] for entry in ENTRIES]
+
+
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.splitlines()[0])
 def test_an_entry_says_what_it_means_how_it_is_seen_and_what_to_do(entry: str) -> None:
     assert [word for word in ("**Means**", "**Seen**", "**Do**") if word not in entry] == []
