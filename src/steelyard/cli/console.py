@@ -51,7 +51,7 @@ def _listen_for_compiling() -> None:
     """Ask numba itself: it tells of each kernel that it compiles, and of none that it loads."""
     from numba.core import event
 
-    class Once(event.Listener):  # type: ignore[misc]
+    class Once(event.Listener):
         said = False
 
         def on_start(self, event: Any) -> None:
@@ -62,7 +62,7 @@ def _listen_for_compiling() -> None:
         def on_end(self, event: Any) -> None:
             """Nothing is said at the end."""
 
-    event.register("numba:compile", Once())
+    event.register("numba:compile", Once())  # type: ignore[no-untyped-call]
 
 
 def progress_bar(label: str) -> Callable[[int, int], None] | None:
