@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from steelyard.findings import REMEDIES, Finding
+from steelyard.findings import AT_REST, REMEDIES, UNMEASURED, Finding
 
 ROOT = Path(__file__).parents[1]
 FAQ = (ROOT / "docs" / "findings.md").read_text()
@@ -16,6 +16,11 @@ ENTRIES = re.split(r"^### ", FAQ, flags=re.MULTILINE)[1:]
 
 def test_every_finding_has_one_entry_and_every_entry_a_finding() -> None:
     assert sorted(entry.splitlines()[0] for entry in ENTRIES) == sorted(REMEDIES)
+
+
+def test_the_table_at_the_top_links_every_entry_in_order() -> None:
+    linked = re.findall(r"^\| \[`([a-z-]+)`\]\(#\1\) \| \S", FAQ, flags=re.MULTILINE)
+    assert linked == [entry.splitlines()[0] for entry in ENTRIES]
 
 
 @pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.splitlines()[0])
@@ -28,6 +33,10 @@ def test_codes_are_words_and_remedies_are_sentences(code: str) -> None:
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", code)
     assert REMEDIES[code].endswith(".")
     assert Finding.of(code, "Numbers.") == Finding(code, "Numbers.", REMEDIES[code])
+
+
+def test_other_remedies_are_those_of_known_codes() -> None:
+    assert set(AT_REST) | set(UNMEASURED) <= set(REMEDIES)
 
 
 def test_every_page_is_in_the_navigation() -> None:

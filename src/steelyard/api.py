@@ -23,6 +23,7 @@ from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 
 if TYPE_CHECKING:
+    from steelyard.io.parts_files import SavedParts
     from steelyard.pipelines.shape_in_parts import Shape
     from steelyard.shape.cloud import Cloud
     from steelyard.shape.views import Views
@@ -118,11 +119,17 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
 
 def save_parts(shape: Shape, path: str | Path) -> None:
     """Write a shape in parts to `path` (parts.npz), with how wrong it may be; raises BadFile."""
-    from steelyard.io.parts_files import SavedParts, write_parts
+    from steelyard.io.parts_files import write_parts
+
+    write_parts(saved_parts(shape), path)
+
+
+def saved_parts(shape: Shape) -> SavedParts:
+    """Return a shape in parts as parts.npz holds it."""
+    from steelyard.io.parts_files import SavedParts
 
     made, error = shape.segmentation, shape.error
-    saved = SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, error.com_m, error.stretch)
-    write_parts(saved, path)
+    return SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, error.com_m, error.stretch)
 
 
 def _seen(path: Path) -> Cloud | Views:

@@ -5,7 +5,8 @@ One table gives every code its remedy; `docs/findings.md` has an entry for each.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
 
 REMEDIES: dict[str, str] = {
     "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] or the [[robot]] ("on-object" if that is "on-sensor").',
@@ -64,6 +65,18 @@ REMEDIES: dict[str, str] = {
     "rows-missing": "Check the robot's network and logger if they were not meant to be missing; they were left out.",
 }
 
+# What helps instead where all rows are at rest, as in a table of still poses: there is no motion to make faster.
+AT_REST: dict[str, str] = {
+    "inertia-not-identified": "Record a log with times in which the object turns, or give its shape (parts or a scan).",
+    "centroids-coplanar": "Record a log with times in which the object turns, or merge parts of the same material.",
+    "more-parts-than-rank": "Merge parts of the same material, or record a log with times in which the object turns.",
+}
+# And where nothing measured the acceleration of S.
+UNMEASURED: dict[str, str] = {
+    "inertia-not-identified": "Record the position of the sensor or an accelerometer as well: "
+    "without its acceleration only rest counts.",
+}
+
 
 @dataclass(frozen=True)
 class Finding:
@@ -77,3 +90,7 @@ class Finding:
     def of(cls, code: str, message: str) -> Finding:
         """Return the finding with the remedy of its code."""
         return cls(code, message, REMEDIES[code])
+
+    def instead(self, remedies: Mapping[str, str]) -> Finding:
+        """Return the finding with the remedy that `remedies` have for its code, if they have one."""
+        return replace(self, remedy=remedies.get(self.code, self.remedy))

@@ -96,6 +96,14 @@ def test_a_scan_gives_points_and_colours(capsys: pytest.CaptureFixture[str], fol
         assert said not in without
 
 
+def test_a_scan_alone_is_cut_into_the_parts_to_draw(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    scan = "@hammer/points.npz"
+    status, out, _ = run(capsys, folder, "@ols.json", "--scan", scan, "-o", "@out.html", "--json")
+    assert status == 0
+    assert json.loads(out)["parts_drawn"] >= 1
+    assert 'data-show="points"' in (folder / "out.html").read_text(encoding="utf-8")
+
+
 def test_only_the_shape_where_nothing_says_where_it_sits(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     status, _, err = run(capsys, folder, "@ols.json", "--parts", "@parts.npz", "-o", "@out.html")
     assert status == 0
@@ -129,7 +137,7 @@ def test_parts_of_another_object_are_refused(capsys: pytest.CaptureFixture[str],
     [
         (("@none.json",), "@none.json: cannot be read (No such file or directory)."),
         (("@result.json", "--rival", "ols.json"), "--rival needs NAME=FILE, as in --rival OLS=ols.json; got 'ols.json'."),
-        (("@result.json", "--scan", "@c.ply"), "--scan colours the parts that --parts gives: give both, or leave --scan out."),
+        (("@result.json", "--scan", "@c.ply"), "@c.ply: no such file."),
         (("@result.json", "--parts", "@result.json"), "@result.json: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."),
         (("@result.json", "-o", "@no/r.html"), "@no/r.html: cannot be written: there is no folder @no. Make it first."),
     ],

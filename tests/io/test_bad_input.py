@@ -14,7 +14,7 @@ import pytest
 
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue, MissingDependency
 from steelyard.io import read_recording
-from steelyard.io.description import EXAMPLE
+from steelyard.io.example import EXAMPLE
 
 HEADER = "t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz\n"
 ROW = "{},1,2,3,0.1,0.2,0.3,1,0,0,0\n"
@@ -171,9 +171,30 @@ def test_missing_data_file_names_the_searched_folders(tmp_path: Path, monkeypatc
     monkeypatch.setenv("STEELYARD_DATA", str(tmp_path / "env"))
     path = write(tmp_path, swap(TOML, '"a.csv"', '"b.csv"'))
     assert message(path, BadFile, tmp_path / "data") == (
-        '"b.csv" was not found. Searched: DIR/data, DIR/env, DIR. '
+        'log.toml, [[stream]] 1 ("b.csv"): "b.csv" was not found. Searched: DIR/data, DIR/env, DIR. '
         "Correct the path, or give the folder of the data with --data DIR or STEELYARD_DATA."
     )
+
+
+def test_missing_tool_names_the_line_that_asks_for_it(tmp_path: Path) -> None:
+    path = write(tmp_path, swap(TOML, "[log]", '[log]\ntool = "grip.json"'))
+    assert message(path, BadFile).startswith('log.toml, [log], tool: "grip.json" was not found. Searched: DIR')
+
+
+COLUMNS = "columns in a.csv: t, fx, fy, fz, tx, ty, tz, qw, qx, qy, qz."
+
+
+@pytest.mark.parametrize(
+    ("old", "new", "said"),
+    [
+        ('["tx", "ty"', '["tx", "fy"', 'column "fy" is given for force and torque.'),
+        ('["fx", "fy"', '["fx", 1', 'column "fx" is given for two axes of force.'),
+        ('["t"]', '["fx"]', 'column "fx" is given for time and force.'),
+    ],
+)
+def test_one_column_for_two_things(tmp_path: Path, old: str, new: str, said: str) -> None:
+    path = write(tmp_path, swap(TOML, old, new))
+    assert message(path, BadDescription) == f"{STREAM}: {said} Each needs columns of its own; {COLUMNS}"
 
 
 def test_missing_description(tmp_path: Path) -> None:

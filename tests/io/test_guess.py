@@ -11,7 +11,6 @@ import pytest
 
 from steelyard.errors import BadDescription, BadValue
 from steelyard.io import read_pendant, read_recording
-from steelyard.io.description import EXAMPLE
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation
 
@@ -146,10 +145,54 @@ def test_names_that_do_not_tell(tmp_path: Path, names: str, reason: str) -> None
     words = names.split()
     with pytest.raises(BadDescription) as caught:
         bare(tmp_path, words, [0.0] * len(words), [2000.0] * len(words))
-    assert str(caught.value) == (
+    assert str(caught.value).startswith(
         f"{tmp_path / 'data.csv'}: cannot tell what the columns are: {reason} "
-        f"Write a description that says it, for example:\n{EXAMPLE}"
+        "Write a description that says it, for example:\n[log]\n"
     )
+
+
+def stream_lines(text: str) -> str:
+    """The lines of the example below [[stream]]."""
+    return text.split("[[stream]]\n")[1]
+
+
+def test_the_example_of_a_description_is_in_the_words_of_the_file(tmp_path: Path) -> None:
+    names = ["stamp_ms", "F1", "F2", "F3", "Mx [N*mm]", "My [N*mm]", "Mz [N*mm]", *("ax", "ay", "az")]
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, names, [0.0, *W, 0, 0, 9.8], [1.0, *W, 0, 0, 9.8])
+    assert stream_lines(str(caught.value)) == (
+        'path     = "data.csv"\n'
+        'time     = { columns = ["stamp_ms"], unit = "ms" }\n'
+        'force    = { columns = ["fx", "fy", "fz"], unit = "N" }   # put your columns here\n'
+        'torque   = { columns = ["Mx [N*mm]", "My [N*mm]", "Mz [N*mm]"], unit = "N*mm" }\n'
+        'specific_force = { columns = ["ax", "ay", "az"], unit = "m/s^2" }\n'
+    )
+
+
+def test_the_example_for_an_array_file_names_its_arrays(tmp_path: Path) -> None:
+    np.savez(tmp_path / "m.npz", time=np.arange(3.0), force_sensor=[W[:3]] * 3, gravity_sensor=[[0, 0, -9.81]] * 3)
+    with pytest.raises(BadDescription) as caught:
+        read_recording(tmp_path / "m.npz")
+    assert 'path     = "m.npz"\n' in str(caught.value)
+    assert 'force    = { columns = ["force_sensor"], unit = "N" }\n' in str(caught.value)
+
+
+def test_the_example_for_a_file_without_header_counts_columns(tmp_path: Path) -> None:
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, ["0", *map(str, [*W, *Q])], [0.01, *W, *Q])
+    assert "force    = { columns = [1, 2, 3]," in str(caught.value)
+    (tmp_path / "log.toml").write_text("[log]\n[[stream]]\n" + stream_lines(str(caught.value)))
+    assert read_recording(tmp_path / "log.toml").streams[0].channels["force"].tolist() == [W[:3]] * 2
+
+
+def test_a_file_that_does_not_say_gravity_has_a_note_of_what_was_assumed(tmp_path: Path) -> None:
+    wrench = ["t", "fx", "fy", "fz", "tx", "ty", "tz"]
+    bare(tmp_path, [*wrench, "qw", "qx", "qy", "qz"], [0, *W, *Q], [0.01, *W, *Q])
+    assert read_recording(tmp_path / "data.csv").notes == (
+        "the file does not say gravity: 9.80665 m/s² along -z of the world was assumed ([log] gravity of a description)",
+    )
+    bare(tmp_path, [*wrench, "gx", "gy", "gz"], [0, *W, 0, 0, -9.82], [0.01, *W, 0, 0, -9.82])
+    assert read_recording(tmp_path / "data.csv").notes == ()
 
 
 # --- pendant --------------------

@@ -39,6 +39,11 @@ def read(folder: Path, toml: str, **files: str | bytes) -> Recording:
     return read_recording(folder / "log.toml")
 
 
+def with_more() -> str:
+    """The table with one more vector of the force's numbers: ux, uy, uz."""
+    return table([*COLUMNS, "ux", "uy", "uz"], np.hstack([ROWS, [FORCE] * 4]))
+
+
 def only(recording: Recording) -> Stream:
     (stream,) = recording.streams
     return stream
@@ -127,14 +132,18 @@ def test_units(tmp_path: Path, quantity: str, unit: str, factor: float) -> None:
         "force": 'force = { columns = ["fx", "fy", "fz"] }',
         "torque": 'torque = { columns = ["tx", "ty", "tz"] }',
     }
-    lines[quantity] = f'{quantity} = {{ columns = ["fx", "fy", "fz"], unit = "{unit}" }}'
+    lines[quantity] = f'{quantity} = {{ columns = ["ux", "uy", "uz"], unit = "{unit}" }}'
     toml = "[log]\ngravity = [0, 0, -9.82]\n" + STREAM + TIME + TURN + "\n".join(lines.values())
-    np.testing.assert_allclose(only(read(tmp_path, toml)).channels[quantity], np.multiply([FORCE] * 4, factor))
+    np.testing.assert_allclose(
+        only(read(tmp_path, toml, a_csv=with_more())).channels[quantity], np.multiply([FORCE] * 4, factor)
+    )
 
 
 def test_one_g_is_standard_gravity_where_the_log_is_not_on_earth(tmp_path: Path) -> None:
     toml = "[log]\ngravity = [0, 0, -1.62]\n" + STREAM + TIME + WRENCH
-    stream = only(read(tmp_path, toml + 'specific_force = { columns = ["fx", "fy", "fz"], unit = "g" }'))
+    stream = only(
+        read(tmp_path, toml + 'specific_force = { columns = ["ux", "uy", "uz"], unit = "g" }', a_csv=with_more())
+    )
     np.testing.assert_allclose(stream.channels["specific_force"][0], np.multiply(FORCE, STANDARD_GRAVITY))
 
 
@@ -166,8 +175,8 @@ def test_forms_of_rotation(tmp_path: Path, form: str) -> None:
 
 def test_frames(tmp_path: Path) -> None:
     toml = STREAM + TIME + TURN + WRENCH.replace('"fz"] }', '"fz"], frame = "W" }')
-    toml += 'position = { columns = ["fx", "fy", "fz"] }\n'
-    assert dict(only(read(tmp_path, toml)).frames) == {"force": "W", "position": "W"}
+    toml += 'position = { columns = ["ux", "uy", "uz"] }\n'
+    assert dict(only(read(tmp_path, toml, a_csv=with_more())).frames) == {"force": "W", "position": "W"}
 
 
 def test_zero_torque(tmp_path: Path) -> None:

@@ -233,7 +233,7 @@ WRONG: dict[str, tuple[Change, str]] = {
     "gravity": (swap("gravity = [0, 0, -9.81]", "gravity = [0, 0, -981]"), 'team.toml, [team]: "gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got [0, 0, -981].'),
     "torque alone": (lambda t: re.sub(r"    joint_position[^\n]*\n", "", t, count=1), 'team.toml, [[robot]] 1 ("robot0"), recording 1: "joint_torque" becomes a force only at known joint angles. Give "joint_position" as well.'),
     "away": (swap('name = "grasp-0"', 'name = "grasp-0"\n  away = true'), 'team.toml, [[robot]] 1 ("robot0"), recording 1: "away" says that the robot holds nothing in this recording; leave out its streams.'),
-    "no file": (swap("team/robot0-grasp-0.csv", "team/none.csv"), '"team/none.csv" was not found. Searched: '),
+    "no file": (swap("team/robot0-grasp-0.csv", "team/none.csv"), 'team.toml, [[robot]] 1 ("robot0"), recording 1, stream 1 ("team/none.csv"): "team/none.csv" was not found. Searched: '),
 }  # fmt: skip
 
 

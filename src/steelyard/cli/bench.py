@@ -9,13 +9,14 @@ import click
 
 from steelyard.bench.timing import one_blas_thread
 from steelyard.cli.console import print_json, progress_bar, say
+from steelyard.cli.groups import Group
 
 _JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
 def bench() -> None:
-    """Make every claimed number again."""
+    """Make every number that the README and BENCHMARK.md claim again: a command per table."""
     one_blas_thread()
 
 
@@ -46,13 +47,25 @@ def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> No
 
 
 @bench.command()
-@click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True)
-@click.option("--motion", default="stop_go", show_default=True)
-@click.option("--noise", default="moderate", show_default=True)
-@click.option("--spectrum", type=click.Choice(["white", "2hz", "both"]), default="both", show_default=True)
+@click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True, help="Seeds 0, 1, ...")
+@click.option("--motion", default="stop_go", show_default=True, help="Motion of the logs, as in bench identify.")
+@click.option("--noise", default="moderate", show_default=True, help="Noise level, as in bench identify.")
+@click.option(
+    "--spectrum",
+    type=click.Choice(["white", "2hz", "both"]),
+    default="both",
+    show_default=True,
+    help="White noise, noise correlated below 2 Hz, or each in turn.",
+)
 @click.option("--all-objects", is_flag=True, help="Every seed on all ten objects instead of one in turn.")
 @click.option("--noise-unknown", is_flag=True, help="The log does not declare its noise: it is estimated.")
-@click.option("--bias", type=click.Choice(["free", "none"]), default="none", show_default=True)
+@click.option(
+    "--bias",
+    type=click.Choice(["free", "none"]),
+    default="none",
+    show_default=True,
+    help="The sensor's bias is estimated, or known to be none.",
+)
 @click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
 @_JSON
 def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **choices: Any) -> None:
@@ -180,7 +193,7 @@ def speed(tets: int, many: int, repeats: int, hull_sets: int, as_json: bool) -> 
 
 @bench.command()
 @click.option("--count", type=click.IntRange(min=1), default=60, show_default=True, help="Channels, plates and tubes.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True)
+@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of sizes and points.")
 @_JSON
 def sheets(count: int, seed: int, as_json: bool) -> None:
     """Thin channels, plates and open tubes from bare points: is the volume right, and are wrong ones named?"""

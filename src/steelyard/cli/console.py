@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import sys
 from collections.abc import Callable, Sequence
+from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -40,12 +41,28 @@ def require_output(output: Path | None, what: str, suffixes: Sequence[str], *inp
 
 
 def say_if_compiling() -> None:
-    """Say once that kernels are compiled when no compiled ones are cached yet."""
-    import steelyard
+    """Have it said once on a terminal that kernels are compiled, when one is; nothing where all come from the cache."""
+    if sys.stderr.isatty():
+        _listen_for_compiling()
 
-    root = Path(steelyard.__file__).parent
-    if sys.stderr.isatty() and not any(root.glob("identify/__pycache__/*.nbi")):
-        say("Compiling numerical kernels (first run only, about a minute) ...")
+
+@cache
+def _listen_for_compiling() -> None:
+    """Ask numba itself: it tells of each kernel that it compiles, and of none that it loads."""
+    from numba.core import event
+
+    class Once(event.Listener):
+        said = False
+
+        def on_start(self, event: Any) -> None:
+            if not self.said:
+                self.said = True
+                say("Compiling numerical kernels (first run only, about a minute) ...")
+
+        def on_end(self, event: Any) -> None:
+            """Nothing is said at the end."""
+
+    event.register("numba:compile", Once())  # type: ignore[no-untyped-call]
 
 
 def progress_bar(label: str) -> Callable[[int, int], None] | None:

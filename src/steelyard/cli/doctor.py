@@ -8,7 +8,7 @@ from importlib import metadata
 import click
 
 from steelyard import __version__
-from steelyard.cli.console import print_json
+from steelyard.cli.console import print_json, say_if_compiling
 from steelyard.errors import CannotAnswer
 
 CORE = ("numpy", "scipy", "numba", "click", "manifold3d")
@@ -24,6 +24,7 @@ TOLERANCE = 1e-4
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def doctor(as_json: bool) -> None:
     """Show versions and what is installed, and identify a made body whose answer is known."""
+    say_if_compiling()
     versions = {name: _version(name) for name in (*CORE, *EXTRAS)}
     error, seconds = _known_answer()
     healthy = error < TOLERANCE

@@ -8,6 +8,7 @@ from importlib import import_module
 import click
 
 from steelyard import __version__
+from steelyard.cli.groups import Group
 from steelyard.errors import SteelyardError
 
 # Verb -> (module and function, one line of help).
@@ -31,7 +32,7 @@ VERBS: dict[str, tuple[str, str]] = {
 }
 
 
-class _Verbs(click.Group):
+class _Verbs(Group):
     """A group whose verbs are imported on call."""
 
     def list_commands(self, ctx: click.Context) -> list[str]:
@@ -44,9 +45,8 @@ class _Verbs(click.Group):
         command: click.Command = getattr(import_module(module), function)
         return command
 
-    def format_commands(self, ctx: click.Context, formatter: click.HelpFormatter) -> None:
-        with formatter.section("Commands"):
-            formatter.write_dl([(name, text) for name, (_, text) in VERBS.items()])
+    def line_of(self, ctx: click.Context, name: str) -> str:
+        return VERBS[name][1]
 
 
 @click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})

@@ -6,15 +6,16 @@ import sys
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, cast
 
 import click
 
-from steelyard.cli.console import print_json, require_output, say
+from steelyard.cli.console import print_json, require_output, say, say_if_compiling
 from steelyard.errors import BadValue
 
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
+    from steelyard.io.parts_files import SavedParts
     from steelyard.parts.parts import Parts
     from steelyard.report import Report, Residuals, Scene, Truth
     from steelyard.shape.cloud import Cloud
@@ -29,7 +30,12 @@ _SAME_VOLUME = 0.02
 @click.command(context_settings={"help_option_names": ["-h", "--help"]})
 @click.argument("result", type=_FILE)
 @click.option("--parts", type=_FILE, help="Parts to draw: parts.npz, or a mesh (.ply) with a part per face.")
-@click.option("--scan", type=_FILE, help="Cloud of the object (PLY, PCD or NPZ): points, and colours of the surface.")
+@click.option(
+    "--scan",
+    type=_FILE,
+    help="Cloud of the object (.ply, .pcd, .npz): its points, and colours of --parts. "
+    "Without --parts the cloud, or a folder of views, is cut into parts as identify --scan does.",
+)
 @click.option("--log", type=_FILE, help="The log of the result: residuals over time, and where the object sits.")
 @click.option("--data", type=_FILE, help="Folder that relative paths in the log's description start from.")
 @click.option("--tool", type=_FILE, help="Result (.json) of the gripper that was taken away: the log weighs it too.")
@@ -48,22 +54,20 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
     from steelyard.team.estimate import TeamEstimate
 
     require_output(output, "a page", [".html", ".htm"], result, parts, scan, log, tool, truth)
-    if scan is not None and parts is None:
-        raise BadValue("--scan colours the parts that --parts gives: give both, or leave --scan out.")
     estimate = read_result(result)
     others = {name: read_result(path) for name, path in map(_rival, rivals)}
     said = {"command": "steelyard " + " ".join(sys.argv[1:])}
     if isinstance(estimate, TeamEstimate):
-        if any(given is not None for given in (parts, truth, tool, pose_in_sensor)):
+        if any(given is not None for given in (parts, scan, truth, tool, pose_in_sensor)):
             raise BadValue(
-                "A team's result has no parts to draw: leave --parts, --truth, --tool and --pose-in-sensor out."
+                "A team's result has no parts to draw: leave --parts, --scan, --truth, --tool and --pose-in-sensor out."
             )
         page = _of_team(title or f"{result.stem}: what the team carries", estimate, log, data, others, said)
     else:
         facts = None if truth is None else _Facts.read(truth, estimate)
         of_log, residuals = (None, None) if log is None else _from_log(log, data, tool, estimate)
         placed = _given_pose(pose_in_sensor) or of_log or (None if facts is None else facts.X_SO)
-        drawing, names = (None, {}) if parts is None else _scene(parts, scan, placed, estimate)
+        drawing, names = (None, {}) if parts is None and scan is None else _scene(parts, scan, placed, estimate)
         known = None if facts is None else facts.truth
         names = names if facts is None else {**names, **facts.names}
         heading = title or f"{result.stem}: what the robot holds"
@@ -164,24 +168,37 @@ def _from_log(
     return recording.object_pose, residuals
 
 
-def _scene(parts: Path, scan: Path | None, placed: Pose | None, estimate: Estimate) -> tuple[Scene, Mapping[int, str]]:
+def _scene(
+    parts: Path | None, scan: Path | None, placed: Pose | None, estimate: Estimate
+) -> tuple[Scene, Mapping[int, str]]:
     """Return what is drawn, and the names of its parts; their centroids say where it sits if nothing else does."""
-    from steelyard.io.parts_files import read_parts
     from steelyard.io.ply_files import read_mesh
     from steelyard.report import scene_of_mesh, scene_of_solid
 
-    cloud = None if scan is None else _cloud(scan)
-    if parts.suffix.lower() == ".ply":
-        mesh = read_mesh(parts)
+    if parts is not None and parts.suffix.lower() == ".ply":
+        mesh, cloud = read_mesh(parts), None if scan is None else _cloud(scan)
         return scene_of_mesh(mesh, cloud, placed or _matched(_enclosed(parts, mesh, estimate), estimate)), {}
-    saved = read_parts(parts)
+    saved, cloud = _saved(parts, scan)
     if estimate.parts:
         try:
             saved = saved.recut([part.volume for part in estimate.parts])
         except BadValue as error:
-            raise BadValue(f"{parts}: {error}") from None
+            raise BadValue(f"{parts or scan}: {error}") from None
     placed = placed or _matched(saved.parts, estimate)
     return scene_of_solid(saved.solid, saved.labels, cloud, saved.rgb, placed), dict(enumerate(saved.names))
+
+
+def _saved(parts: Path | None, scan: Path | None) -> tuple[SavedParts, Cloud | None]:
+    """Return the solid in parts and the points to draw; without `parts` the scan is cut, as `identify --scan` does."""
+    if parts is not None:
+        from steelyard.io.parts_files import read_parts
+
+        return read_parts(parts), None if scan is None else _cloud(scan)
+    from steelyard.api import saved_parts, shape_of
+
+    say_if_compiling()
+    shape = shape_of(cast(Path, scan))
+    return saved_parts(shape), shape.solid.cloud
 
 
 def _enclosed(path: Path, mesh: TriangleMesh, estimate: Estimate) -> Parts | None:

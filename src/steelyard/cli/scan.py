@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, progress_bar, require_output
+from steelyard.cli.console import print_json, progress_bar, require_output, say_if_compiling
 
 if TYPE_CHECKING:
     from steelyard.shape.scan import Scan
@@ -28,6 +28,7 @@ def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     from steelyard.shape.scan import fuse
 
     require_output(output, "a cloud", [".ply", ".npz"], views)
+    say_if_compiling()
     read = read_views(views, progress_bar("reading views"))
     begun = time.process_time()
     fused = fuse(read, points)

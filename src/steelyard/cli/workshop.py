@@ -9,11 +9,12 @@ from typing import Any
 
 import click
 
-from steelyard.cli.console import print_json, progress_bar, say
+from steelyard.cli.console import print_json, progress_bar, say, say_if_compiling
+from steelyard.cli.groups import Group
 from steelyard.errors import BadValue
 
 
-@click.group(context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
 def workshop() -> None:
     """Make the embedded data set: twenty families of workshop tools with exact truth."""
 
@@ -28,26 +29,48 @@ def workshop() -> None:
     help="Random variants of each family (sizes, materials, colours) instead of the nominal tools.",
 )
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of variants and clouds.")
-@click.option("--tools", multiple=True, help="Only these families (repeat the option).")
+@click.option("--tools", multiple=True, help="Only these families, such as hammer (repeat the option).")
 @click.option("--graded", is_flag=True, help="The graded families: tools with parts that are not homogeneous.")
-@click.option("--motion", type=click.Choice(["paper", "slow", "static"]), default="paper", show_default=True)
+@click.option(
+    "--motion",
+    type=click.Choice(["paper", "slow", "static"]),
+    default="paper",
+    show_default=True,
+    help="Motion of the log: the paper's brisk one, one below 0.25 m/s everywhere, or still poses only.",
+)
+@click.option(
+    "--views",
+    is_flag=True,
+    help="RGB-D views of each tool on a table too, for scan and identify --scan (20 MB each; needs steelyard[images]).",
+)
 @click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
 def build(
-    folder: Path, variants: int, seed: int, tools: tuple[str, ...], graded: bool, motion: str, as_json: bool
+    folder: Path,
+    variants: int,
+    seed: int,
+    tools: tuple[str, ...],
+    graded: bool,
+    motion: str,
+    views: bool,
+    as_json: bool,
 ) -> None:
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
-    from steelyard.io.object_writing import write_object
-    from steelyard.simulate.workshop import known_object
+    from steelyard.io.images import require_images
+    from steelyard.io.object_writing import write_object, write_object_views
+    from steelyard.simulate.workshop import known_object, scan_of
     from steelyard.workshop.catalogue import FAMILIES, build_graded, require
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED
 
+    say_if_compiling()
     begun = time.perf_counter()
     build_tool, families = (build_graded, GRADED) if graded else (build_even, FAMILIES)
     for name in tools:  # all of them before the first is written
         require(name, graded=graded)
     if folder.exists() and not folder.is_dir():
         raise BadValue(f"{folder}: this is a file; give a folder to write the tools into.")
+    if views:
+        require_images()
     jobs = [(name, k) for k in range(max(variants, 1)) for name in dict.fromkeys(tools or families)]
     progress = progress_bar("workshop build")
     rows: list[dict[str, Any]] = []
@@ -56,6 +79,8 @@ def build(
         known = known_object(tool, seed, motion)
         known = replace(known, name=f"{tool.name}-s{seed}-{k}" if variants else tool.name)
         write_object(known, folder / known.name)
+        if views:
+            write_object_views(*scan_of(known, seed), folder / known.name / "views")
         rows.append({
             "name": known.name, "mass_kg": float(known.truth.mass), "parts": len(known.parts), "half": known.half,
             "findings": [finding.code for finding in known.findings],
@@ -64,8 +89,14 @@ def build(
             progress(done, len(jobs))
     seconds = time.perf_counter() - begun
     if as_json:
-        print_json({"folder": str(folder), "seconds": round(seconds, 3), "objects": rows})
+        print_json({"folder": str(folder), "seed": seed, "seconds": round(seconds, 3), "objects": rows})
         return
     for row in rows:
         click.echo(f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {row['parts']:2d} parts  {row['half']}")
-    say(f"{len(rows)} object folder{'s' * (len(rows) != 1)} in {folder} ({seconds:.1f} s).")
+    say(f"{len(rows)} object folder{'s' * (len(rows) != 1)} in {folder} (seed {seed}, {seconds:.1f} s).")
+    if views:
+        one = folder / rows[0]["name"]
+        say(
+            f"Try: steelyard identify {one / 'log.toml'} --scan {one / 'views'} "
+            f"--pose-in-sensor {one / 'views' / 'object.toml'}"
+        )

@@ -13,22 +13,10 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.entries import Entry
+from steelyard.io.example import EXAMPLE
 from steelyard.io.object_pose import ObjectPose, parse_object_pose
 from steelyard.io.stream_entries import StreamSpec, parse_stream
 from steelyard.logs.recording import STANDARD_GRAVITY
-
-EXAMPLE = """\
-[log]
-gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
-wrench  = "on-sensor"        # or "on-object": what the robot applies to the object
-
-[[stream]]
-path     = "data.csv"
-time     = { columns = ["t"], unit = "s" }
-force    = { columns = ["fx", "fy", "fz"], unit = "N" }
-torque   = { columns = ["tx", "ty", "tz"], unit = "N*m" }
-rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }   # S to W
-"""
 
 _LARGEST_DESCRIPTION = 4_000_000
 # [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
@@ -52,6 +40,7 @@ class Description:
     noise        standard deviations, SI
     tool         path of a result, as written
     placed       pose of O in S, None where nothing says
+    notes        what a bare file left to be assumed
     """
 
     streams: tuple[StreamSpec, ...]
@@ -60,6 +49,7 @@ class Description:
     noise: Mapping[str, float] = field(default_factory=dict)
     tool: str | None = None
     placed: ObjectPose | None = None
+    notes: tuple[str, ...] = ()
 
 
 def read_description(path: Path) -> Description:

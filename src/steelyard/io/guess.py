@@ -7,7 +7,7 @@ A unit in brackets is taken; a vector whose meaning its numbers leave open (gx m
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -16,12 +16,14 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.io.channels import channel_with_gaps
-from steelyard.io.description import EXAMPLE, Description, default_gravity
+from steelyard.io.description import Description, default_gravity
 from steelyard.io.entries import listed
+from steelyard.io.example import columns_text, example_of
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.table_header import Header
 from steelyard.io.tables import Table
 from steelyard.io.units import TIME, UNITS
+from steelyard.logs.recording import STANDARD_GRAVITY
 
 Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
@@ -39,7 +41,6 @@ _STEMS: dict[str, tuple[str, ...]] = {
 _QUATERNION = ("q", "quat", "quaternion", "orientation", "rotation")
 # Angles leave open in which order they turn and whether they are degrees. Names -> the form and unit that are usual.
 _ANGLES = {("roll", "pitch", "yaw"): ("rpy", "deg"), ("rx", "ry", "rz"): ("rotation-vector", "rad")}
-_ROTATION_LINE = next(line for line in EXAMPLE.splitlines() if line.startswith("rotation"))
 _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
 _TIMES = ("t", "time", "timestamp", "stamp", "secs", "seconds")
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
@@ -87,18 +88,18 @@ def describe(table: Table) -> tuple[Description, Cells]:
     specs += [rotation] if rotation else []
     _require(table, names, [spec.name for spec in specs])
     time = None if stamps is None else TimeSpec(stamps, _time_unit(table, names, stamps, cells), 0.0, "time")
-    gravity = _gravity(specs, cells)
+    gravity, notes = _gravity(specs, cells)
     poses = time is None and _turns_each_row(specs, cells, gravity)
     where = table.path.name
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
     time = time and TimeSpec(time.column, time.unit, time.rate, f"{where}, time")
-    return Description((StreamSpec(where, tuple(located), where, time, poses),), gravity), cells
+    return Description((StreamSpec(where, tuple(located), where, time, poses),), gravity, notes=notes), cells
 
 
 def _simplified(table: Table) -> _Names:
     header = table.header
     if header.names is None:
-        raise _cannot_tell(table, "the file has no header")
+        raise _cannot_tell(table, "the file has no header", {})
     plain: dict[str, int] = {}
     units: dict[int, str] = {}
     inner = {n for group in header.groups.values() for n in group}
@@ -108,7 +109,7 @@ def _simplified(table: Table) -> _Names:
             units[number] = unit.group(1)
         simple = _simple(name[: unit.start()] if unit else name)
         if simple in plain:
-            raise _cannot_tell(table, f'two columns are called "{simple}"')
+            raise _cannot_tell(table, f'two columns are called "{simple}"', _own_lines(table, _Names(plain, units)))
         plain[simple] = number
     return _Names({**plain, **_array_names(header)}, units)
 
@@ -158,10 +159,11 @@ def _time_columns(names: _Names) -> Iterator[int]:
 def _require(table: Table, names: _Names, found: Sequence[str]) -> None:
     missing = [name for name in ("force", "torque") if name not in found]
     if missing:
-        raise _cannot_tell(table, f"no {' and no '.join(missing)} was recognised")
+        raise _cannot_tell(table, f"no {' and no '.join(missing)} was recognised", _own_lines(table, names))
     if not {"rotation", "gravity", "specific_force"} & set(found):
         _require_no_angles(table, names)
-        raise _cannot_tell(table, "nothing says where gravity points in the sensor frame")
+        reason = "nothing says where gravity points in the sensor frame"
+        raise _cannot_tell(table, reason, _own_lines(table, names))
 
 
 def _require_no_angles(table: Table, names: _Names) -> None:
@@ -169,27 +171,49 @@ def _require_no_angles(table: Table, names: _Names) -> None:
     for three, (form, unit) in _ANGLES.items():
         found = names.all_of(three, len(three[0]) < 3)
         if found:
-            shown = table.header.names or ()
-            columns = ", ".join(f'"{shown[n]}"' for n in found)
-            line = f'rotation = {{ columns = [{columns}], form = "{form}", unit = "{unit}" }}   # S to W; check both'
+            line = f'{{ columns = {_columns(table, found)}, form = "{form}", unit = "{unit}" }}   # S to W; check both'
             raise _cannot_tell(
                 table,
                 f"{', '.join(three)} turn the sensor, but only a description can say in which form (rpy or "
                 "rotation-vector) and unit (deg or rad)",
-                EXAMPLE.replace(_ROTATION_LINE, line),
+                {**_own_lines(table, names), "rotation": line},
             )
 
 
-def _cannot_tell(table: Table, reason: str, example: str = EXAMPLE) -> BadDescription:
-    shown = (
-        f"Columns here: {listed(table.header.shown())}."
-        if table.header.names
-        else f"It has {table.header.count} columns."
-    )
+def _cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> BadDescription:
+    """Return the error; `lines` are those of a description that the names of the file do tell."""
+    names = table.header.names
+    shown = f"Columns here: {listed(table.header.shown())}." if names else f"It has {table.header.count} columns."
     return BadDescription(
         f"{table.path}: cannot tell what the columns are: {reason}. {shown} "
-        f"Write a description that says it, for example:\n{example}"
+        f"Write a description that says it, for example:\n{example_of(table.path.name, lines, not names)}"
     )
+
+
+def _own_lines(table: Table, names: _Names) -> dict[str, str]:
+    """Return quantity -> its line of a description, for those whose columns were recognised."""
+    lines = {}
+    stamps = next(_time_columns(names), None)
+    if stamps is not None:
+        lines["time"] = f'{{ columns = {_columns(table, (stamps,))}, unit = "{_said_unit(names, stamps) or "s"}" }}'
+    for quantity in ("force", "torque", "specific_force", "gravity"):
+        if found := _vector(names, quantity):
+            said = names.units.get(found[0], "")
+            unit = said if said in UNITS[quantity] else next(iter(UNITS[quantity]))
+            lines[quantity] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}'
+    if turn := _rotation(names):
+        numbers = [int(n) for n in turn.columns]
+        lines["rotation"] = f'{{ columns = {_columns(table, numbers)}, form = "{turn.form}" }}   # S to W'
+    return lines
+
+
+def _columns(table: Table, numbers: Sequence[int]) -> str:
+    """Return the names of columns as a description lists them; an array that holds them all by its own name."""
+    for name, group in table.header.groups.items():
+        if group == tuple(numbers):
+            return columns_text([name])
+    shown = table.header.names or ()
+    return columns_text([shown[n] for n in numbers])
 
 
 def _vector_spec(
@@ -198,7 +222,8 @@ def _vector_spec(
     """Return the vector with its unit, None where its size does not tell what it is."""
     unit = names.units.get(numbers[0])
     if unit is not None and unit not in UNITS[quantity]:
-        raise _cannot_tell(table, f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}')
+        reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
+        raise _cannot_tell(table, reason, _own_lines(table, names))
     if unit is None:
         unit = _unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
     return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)
@@ -215,10 +240,9 @@ def _unit_by_size(quantity: str, values: Array) -> str | None:
 
 def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
     """Return the unit from the name (t_ms, t [ms]), from the size of stamps since 1970, or seconds."""
-    name = next(key for key, n in names.plain.items() if n == number)
-    for said in (names.units.get(number, ""), name.rpartition("_")[2]):
-        if said in TIME:
-            return said
+    said = _said_unit(names, number)
+    if said is not None:
+        return said
     if cells[number].dtype.kind == "M":
         return "s"
     stamps = cells[number].astype(np.float64)
@@ -228,8 +252,15 @@ def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:
             return unit
     step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
     if step > _SLOWEST:
-        raise _cannot_tell(table, f"time rises by {step:g} per row, which can hardly be seconds")
+        reason = f"time rises by {step:g} per row, which can hardly be seconds"
+        raise _cannot_tell(table, reason, _own_lines(table, names))
     return "s"
+
+
+def _said_unit(names: _Names, number: int) -> str | None:
+    """Return the unit of time that a name carries: t_ms, t [ms]."""
+    name = next(key for key, n in names.plain.items() if n == number)
+    return next((said for said in (names.units.get(number, ""), name.rpartition("_")[2]) if said in TIME), None)
 
 
 def _size(values: Array) -> float:
@@ -238,13 +269,16 @@ def _size(values: Array) -> float:
     return float(np.median(sizes)) if len(sizes) else float("nan")
 
 
-def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> Array:
-    """Return gravity in W, z up, as long as the file's own gravity; standard where it has none."""
+def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[str, ...]]:
+    """Return gravity in W, z up, as long as the file's own gravity; standard where it has none, which a note says."""
     for spec in specs:
         if spec.name == "gravity":
             values = np.stack([cells[int(n)] for n in spec.columns], -1)
-            return np.array([0.0, 0.0, -_size(values)])
-    return default_gravity()
+            return np.array([0.0, 0.0, -_size(values)]), ()
+    way = " along -z of the world" if any(spec.name == "rotation" for spec in specs) else ""
+    return default_gravity(), (
+        f"the file does not say gravity: {STANDARD_GRAVITY} m/s²{way} was assumed ([log] gravity of a description)",
+    )
 
 
 def _turns_each_row(specs: Sequence[QuantitySpec], cells: Cells, gravity: Array) -> bool:

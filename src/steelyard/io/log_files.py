@@ -69,7 +69,8 @@ def _recording(
     )
     require_matched_rows(streams, path.name)
     streams, findings = without_missing(specs, streams)
-    tool = None if description.tool is None else str(find_file(description.tool, path.parent, data))
+    tool = description.tool
+    tool = None if tool is None else str(find_file(tool, path.parent, data, f"{path.name}, [log], tool"))
     placed = description.placed
     return Recording(
         streams,
@@ -81,4 +82,5 @@ def _recording(
         object_pose_std=None if placed is None else placed.std,
         name=path.stem,
         findings=findings,
+        notes=description.notes,
     )

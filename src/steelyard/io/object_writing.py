@@ -13,7 +13,10 @@ from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recording_files import object_table
+from steelyard.io.view_folders import write_views
 from steelyard.parts.known import KnownObject
+from steelyard.shape.views import Views
+from steelyard.spatial import Pose
 from steelyard.whole_files import whole_folder, write_bytes, write_text
 
 PARTS_NOTE = (
@@ -56,6 +59,15 @@ def write_object(known: KnownObject, folder: Path | str) -> None:
         write_bytes(new / "motion.npz", _npz(known.track.columns()))
         write_text(new / "truth.json", json.dumps(truth_dict(known), indent=1) + "\n")
         write_text(new / "log.toml", f"{LOG}\n{object_table(known.X_SO)}")
+
+
+def write_object_views(views: Views, X_SW: Pose, folder: Path | str) -> None:
+    """Write posed RGB-D views of an object, and `object.toml`: where their world W sits in the sensor. Raises BadFile.
+
+    `steelyard identify log.toml --scan FOLDER --pose-in-sensor FOLDER/object.toml` then runs as it stands.
+    """
+    write_views(views, folder)
+    write_text(Path(folder) / "object.toml", object_table(X_SW, of="the world of the views"))
 
 
 def _npz(arrays: dict[str, Any]) -> bytes:

@@ -40,14 +40,17 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     return folder / "log.toml"
 
 
-def object_table(pose: Pose, std: tuple[float, float] | None = None) -> str:
-    """Return the [object] table of a description: where the object's frame O sits in S; std in m and rad."""
+def object_table(pose: Pose, std: tuple[float, float] | None = None, of: str = "the mesh's frame") -> str:
+    """Return the [object] table of a description: where the object's frame O sits in S; std in m and rad.
+
+    of  what the frame is, in words
+    """
     position, rotation = (
         ", ".join(f"{v + 0.0:.12g}" for v in values) for values in (pose.position, pose.rotation.matrix.ravel())
     )
     spread = "" if std is None else f", std_mm = {1e3 * std[0]:.9g}, std_deg = {np.degrees(std[1]):.9g}"
     place = f'position = [{position}], unit = "m", rotation = [{rotation}], form = "matrix"{spread}'
-    return f"[object]\npose_in_sensor = {{ {place} }}   # of the mesh's frame\n"
+    return f"[object]\npose_in_sensor = {{ {place} }}   # of {of}\n"
 
 
 def _described(stream: Stream) -> str:

@@ -13,6 +13,7 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.channels import channel, channel_with_gaps, require_one_length
 from steelyard.io.clocks import Clock, common_origin, require_likely_step, steady
+from steelyard.io.entries import listed
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
 from steelyard.io.tables import Table, choose_columns, find_file, open_table
 
@@ -28,7 +29,7 @@ def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) ->
                 f'{spec.where}: "topic" belongs to bags, which are not supported yet. Export the topic to CSV.'
             )
         if spec.path not in opened:
-            opened[spec.path] = open_table(find_file(spec.path, folder, data))
+            opened[spec.path] = open_table(find_file(spec.path, folder, data, spec.where))
     return [opened[spec.path] for spec in specs]
 
 
@@ -38,7 +39,7 @@ def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cel
     exact: dict[Path, set[int]] = {}
     for spec, table in zip(specs, tables, strict=True):
         stamps = _time_column(spec, table)
-        chosen = [n for quantity in spec.quantities for n in _numbers(quantity, table)]
+        chosen = _chosen(spec, table, stamps)
         wanted.setdefault(table.path, set()).update(chosen, stamps)
         exact.setdefault(table.path, set()).update(stamps)
     cells: dict[Path, Cells] = {}
@@ -46,6 +47,24 @@ def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cel
         if table.path not in cells:
             cells[table.path] = table.read(sorted(wanted[table.path]), sorted(exact[table.path]))
     return [cells[table.path] for table in tables]
+
+
+def _chosen(spec: StreamSpec, table: Table, stamps: Sequence[int]) -> list[int]:
+    """Return the columns of all quantities; raises BadDescription where one is named for two things."""
+    user = dict.fromkeys(stamps, "time")
+    chosen = []
+    for quantity in spec.quantities:
+        for n in _numbers(quantity, table):
+            if n in user:
+                called = f'"{table.header.names[n]}"' if table.header.names else str(n)
+                both = f"{user[n]} and {quantity.name}" if user[n] != quantity.name else f"two axes of {user[n]}"
+                raise BadDescription(
+                    f"{spec.where}: column {called} is given for {both}. Each needs columns of its own; "
+                    f"columns in {table.path.name}: {listed(table.header.shown() or range(table.header.count))}."
+                )
+            user[n] = quantity.name
+            chosen.append(n)
+    return chosen
 
 
 def _numbers(spec: QuantitySpec, table: Table) -> tuple[int, ...]:

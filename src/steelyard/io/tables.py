@@ -61,12 +61,16 @@ def data_suffix(path: Path) -> str:
     return (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
 
 
-def find_file(name: str, folder: Path, data: Path | None) -> Path:
-    """Return the file `name`, sought in `data`, $STEELYARD_DATA, `folder`; raises BadFile naming them."""
+def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Path:
+    """Return the file `name`, sought in `data`, $STEELYARD_DATA, `folder`; raises BadFile naming them.
+
+    asked  the place of the description that asks for it; empty where a person does
+    """
+    by = f"{asked}: " if asked else ""
     if Path(name).is_absolute():
         if Path(name).exists():
             return Path(name)
-        raise BadFile(f"{name}: no such file.")
+        raise BadFile(f"{by}{name}: no such file.")
     environment = os.environ.get("STEELYARD_DATA")
     folders = [data] if data else []
     folders += [Path(environment)] if environment else []
@@ -75,7 +79,7 @@ def find_file(name: str, folder: Path, data: Path | None) -> Path:
         if (each / name).exists():
             return each / name
     raise BadFile(
-        f'"{name}" was not found. Searched: {", ".join(str(each.absolute()) for each in folders)}. '
+        f'{by}"{name}" was not found. Searched: {", ".join(str(each.absolute()) for each in folders)}. '
         "Correct the path, or give the folder of the data with --data DIR or STEELYARD_DATA."
     )
 

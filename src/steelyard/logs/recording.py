@@ -77,6 +77,7 @@ class Recording:
     object_pose   pose of the scan's frame O in S, with its uncertainty (m, rad)
     dead          channels of the wrench [tau, f] in S that do not measure: nothing may be concluded from them
     findings      what reading it already showed: rows that missed a number and were left out
+    notes         what reading it had to assume, in words
     """
 
     streams: tuple[Stream, ...]
@@ -89,3 +90,4 @@ class Recording:
     name: str = "log"
     dead: tuple[bool, ...] = (False,) * 6
     findings: tuple[Finding, ...] = ()
+    notes: tuple[str, ...] = ()

@@ -16,7 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import AT_REST, UNMEASURED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
 from steelyard.identify.geodesic import Geodesic
@@ -124,8 +124,10 @@ def identify(
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if aligned.acceleration_from in ENCODERS and parts is None:
         estimate = allow_softness(log, estimate)
+    if unmeasured or log.still.all():
+        better = UNMEASURED if unmeasured else AT_REST
+        estimate = replace(estimate, findings=tuple(finding.instead(better) for finding in estimate.findings))
     if unmeasured:
-        estimate = replace(estimate, findings=tuple(map(_needs_acceleration, estimate.findings)))
         aligned = replace(aligned, notes=())
     if parts is not None and shape is not None:
         estimate = _looked_at(estimate, parts, shape)
@@ -133,7 +135,8 @@ def identify(
         if not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late, *of_sensor)
-    return _in_recording_sign(replace(estimate, delays_s=dict(aligned.delays_s)).noted(*aligned.notes), recording)
+    estimate = replace(estimate, delays_s=dict(aligned.delays_s)).noted(*recording.notes, *aligned.notes)
+    return _in_recording_sign(estimate, recording)
 
 
 @contextmanager
@@ -244,14 +247,6 @@ def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLo
         return at_rest, ("no stream measures the acceleration: only the rows at rest were used",)
     quiet = None if log.noise is None else tuple(Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) for n in log.noise)
     return replace(log, noise=quiet), ("no stream measures the acceleration: it was taken as zero throughout",)
-
-
-def _needs_acceleration(finding: Finding) -> Finding:
-    """Return the finding with the remedy that helps where nothing measured the acceleration of S."""
-    if finding.code != "inertia-not-identified":
-        return finding
-    remedy = "Record the position of the sensor or an accelerometer as well: without its acceleration only rest counts."
-    return replace(finding, remedy=remedy)
 
 
 def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:

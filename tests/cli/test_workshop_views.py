@@ -1,0 +1,39 @@
+"""`steelyard workshop build --views`: views that are read again, with the place of their world in the sensor."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from click.testing import CliRunner
+
+from steelyard.cli.main import cli
+from steelyard.io.object_pose import read_object_pose
+from steelyard.io.view_folders import read_views
+from steelyard.simulate import workshop
+from steelyard.simulate.scanning import scan_mesh
+from steelyard.simulate.workshop import known_object, scan_of
+from steelyard.workshop.catalogue import build
+
+
+def test_views_are_written_with_their_place_in_the_sensor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    pytest.importorskip("PIL")
+    monkeypatch.setattr(workshop.scan_of, "__defaults__", (0, 4))
+    arguments = ["workshop", "build", str(tmp_path), "--tools", "ruler", "--views", "--seed", "3"]
+    done = CliRunner().invoke(cli, arguments)
+    assert done.exit_code == 0, done.output
+    assert "(seed 3, " in done.output
+    views, X_SW = scan_of(known_object(build("ruler"), 3), 3, 4)
+    read = read_views(tmp_path / "ruler" / "views")
+    assert np.array_equal(read.depth, views.depth)
+    assert read.rgb is not None
+    placed = read_object_pose(str(tmp_path / "ruler" / "views" / "object.toml")).pose
+    np.testing.assert_allclose(placed.matrix(), X_SW.matrix(), atol=1e-11)
+
+
+def test_the_place_takes_the_true_tool_to_where_the_robot_holds_it() -> None:
+    known = known_object(build("ruler"))
+    _, X_SW = scan_of(known, 0, 2)
+    X_WO = scan_mesh(known.mesh, 0, count=2).X_WO
+    np.testing.assert_allclose((X_SW @ X_WO).matrix(), known.X_SO.matrix(), atol=1e-12)
