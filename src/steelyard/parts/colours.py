@@ -42,12 +42,14 @@ class ColourModes:
     rgb    (M, 3) the colours, 0..255, as they are without the lamp
     lamp   (8,) weights of the harmonics of the normal; brightness is 1 + lamp . f(normal); 0 where no lamp is seen
     noise  median distance of neighbouring colours, 0..1, before averaging
+    plain  (V, 3) the colour of every point, 0..1, without the lamp and before averaging
     """
 
     label: Integers
     rgb: Array
     lamp: Array
     noise: float
+    plain: Array
 
 
 def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: Any = None) -> ColourModes:
@@ -76,7 +78,7 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     modes = _modes(colour, near, sure, reach)
     label = _assigned(colour, near, sure, modes, reach)
     label, modes = _without_blends(label, modes, near, raw, max(FINEST, 2 * noise))
-    return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise)
+    return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise, raw)
 
 
 def _lent(colour: Array, xyz: Array, seen: Any) -> Array:

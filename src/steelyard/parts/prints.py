@@ -22,7 +22,7 @@ def without_prints(label: Integers, skin: Skin) -> Integers:
     """Return the colours (V,) of the vertices with small, flush patches given the colour around them."""
     total = float(skin.areas.sum())
     for _ in range(3):
-        patch = _patches(label, skin)
+        patch = patches(label, skin)
         count = int(patch.max()) + 1
         corners = patch[skin.triangles]
         owner = np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
@@ -48,7 +48,7 @@ def without_prints(label: Integers, skin: Skin) -> Integers:
     return label
 
 
-def _patches(label: Integers, skin: Skin) -> Integers:
+def patches(label: Integers, skin: Skin) -> Integers:
     """Return the number (V,) of the connected patch of one colour that each vertex lies in.
 
     Near vertices are connected as well, unless they look apart: few triangles lead from face to face of a sharp edge.

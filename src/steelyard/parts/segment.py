@@ -20,6 +20,7 @@ from steelyard.findings import Finding
 from steelyard.parts.colours import colour_modes
 from steelyard.parts.description import Cuts, cuts_of
 from steelyard.parts.doubt import doubts
+from steelyard.parts.fades import without_fades
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.parts.pieces import cell_colours, inner_faces, pieces_of, with_points
@@ -157,7 +158,7 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     if cloud.rgb is not None:
         told = (cloud.normals, cloud.seen) if same else (None, None)  # what is known of points is known of vertices
         colours = colour_modes(_vertex_colours(cloud, mesh), skin, *told)
-        colour = without_prints(colours.label, skin)
+        colour = without_prints(without_fades(colours, skin), skin)
     pairs, corners = inner_faces(mesh)
     a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
     areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
