@@ -123,6 +123,8 @@ def test_clean_logs_stay_clean(object_name: str, tmp_path: Path) -> None:
         "torque in N mm",
         "tilt 20",
         "rows twice, same stamps",
+        "rotation vector, radians as degrees",
+        "wrench in W",
     ],
 )
 def test_the_answer_survives_on_poses(trap: str, examples_dir: Path, data_dir: Path) -> None:
@@ -149,6 +151,27 @@ def test_motion_can(tmp_path: Path) -> None:
     for mistake in ({"sign_flipped": True}, {"gravity": (0, 0, 9.81)}):
         finding = examine(made(tmp_path, KINDS["plain"], **mistake))[1][0]
         assert "cannot tell" not in finding.message
+
+
+def test_the_axes_of_the_wrench_are_said(examples_dir: Path, data_dir: Path) -> None:
+    recording = real("kuka_static", examples_dir, data_dir)
+    for trap, right in (("wrench in W", "W"), ("wrench said to be in W", "S")):
+        read, (finding,) = examine(TRAPS[trap][0](recording))
+        assert f"The wrench is in the axes of {right}" in finding.message
+        assert f'frame = "{right}"' in finding.remedy
+        assert read.streams[0].frames["force"] == right
+
+
+def test_a_weight_taken_away_is_in_no_other_axes(examples_dir: Path, data_dir: Path) -> None:
+    recording = real("kuka_static", examples_dir, data_dir)
+    noise = np.random.default_rng(5)
+    for bias in ([0.0, 0.0, 8.0], [0.0, 0.0, -8.0]):
+        empty = edited(
+            recording,
+            force=lambda v, bias=bias: noise.normal(bias, 0.1, v.shape),
+            torque=lambda v: noise.normal(0, 0.005, v.shape),
+        )
+        assert not [f for f in examine(empty)[1] if "axes" in f.message]
 
 
 def test_two_mistakes(examples_dir: Path, data_dir: Path) -> None:

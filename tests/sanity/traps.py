@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.logs.misread import rolled
 from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.glance import in_other_axes
 from steelyard.spatial import Rotation
 
 Edit = Callable[[Recording], Recording]
@@ -72,6 +73,24 @@ def reread(recording: Recording, misread: Callable[[Rotation], Rotation]) -> Rec
     return edited(recording, rotation=lambda v: misread(Rotation.nearest(v)).matrix)
 
 
+def in_base_axes(recording: Recording) -> Recording:
+    """Return the recording with force and torque turned into W, still said to be in S."""
+    poses = next(s for s in recording.streams if "rotation" in s.channels)
+
+    def turned(stream: Stream) -> Stream:
+        felt = [q for q in ("force", "torque") if q in stream.channels]
+        if not felt:
+            return stream
+        rows = np.arange(len(stream))
+        if stream.time is not None and poses.time is not None:
+            rows = np.minimum(np.searchsorted(poses.time, stream.time), len(poses) - 1)
+        rotation = poses.channels["rotation"][rows]
+        changed = {q: np.einsum("nij,nj->ni", rotation, stream.channels[q]) for q in felt}
+        return replace(stream, channels={**stream.channels, **changed})
+
+    return replace(recording, streams=tuple(turned(s) for s in recording.streams))
+
+
 TRAPS: dict[str, tuple[Edit, str]] = {
     "sign": (lambda r: replace(r, wrench_sign=-r.wrench_sign), "wrench-sign-flipped"),
     "gravity up": (lambda r: replace(r, gravity=-r.gravity), "gravity-frame"),
@@ -82,6 +101,12 @@ TRAPS: dict[str, tuple[Edit, str]] = {
     "w first": (lambda r: edited(r, rotation=lambda v: rolled(v, 1)), "quaternion-order"),
     "w last": (lambda r: edited(r, rotation=lambda v: rolled(v, -1)), "quaternion-order"),
     "radians as degrees": (lambda r: reread(r, lambda R: Rotation.from_rpy(np.radians(R.rpy()))), "gravity-frame"),
+    "rotation vector, radians as degrees": (
+        lambda r: reread(r, lambda R: Rotation.exp(np.radians(R.log()))),
+        "gravity-frame",
+    ),
+    "wrench in W": (in_base_axes, "gravity-frame"),
+    "wrench said to be in W": (lambda r: in_other_axes(r), "gravity-frame"),
     "rotation vector as rpy": (lambda r: reread(r, lambda R: Rotation.from_rpy(R.log())), "gravity-frame"),
     "yaw, pitch, roll": (lambda r: reread(r, lambda R: Rotation.from_rpy(R.rpy()[..., ::-1])), "gravity-frame"),
     "moving axes": (lambda r: reread(r, lambda R: Rotation.from_rpy(-R.inverse().rpy())), "gravity-frame"),

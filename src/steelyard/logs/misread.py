@@ -46,6 +46,14 @@ def _in_degrees(rotation: Array) -> Array | None:
     return Rotation.from_rpy(np.degrees(angles)).matrix
 
 
+def _vector_in_degrees(rotation: Array) -> Array | None:
+    """Undo a rotation vector in radians read as degrees: hardly any is then longer than pi degrees."""
+    vector = Rotation.nearest(rotation).log()
+    if np.quantile(np.linalg.norm(vector, axis=1), 0.99) > np.radians(1.01 * np.pi):
+        return None
+    return Rotation.exp(np.degrees(vector)).matrix
+
+
 def _vector(rotation: Array) -> Array:
     """Undo a rotation vector read as roll, pitch, yaw.
 
@@ -78,6 +86,12 @@ MISREAD = (
         "the angles of the rotation are in radians, not in degrees",
         'Set unit = "rad" in the rotation of this stream.',
         _in_degrees,
+    ),
+    Misread(
+        "gravity-frame",
+        "the numbers of the rotation are a rotation vector in radians, not in degrees",
+        'Set form = "rotation-vector" and unit = "rad" in the rotation of this stream.',
+        _vector_in_degrees,
     ),
     Misread(
         "gravity-frame",

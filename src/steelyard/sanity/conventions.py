@@ -1,4 +1,4 @@
-"""Conventions: sign of the wrench, sense of the rotation, order of quaternions, direction of gravity, unit of torque.
+"""Conventions: sign and axes of the wrench, sense of the rotation, order of quaternions, gravity, unit of torque.
 
 The log as given is fitted beside the log under each rival convention (see `glance`). A rival is claimed only where it
 
@@ -24,7 +24,7 @@ from steelyard.logs.misread import MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
 from steelyard.sanity.compensated import both_masses, compensated
-from steelyard.sanity.glance import Glance, glance
+from steelyard.sanity.glance import Glance, glance, in_other_axes
 from steelyard.sanity.mirrored import Mirror, mirrored
 from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
@@ -36,6 +36,8 @@ MUCH_BETTER = 0.25
 # A reading that leaves less than the first share of the force variance has rotation and gravity right but for a tilt;
 # one that leaves less than the second has the tilt right, too: two degrees leave more.
 GOOD, LEVEL = 0.03, 2e-4
+# Constant forces seem to turn with the sensor where a bias lies along gravity; torques then do not.
+TORQUES_TOO = 0.3
 # With fewer poses or stretches than this, a direction of gravity fits by chance.
 FEWEST_BLOCKS = 6
 # No hand holds a mass this far from its sensor [m].
@@ -50,7 +52,7 @@ SENSOR_TURN = np.radians(10.0)
 class Reading:
     """One way to read the recording: words for what would be wrong, gravity, rotations, its fit, how they were misread.
 
-    `misread` is None where the rotations are as given.
+    `misread` is None where the rotations are as given; `view` is what is seen where the wrench is in other axes.
     """
 
     words: str
@@ -58,6 +60,7 @@ class Reading:
     rotation: Array | None
     fit: StaticFit
     misread: Misread | None = None
+    view: Glance | None = None
 
 
 def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -67,10 +70,10 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
         return recording, ()
     found: list[Finding] = []
     reading = _reading(view, "", recording.gravity, view.rotation)
-    best = _best_rival(view, reading)
+    best = _best_rival(recording, view, reading)
     if best is not None:
         found.append(_rival_finding(best, reading))
-        recording, reading = _as_read(recording, best), best
+        recording, reading, view = _as_read(recording, best), best, best.view or view
     found.extend(less := compensated(view, recording.gravity, reading.rotation))
     # What a controller leaves of a weight may have either sign.
     flipped, findings = (recording, ()) if less else _signs(recording, view, reading)
@@ -119,7 +122,15 @@ def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
                 yield _reading(view, words, sign * size * np.eye(3)[axis], R)
 
 
-def _best_rival(view: Glance, given: Reading) -> Reading | None:
+def _in_other_axes(recording: Recording, given: Reading) -> Iterator[Reading]:
+    """Yield the reading of the wrench in W where it was said to be in S, and in S where it was said to be in W."""
+    view = None if any(recording.dead) else glance(in_other_axes(recording))
+    if view is not None and given.rotation is not None:
+        words = f"the wrench is in the axes of {'W (the base), not of S' if view.world else 'S, not of W (the base)'}"
+        yield replace(_reading(view, words, given.gravity, given.rotation), view=view)
+
+
+def _best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | None:
     """Return the rival that beats the reading as given, if there is one."""
     if view.rotation is None or given.fit.force_share < GOOD:
         return None
@@ -127,12 +138,13 @@ def _best_rival(view: Glance, given: Reading) -> Reading | None:
     bar = MUCH_BETTER * given.fit.force_share
     able = [
         r
-        for r in _rivals(view, given.gravity)
+        for r in (*_rivals(view, given.gravity), *_in_other_axes(recording, given))
         if r.fit.force_share < min(bar, 0.5)
         and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
         and r.fit.sign != 0
         and _varies(view, r)
         and _beats_tilt(r, free)
+        and (r.view is None or r.fit.torque_share < TORQUES_TOO)
     ]
     # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
     return min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
@@ -142,7 +154,7 @@ def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
     """Tell whether a freely tilted gravity explains no more (an axis: much more) than the rival does."""
     if free is None:
         return True
-    if rival.misread is not None:
+    if rival.misread is not None or rival.view is not None:
         return rival.fit.force_share < 0.5 * free.force_share
     return rival.fit.force_share < 2 * free.force_share + 1e-3
 
@@ -158,11 +170,16 @@ def _rival_finding(best: Reading, given: Reading) -> Finding:
         f"{best.words[0].upper()}{best.words[1:]}; so read, {_percent(best.fit.force_share)} of the force variance is "
         f"left unexplained instead of {_percent(given.fit.force_share)}. The answer assumes this."
     )
+    if best.view is not None:
+        remedy = f'Set frame = "{"W" if best.view.world else "S"}" in force and torque of this stream.'
+        return Finding("gravity-frame", message, remedy)
     return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
 
 
 def _as_read(recording: Recording, best: Reading) -> Recording:
-    """Return the recording with its rotations and gravity as the reading has them."""
+    """Return the recording with its rotations, gravity and axes of the wrench as the reading has them."""
+    if best.view is not None:
+        return in_other_axes(recording)
     if best.misread is None:
         return replace(recording, gravity=best.gravity)
     streams = []

@@ -7,7 +7,7 @@ low-passed alike, so that a body at rest or in slow motion obeys f = m (a - g), 
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -125,6 +125,17 @@ def glance(recording: Recording) -> Glance | None:
     if stream is None:
         return None
     return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
+
+
+def in_other_axes(recording: Recording) -> Recording:
+    """Return the recording with its wrench said to be in W where it was in S, and in S where it was in W."""
+
+    def turned(stream: Stream) -> Stream:
+        felt = {"force", "torque"} & set(stream.channels)
+        other = "S" if stream.frames.get("force", "S") == "W" else "W"
+        return replace(stream, frames={**stream.frames, **dict.fromkeys(felt, other)}) if felt else stream
+
+    return replace(recording, streams=tuple(map(turned, recording.streams)))
 
 
 def channel(recording: Recording, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
