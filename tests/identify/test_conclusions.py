@@ -34,6 +34,24 @@ def test_error_bars_cover_the_truth(spectrum: Spectrum) -> None:
         assert 0.88 <= float(kind.mean()) <= 0.99
 
 
+def test_no_bar_is_narrower_than_leaving_blocks_out_shows() -> None:
+    """Stretches in which one torque is a little off: what is wrong is the same all through a stretch."""
+    wider = 0
+    for seed in range(4):
+        log, _ = simulate_log("hammer", "stop_go", "moderate", seed, shuffled=False)
+        stretch = np.arange(len(log)) * 20 // len(log)
+        wrong = np.zeros((len(log), 6))
+        wrong[:, 0] = np.random.default_rng(seed).normal(0, 0.02, 20)[stretch]
+        found = NoiseAware().identify(replace(log, wrench=log.wrench + wrong, pose=stretch))
+        jackknife, known = found.evidence.jackknife_people, found.identified
+        assert jackknife is not None
+        assert known.all()
+        assert (found.std > 0.999 * jackknife).all()
+        wider += int((found.std > 1.001 * jackknife).sum())
+        np.testing.assert_allclose(found.covariance, found.covariance.T, atol=1e-15)
+    assert wider  # a bar that is wider for its own reasons stays so
+
+
 def test_error_bars_shrink_with_the_root_of_the_rows() -> None:
     def std(repeats: int) -> np.ndarray:
         log, _ = simulate_log("mallet", "stop_go", "moderate", 0, shuffled=True, repeats=repeats)

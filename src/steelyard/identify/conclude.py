@@ -15,7 +15,7 @@ from steelyard.identify.dense import eigen, product, product_transposed
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
 from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations, without_bias
-from steelyard.identify.people import people_jacobian
+from steelyard.identify.people import parameter_jacobian, people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
@@ -99,7 +99,7 @@ def conclude(
     left_out = leave_one_out(problem, solution, bread, response)
     if left_out:
         estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
-    return widened(estimate.with_findings(*_findings(estimate))) if response is None else estimate
+    return _as_blocks_show(widened(estimate.with_findings(*_findings(estimate)))) if response is None else estimate
 
 
 def widened(estimate: Estimate) -> Estimate:
@@ -124,6 +124,25 @@ def widened(estimate: Estimate) -> Estimate:
         part_covariance=None if estimate.part_covariance is None else factor**2 * estimate.part_covariance,
         parts=tuple(replace(part, std=factor * part.std) for part in estimate.parts),
         notes=(*estimate.notes, note),
+    )
+
+
+def _as_blocks_show(estimate: Estimate) -> Estimate:
+    """Return the estimate with no number's bar narrower than leaving blocks out shows; correlations are kept.
+
+    What the model leaves out (an arm that swings after a stop) moves some numbers more than others.
+    """
+    jackknife, known = estimate.evidence.jackknife_people, estimate.identified
+    if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS:
+        return estimate
+    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
+    factor = np.where(known, np.maximum(jackknife / np.maximum(estimate.std, least), 1.0), 1.0)
+    phi = estimate.parameters.vector.copy()
+    stretch = parameter_jacobian(phi) @ (factor[:, None] * people_jacobian(phi))
+    return replace(
+        estimate,
+        covariance=stretch @ estimate.covariance @ stretch.T,
+        cross_covariance=stretch @ estimate.cross_covariance,
     )
 
 
