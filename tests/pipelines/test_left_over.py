@@ -9,6 +9,7 @@ import pytest
 
 import steelyard as sy
 from steelyard.logs.recording import Recording, Stream
+from steelyard.pipelines.held_object import DRIFT_ALLOWED
 from steelyard.pipelines.left_over import left_over, of_another_fit
 from steelyard.simulate import hammer
 
@@ -34,7 +35,7 @@ def rms(left: np.ndarray) -> tuple[float, float]:
     return float(np.sqrt((left[:, 3:] ** 2).mean())), float(np.sqrt((left[:, :3] ** 2).mean()))
 
 
-@pytest.mark.parametrize("mistake", ["none", "sign", "gravity", "drift"])
+@pytest.mark.parametrize("mistake", ["none", "sign", "gravity", "drift", "small drift"])
 def test_residuals_are_those_of_the_answer(made: Recording, mistake: str) -> None:
     recording, options = made, sy.Options()
     if mistake == "sign":
@@ -44,13 +45,24 @@ def test_residuals_are_those_of_the_answer(made: Recording, mistake: str) -> Non
         recording, options = replace(made, gravity=turn.apply(made.gravity)), sy.Options(gravity="unknown")
     if mistake == "drift":
         recording = changed(made, "force", np.array([2.0, -1.5, 1.0]))
+    if mistake == "small drift":
+        recording = changed(made, "force", np.array([0.1, -0.08, 0.05]))
     estimate = sy.identify(recording, options)
+    assert any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) == ("drift" in mistake)
     assert ("bias-drift" in estimate.codes()) == (mistake == "drift")
     _, left = left_over(recording, estimate)
     force, torque = rms(left)
     assert force == pytest.approx(estimate.evidence.residual_force_N, rel=0.05)
     assert torque == pytest.approx(estimate.evidence.residual_torque_Nm, rel=0.05)
     assert not of_another_fit(estimate, left)
+
+
+def test_a_drift_too_small_to_be_named_does_not_move_the_answer(made: Recording) -> None:
+    right = sy.identify(made)
+    found = sy.identify(changed(made, "force", np.array([0.1, -0.08, 0.05])))
+    assert "bias-drift" not in found.codes()
+    assert np.all(np.abs(found.com - right.com) < 1.5 * right.std[1:4])
+    assert abs(found.mass - right.mass) < 1.5 * right.std[0]
 
 
 def test_a_tool_that_was_taken_away_is_asked_for(made: Recording) -> None:

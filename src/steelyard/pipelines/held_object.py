@@ -34,6 +34,7 @@ from steelyard.parts.parts import Parts
 from steelyard.sanity import (
     after,
     allow_softness,
+    drift_of,
     examine,
     examine_masses,
     examine_sensor,
@@ -54,8 +55,8 @@ Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
 LARGEST = 2.0
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
-# How the note begins that says which direction of gravity was used.
-GRAVITY_FOUND = "gravity was estimated"
+# How the notes begin that say which direction of gravity was used, and that a drift was found.
+GRAVITY_FOUND, DRIFT_ALLOWED = "gravity was estimated", "the fit was repeated with a bias that drifts"
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
 # Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
@@ -114,11 +115,12 @@ def identify(
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
     with _beside(before):
         estimate = load.estimate()
-    late = after(log, estimate, aligned, recording)
-    if load.bias.free and not load.bias.drift and any(f.code == "bias-drift" for f in late):
+    drift = drift_of(log)
+    late = after(log, estimate, aligned, recording, drift)
+    if load.bias.free and not load.bias.drift and drift and drift.sure and "base-tilted" not in {f.code for f in late}:
         load = replace(load, bias=replace(load.bias, drift=True))
-        estimate = load.estimate().noted("the fit was repeated with a bias that drifts")
-        late = after(log, estimate, aligned, recording)
+        estimate = load.estimate().noted(f"{DRIFT_ALLOWED}: {drift.words}")
+        late = after(log, estimate, aligned, recording, drift)
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)

@@ -10,7 +10,7 @@ from steelyard.identify.problem import scaled_time
 from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
-from steelyard.pipelines.held_object import GRAVITY_FOUND, levelled_as
+from steelyard.pipelines.held_object import DRIFT_ALLOWED, GRAVITY_FOUND, levelled_as
 from steelyard.sanity import examine
 
 # Residuals this many times those of the answer are not what it was made from.
@@ -32,7 +32,7 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
     log = aligned.log
     vector = estimate.parameters.vector + (0.0 if tool is None else tool.parameters.vector)
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
-    if "bias-drift" in estimate.codes() and log.time is not None:
+    if any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) and log.time is not None:
         left = left - _line(scaled_time(log), left)
     return log, np.where(log.dead, 0.0, left)
 

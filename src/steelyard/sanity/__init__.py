@@ -1,6 +1,6 @@
 """Sanity: is the log what its description says, and does the answer look like one?"""
 
-from steelyard.sanity.after import after
+from steelyard.sanity.after import after, drift_of
 from steelyard.sanity.before import examine
 from steelyard.sanity.contact import untouched
 from steelyard.sanity.density import impossible_density
@@ -14,6 +14,7 @@ __all__ = [
     "after",
     "allow_softness",
     "dead_channels",
+    "drift_of",
     "examine",
     "examine_masses",
     "examine_sensor",
