@@ -176,7 +176,8 @@ def test_missing_data_file_names_the_searched_folders(tmp_path: Path, monkeypatc
     )
 
 
-def test_missing_tool_names_the_line_that_asks_for_it(tmp_path: Path) -> None:
+def test_missing_tool_names_the_line_that_asks_for_it(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delenv("STEELYARD_DATA", raising=False)
     path = write(tmp_path, swap(TOML, "[log]", '[log]\ntool = "grip.json"'))
     assert message(path, BadFile).startswith('log.toml, [log], tool: "grip.json" was not found. Searched: DIR')
 
