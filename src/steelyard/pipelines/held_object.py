@@ -119,7 +119,7 @@ def identify(
     late = after(log, estimate, aligned, recording, drift)
     if load.bias.free and not load.bias.drift and drift and drift.sure and "base-tilted" not in {f.code for f in late}:
         load = replace(load, bias=replace(load.bias, drift=True))
-        estimate = load.estimate().noted(f"{DRIFT_ALLOWED}: {drift.words}")
+        estimate = load.estimate().noted(f"{DRIFT_ALLOWED} (most surely {drift.surest_words})")
         late = after(log, estimate, aligned, recording, drift)
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)

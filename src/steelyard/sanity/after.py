@@ -103,6 +103,13 @@ class Drift:
         return f"by {sizes[1]:.2g} ± {errors[1]:.1g} N and {sizes[0]:.2g} ± {errors[0]:.1g} N m over {self.span:.0f} s"
 
     @property
+    def surest_words(self) -> str:
+        """How much the channel drifts that is surest to."""
+        i = int(np.argmax(np.abs(self.growth) / np.maximum(self.std, 1e-300)))
+        kind, unit = ("torque", "N m") if i < 3 else ("force", "N")
+        return f"{kind} along {'xyz'[i % 3]} by {self.growth[i]:.2g} ± {self.std[i]:.1g} {unit} over {self.span:.0f} s"
+
+    @property
     def _sizes(self) -> tuple[Array, Array]:
         parts = (self.growth, self.std)
         sizes, errors = (np.array([np.linalg.norm(v[:3]), np.linalg.norm(v[3:])]) for v in parts)
