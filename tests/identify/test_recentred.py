@@ -118,6 +118,31 @@ def test_a_scan_leaves_the_centre_to_the_log_rows_at_rest_too(motion: str) -> No
     assert np.sqrt(np.mean(np.square(score))) < 1.5
 
 
+def test_a_log_that_knows_the_inertia_better_than_the_scan_takes_it_over() -> None:
+    truth, drawn = (HAMMER.whole(HAMMER.volume * 2000.0 * np.array([1.0, by, 1.0])) for by in (1.0, 1.1))
+    scan = Parts(np.arange(1), drawn.vector[None] / 2000.0)
+    log = handling_log(truth, "paper", noise=(0.01, 0.001, 0.005, 0.0002), seed=0)
+    found = PartMasses(scan, bias="none", shape_error=SCANNED).identify(log)
+    wrong = np.linalg.norm(drawn.inertia_com * float(truth.mass / drawn.mass) - truth.inertia_com)
+    assert np.linalg.norm(found.parameters.inertia_com - truth.inertia_com) < 0.2 * wrong
+    upper = np.triu_indices(3)
+    assert (np.abs((found.parameters.inertia_com - truth.inertia_com)[upper]) < 3 * found.std[4:]).all()
+
+
+@pytest.mark.parametrize("noise", ["none", "low"])
+def test_masses_of_a_scans_parts_bear_their_borders(noise: str) -> None:
+    """The head is drawn a millimetre off. A log without noise is no harder than one with it."""
+    truth = HAMMER.volume * DENSITIES
+    log = handling_log(HAMMER.whole(truth), "paper", noise=noise, seed=0)
+    there = replace(HAMMER, label=np.arange(1), moments=HAMMER.moments[1:2])
+    head = there.in_frame(Pose(Rotation.identity(), np.array([0, 0, -1e-3]))).moments
+    drawn = replace(HAMMER, moments=np.concatenate([HAMMER.moments[:1], head, HAMMER.moments[2:]]))
+    found = PartMasses(drawn, bias="none", shape_error=SCANNED).identify(log)
+    mass, std = np.array([(part.mass, part.std) for part in found.parts]).T
+    assert (np.abs(mass - truth) < 3 * std).all()
+    assert std.max() < 0.1 * truth.sum()
+
+
 def test_a_scan_far_from_what_the_log_sees_is_trusted_less() -> None:
     truth, drawn = (HAMMER.whole(HAMMER.volume * 2000.0 * np.array([1.0, by, 1.0])) for by in (1.0, 1.5))
     log = handling_log(truth, "static", noise="low", seed=0)

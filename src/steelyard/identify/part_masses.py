@@ -36,7 +36,7 @@ from steelyard.identify.part_models import (
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.placement import misplaced
 from steelyard.identify.problem import Problem
-from steelyard.identify.recentred import apart, recentred
+from steelyard.identify.recentred import apart, followed, recentred
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
@@ -262,8 +262,8 @@ class PartMasses:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
 
         phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with a measured shape (e = 0): letting a
-        log move it lost more in the thin axes than it won in the others. Mass and centre of a scan, or of an object
-        whose grasp is uncertain, move as far as the log says.
+        log move it lost more in the thin axes than it won in the others. A scan, and mass and centre of an object whose
+        grasp is uncertain, move as far as the log says.
         """
         B = self.parts.per_mass
         body = self.parts.whole(masses.mean)
@@ -274,7 +274,8 @@ class PartMasses:
         if self._doubtful:
             follows = spread @ _blur(data, drawn)
         if self._movable:
-            placed = recentred(data, body, error)
+            by_grasp = bool(len(moved)) or not self._doubtful
+            placed = (recentred if by_grasp else followed)(data, body, error)
             body, error, follows = placed.body, placed.error, placed.following(data, follows)
         if self._doubtful:
             spread = placed.left_of(data, spread)

@@ -1,8 +1,9 @@
-"""Mass and centre of mass where shape, grasp and log together see them; the shape's inertia about the centre stays.
+"""A body where shape, grasp and log together see it: of a measured shape mass and centre of mass, of a scan all of it.
 
 Shape and grasp put them at x up to an error with covariance G, the log alone sees them at x_log up to P, whatever the
 inertia, as long as it is of the size of the shape's: they belong at x + G (G + P)^-1 (x_log - x), never beyond either.
-Letting a log move the inertia too loses more in thin axes than it wins in the others.
+Letting a log move the inertia of a measured mesh loses more in thin axes than it wins in the others. A scan errs by a
+share of each second moment, so that its thin axes hold, and a log that knows the inertia better takes it over.
 """
 
 from __future__ import annotations
@@ -13,6 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.effective import Effective
+from steelyard.identify.nearest_body import nearest_body
 from steelyard.identify.people import half_trace_com, parameter_jacobian, people_jacobian
 from steelyard.inertia import InertialParameters
 
@@ -59,6 +61,14 @@ def recentred(data: Effective, body: InertialParameters, error: Array) -> Recent
     left = error - move @ shared - shared.T @ move.T + move @ own @ slope.T
     found = InertialParameters.from_com(float(body.mass + change[0]), body.com + change[1:], body.inertia_com)
     return Recentred(found, 0.5 * (left + left.T), slope @ step)
+
+
+def followed(data: Effective, body: InertialParameters, error: Array) -> Recentred:
+    """Return the body (up to `error` (10, 10) by its shape) with all ten parameters where the log sees them, too."""
+    gain = np.asarray(np.linalg.solve(np.eye(10) + error @ data.information, error))
+    left = error - gain @ data.information @ error
+    moved = body.vector + gain @ (data.pull - data.information @ body.vector)
+    return Recentred(nearest_body(body.vector, moved), 0.5 * (left + left.T), gain)
 
 
 def apart(data: Effective, body: InertialParameters, error: Array) -> float:

@@ -14,6 +14,9 @@ from steelyard.spatial import Pose, Rotation
 
 # How far the centre of mass of a scan errs along an axis, over the stretch of its radius of gyration.
 LEAN = 0.2
+# Masses of a scan's parts need not sum to the whole closer than this share: a sum that is known a thousand times better
+# than its parts makes a valley too narrow and bent for Newton's method. The whole then goes where the log sees it.
+LOOSE = 1e-3
 
 
 @dataclass(frozen=True)
@@ -21,9 +24,9 @@ class ShapeError:
     """Standard deviations of what is taken as known.
 
     com_m           of the centre of mass that the shape gives, per axis [m]
-    inertia_share   of every entry of the inertia alike, as a share of half its trace
-    stretch         of the second moments, each as a share of itself; a shape that errs so leans, too, by a share of
-                    that along each axis, in radii of gyration
+    inertia_share   of every entry of the inertia alike, as a share of half its trace: that of a measured mesh
+    stretch         of the second moments, each as a share of itself: that of a scan, in place of the former. Such a
+                    shape leans, too, by a share of that along each axis, in radii of gyration
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     """
 
@@ -55,14 +58,16 @@ class ShapeError:
         return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
 
     def covariance(self, body: InertialParameters) -> Array:
-        """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
+        """Return the covariance (10, 10) that a wrong shape gives the parameters of a body."""
         phi, inner = body.vector.copy(), np.zeros((10, 10))
         inner[range(1, 4), range(1, 4)] = self.com_m**2
-        inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
         if self.stretch:
-            inner[1:4, 1:4] += (LEAN * self.stretch) ** 2 * _second_moments(body.inertia_com) / body.mass
             slope = _stretched(body.inertia_com)
-            inner[4:, 4:] += self.stretch**2 * slope @ slope.T
+            inner[0, 0] = (LOOSE * float(body.mass)) ** 2
+            inner[1:4, 1:4] += (LEAN * self.stretch) ** 2 * _second_moments(body.inertia_com) / body.mass
+            inner[4:, 4:] = self.stretch**2 * slope @ slope.T
+        else:
+            inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
         back = parameter_jacobian(phi)
         return np.asarray(back @ inner @ back.T)
 
