@@ -22,6 +22,7 @@ from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.linear import reweighted
+from steelyard.identify.misdrawn import DRAWN, misdrawn
 from steelyard.identify.nearest_body import nearest_body
 from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import (
@@ -35,15 +36,15 @@ from steelyard.identify.part_models import (
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.placement import misplaced
 from steelyard.identify.problem import Problem
-from steelyard.identify.recentred import recentred
-from steelyard.identify.shape_error import DRAWN, MEASURED, ShapeError
+from steelyard.identify.recentred import apart, followed, recentred
+from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose
 
 # The weights depend on the answer, and settle in so many rounds.
 RENEWALS = 2
@@ -147,6 +148,24 @@ class PartMasses:
             mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
             body = _with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
+        times = self._apart(data, body)
+        if times <= 1:
+            return self._answered(problem, data, body)
+        found = replace(self, shape_error=self.shape_error.scaled(times))._answered(problem, data, body)
+        words = f"shape and log see the centre of mass {times:.1f} standard deviations apart"
+        return found.noted(f"{words}: the shape was trusted as much less than it says")
+
+    def _apart(self, data: Effective, body: InertialParameters) -> float:
+        """Return by how much a scan is worse than it says, by where the log sees the centre of mass; 1 = it is not.
+
+        What is wrong with the centre is wrong with the inertia. Source: scale factor of the Particle Data Group.
+        """
+        if not self._doubtful:
+            return 1.0
+        body = self.parts.whole(self._masses(data, body, self.parts).mean)
+        return max(1.0, apart(data, body, self.shape_error.covariance(body)))
+
+    def _answered(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
         masses = self._masses(data, body, self.parts)
         body = _with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
@@ -175,11 +194,12 @@ class PartMasses:
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
         body = InertialParameters(found.vector)
-        error, follows = self.shape_error.with_grasp(body), found.covariance
+        error, spread, follows = self.shape_error.with_grasp(body), found.covariance, found.covariance
         if self._movable:
             placed = recentred(data, body, error)
             body, error, follows = placed.body, placed.error, placed.following(data, follows)
-        return self._built(problem, data, found.masses, body, found.covariance + error, follows)
+            spread = placed.left_of(data, spread) if self._doubtful else spread
+        return self._built(problem, data, found.masses, body, spread + error, follows)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
@@ -199,7 +219,7 @@ class PartMasses:
         spread = B @ masses.covariance @ B.T
         moved = body.vector + error @ seen.pull - gain @ body.vector
         if self._doubtful:
-            masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
+            masses = misdrawn(data, self.parts, masses, self.shape_error)
         covariance = rest @ spread @ rest.T + error - gain @ error
         blur = _blur(data, error)
         masses_follow = spread @ blur
@@ -231,7 +251,7 @@ class PartMasses:
     @property
     def _doubtful(self) -> bool:
         """Whether the shape may be worse than a measured mesh."""
-        return self.shape_error.com_m > MEASURED.com_m
+        return self.shape_error.com_m > MEASURED.com_m or self.shape_error.stretch > 0
 
     @property
     def _movable(self) -> bool:
@@ -242,8 +262,8 @@ class PartMasses:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
 
         phi = B m + e with e ~ N(0, G) the error of the shape. The answer stays with a measured shape (e = 0): letting a
-        log move it lost more in the thin axes than it won in the others. Mass and centre of a scan, or of an object
-        whose grasp is uncertain, move as far as the log says.
+        log move it lost more in the thin axes than it won in the others. A scan, and mass and centre of an object whose
+        grasp is uncertain, move as far as the log says.
         """
         B = self.parts.per_mass
         body = self.parts.whole(masses.mean)
@@ -254,10 +274,12 @@ class PartMasses:
         if self._doubtful:
             follows = spread @ _blur(data, drawn)
         if self._movable:
-            placed = recentred(data, body, error)
+            by_grasp = bool(len(moved)) or not self._doubtful
+            placed = (recentred if by_grasp else followed)(data, body, error)
             body, error, follows = placed.body, placed.error, placed.following(data, follows)
         if self._doubtful:
-            masses = replace(masses, covariance=masses.covariance + self._misdrawn(data, masses))
+            spread = placed.left_of(data, spread)
+            masses = misdrawn(data, self.parts, masses, self.shape_error)
         return self._built(problem, data, masses, body, spread + error, follows)
 
     def _off(self, data: Effective, body: InertialParameters) -> bool:
@@ -265,18 +287,6 @@ class PartMasses:
         error = replace(self.shape_error, com_m=max(self.shape_error.com_m, DRAWN))
         seen = data.blurred(error.with_grasp(body))
         return seen.misfit(body.vector) > misfit_limit(seen, len(self.parts))
-
-    def _misdrawn(self, data: Effective, masses: Masses) -> Array:
-        """Return the covariance (P, P) of part masses that come of borders drawn a little off by a scan.
-
-        To first order: a part k that is shifted by d misses m_k dB_k of phi, and C B^T F m_k dB_k of it goes to the
-        masses. The whole does not feel it: the log alone holds that.
-        """
-        body = self.parts.whole(masses.mean)
-        gain = masses.covariance @ self.parts.per_mass.T @ data.blurred(self.shape_error.covariance(body)).information
-        shifted = (self.parts.in_frame(Pose(Rotation.identity(), DRAWN * axis)).per_mass for axis in np.eye(3))
-        steps = [gain @ ((moved - self.parts.per_mass) * masses.mean) for moved in shifted]
-        return np.asarray(sum(step @ step.T for step in steps))
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,

@@ -12,14 +12,21 @@ from steelyard.identify.people import half_trace_com, parameter_jacobian
 from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose, Rotation
 
+# How far the centre of mass of a scan errs along an axis, over the stretch of its radius of gyration.
+LEAN = 0.2
+# Masses of a scan's parts need not sum to the whole closer than this share: a sum that is known a thousand times better
+# than its parts makes a valley too narrow and bent for Newton's method. The whole then goes where the log sees it.
+LOOSE = 1e-3
+
 
 @dataclass(frozen=True)
 class ShapeError:
     """Standard deviations of what is taken as known.
 
     com_m           of the centre of mass that the shape gives, per axis [m]
-    inertia_share   of every entry of the inertia alike, as a share of half its trace
-    stretch         of the second moments, each as a share of itself
+    inertia_share   of every entry of the inertia alike, as a share of half its trace: that of a measured mesh
+    stretch         of the second moments, each as a share of itself: that of a scan, in place of the former. Such a
+                    shape leans, too, by a share of that along each axis, in radii of gyration
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     """
 
@@ -51,13 +58,16 @@ class ShapeError:
         return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
 
     def covariance(self, body: InertialParameters) -> Array:
-        """Return the covariance (10, 10) that a wrong shape gives the parameters of a body, its mass known."""
+        """Return the covariance (10, 10) that a wrong shape gives the parameters of a body."""
         phi, inner = body.vector.copy(), np.zeros((10, 10))
         inner[range(1, 4), range(1, 4)] = self.com_m**2
-        inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
         if self.stretch:
             slope = _stretched(body.inertia_com)
-            inner[4:, 4:] += self.stretch**2 * slope @ slope.T
+            inner[0, 0] = (LOOSE * float(body.mass)) ** 2
+            inner[1:4, 1:4] += (LEAN * self.stretch) ** 2 * _second_moments(body.inertia_com) / body.mass
+            inner[4:, 4:] = self.stretch**2 * slope @ slope.T
+        else:
+            inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
         back = parameter_jacobian(phi)
         return np.asarray(back @ inner @ back.T)
 
@@ -70,13 +80,18 @@ class ShapeError:
         return out
 
 
+def _second_moments(inertia: Array) -> Array:
+    """Return the second moments (3, 3) of a body with this inertia, about the same point."""
+    return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+
+
 def _stretched(inertia: Array) -> Array:
     """Return what six independent unit strains do to the inertia about the centre of mass (6, 6).
 
     The second moments S = 1/2 tr(I) 1 - I become S + S^1/2 E S^1/2. Of the symmetric E the entries on the diagonal have
     variance 1 and those beside it 1/2, so that no axes are preferred; each entry errs by a share of what it comes from.
     """
-    moments, axes = np.linalg.eigh(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+    moments, axes = np.linalg.eigh(_second_moments(inertia))
     root = (axes * np.sqrt(np.maximum(moments, 0))) @ axes.T
     rows, columns = np.triu_indices(3)
     out = np.empty((6, 6))
@@ -91,5 +106,3 @@ def _stretched(inertia: Array) -> Array:
 EXACT = ShapeError()
 # What a mesh of a real tool is wrong by even when it is right.
 MEASURED = ShapeError(com_m=1e-4, inertia_share=3e-3)
-# A scan puts the centroids of its parts off by so much, one standard deviation per axis [m].
-DRAWN = 1e-3
