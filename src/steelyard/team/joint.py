@@ -49,6 +49,7 @@ from steelyard.team.team_findings import (
     vertical,
 )
 from steelyard.team.twist_team import TwistTeam
+from steelyard.team.unexplained import unexplained
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
 LEAST_CHI2 = -0.1
@@ -57,6 +58,8 @@ LEAST_CHI2 = -0.1
 COMPARABLE = 0.1
 # The mass is open where so much of it lies along what is not shown: mostly it is all of it or next to nothing.
 UNWEIGHED = 0.5
+# Findings that say already why forces do not fit.
+TOLD = {"wrench-unexplained", "payload-not-rigid"}
 
 
 @dataclass(frozen=True)
@@ -116,6 +119,7 @@ class JointTeam:
         team = _without_wrists(assembled(log, grasps, spread, payload, D, _added(late, begun)), self.wrists)
         found += [
             *read,
+            *(() if any(one.code in TOLD for one in (*found, *read)) else unexplained(payload, D, log.names)),
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
             *bad_robots(log.names, noise),

@@ -33,6 +33,8 @@ RISES = 2.0
 UNFIT = 0.02
 # Lengths that a turn leaves as they are, to within this factor.
 LIKE_A_TURN = 1.25
+# A map is a factor where no entry is off by more than this share of it.
+LIKE_A_FACTOR = 0.15
 # Share of the variance of forces that is rounding.
 ROUNDING = 1e-18
 # What each reading changes (R, 9).
@@ -124,16 +126,13 @@ def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequ
     """Return the finding of a robot whose forces fit turned by some angle, though with no reading."""
     if both[0].misfit < UNFIT:
         return ()
-    any_map = [one.any_map() for one in both]
-    fallen = np.prod([left / max(one.variance, 1e-300) for one, (left, _) in zip(both, any_map, strict=True)], axis=0)
-    robot, *others = (int(i) for i in np.argsort(fallen))
-    X = any_map[0][1][robot]
-    fits = fallen[robot] < FALLS**-2 and any_map[0][0][robot] < MISSES * float(both[0].size.sum())
+    found = _mapped(both)
+    if found is None or _unlike(groups, D, *found):
+        return ()
+    robot, X = found
     # A map that is no turn may stand for a large bias, or for gravity that is wrong.
     u, sizes, v = np.linalg.svd(X)
-    turns = np.linalg.det(X) > 0 and sizes[-1] > 1 / LIKE_A_TURN and sizes[0] < LIKE_A_TURN
-    clear = fits and turns and fallen[others[0]] > CLEAR * fallen[robot]
-    if not clear or _unlike(groups, D, robot, X):
+    if not (np.linalg.det(X) > 0 and sizes[-1] > 1 / LIKE_A_TURN and sizes[0] < LIKE_A_TURN):
         return ()
     angle = np.degrees(np.arccos(np.clip((np.trace(u @ v) - 1) / 2, -1, 1)))
     text = (
@@ -142,6 +141,26 @@ def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequ
     )
     remedy = f"Check mount and frame of the wrench of '{names[robot]}', and units, order and signs of its columns."
     return (Finding("wrench-unexplained", text, remedy),)
+
+
+def likely_factor(groups: Sequence[Group], D: Array) -> tuple[int, float] | None:
+    """Return the one robot whose forces fit times a factor, and that factor; None where none does clearly."""
+    found = _mapped((_left(_scatter(groups), D), _left(_without_bias(groups), D)))
+    if found is None:
+        return None
+    robot, X = found
+    factor = float(np.trace(X)) / 3
+    return (robot, factor) if np.abs(X - factor * np.eye(3)).max() < LIKE_A_FACTOR * abs(factor) else None
+
+
+def _mapped(both: Sequence[_Left]) -> tuple[int, Array] | None:
+    """Return the robot whose forces fit by some linear map (3, 3), and that map; None where none does clearly."""
+    any_map = [one.any_map() for one in both]
+    fallen = np.prod([left / max(one.variance, 1e-300) for one, (left, _) in zip(both, any_map, strict=True)], axis=0)
+    robot, *others = (int(i) for i in np.argsort(fallen))
+    fits = fallen[robot] < FALLS**-2 and any_map[0][0][robot] < MISSES * float(both[0].size.sum())
+    clear = fits and fallen[others[0]] > CLEAR * fallen[robot]
+    return (robot, any_map[0][1][robot]) if clear else None
 
 
 def _scatter(groups: Sequence[Group]) -> Array:

@@ -1,0 +1,86 @@
+"""What robots push that no rigid payload needs: far more than their sensors' noise, though the fit took it for noise.
+
+Noise is judged band by band from what the fit leaves, so that a dead sensor, a wrong gain or wrong axes make wide bars
+and no misfit. But noise of sensors is much the same at all frequencies, and what a wrong force leaves moves as slowly
+as the payload: the highest band tells the one from the other.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.team.misread_forces import likely_factor
+from steelyard.team.payload_fit import PayloadFit
+from steelyard.team.payload_model import Group
+
+# What is left counts from this share of the payload's weight, and from so many times the noise of the highest band;
+# noise below 2 Hz has less than three times it. Less is enough where one robot explains it.
+SHARE, COLOURED, OF_ONE = 0.03, 4.5, 3.0
+# A robot carries nothing where its forces are hardly slower than noise, while those of another are.
+FLAT, SLOW = 1.5, 5.0
+# Rows of a band that show its noise.
+FEWEST = 20
+GRAVITY = 9.81
+
+
+def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
+    """Yield wrench-unexplained where forces at rest or in motion leave so much; names whoever explains it.
+
+    D  (6, 6 N) sums the pushes at B
+    """
+    weight = abs(float(fit.parameters[0])) * GRAVITY
+    left = [_left(group) for group in fit.groups]
+    worst = int(np.argmax([rms for rms, _ in left]))
+    rms, coloured = left[worst]
+    if rms < SHARE * weight or coloured < OF_ONE:
+        return
+    group = fit.groups[worst]
+    silent = [name for name, flat in zip(names, _flat(group, len(names)), strict=True) if flat]
+    factor = None if silent else likely_factor(fit.groups, D)
+    suspects = silent or ([] if factor is None else [names[factor[0]]])
+    if not suspects and coloured < COLOURED:
+        return
+    why = ""
+    if silent:
+        why = f"What {_listed(silent)} measures is noise alone, as if nothing were carried there. "
+    elif factor is not None:
+        why = f"It falls where what {_listed(suspects)} says is taken {factor[1]:.2g} times. "
+    text = (
+        f"What the robots push {'at rest' if group.parts[0].still else 'in motion'} leaves {rms:.2g} N rms that no "
+        f"rigid payload explains, {100 * rms / weight:.0f} % of its weight, and too slow for noise of the sensors. "
+        f"{why}The answer is not to be trusted."
+    )
+    where = f"the force sensor of {_listed(suspects)}" if suspects else "each robot's force sensor"
+    remedy = f"Check {where}: does it live, and are unit, frame, order and signs of its columns right?"
+    yield Finding("wrench-unexplained", text, remedy)
+
+
+def _left(group: Group) -> tuple[float, float]:
+    """Return the rms [N] of the force that is left per row, and that over what the highest band has."""
+    rows = np.sum([part.rows for part in group.parts], axis=0)
+    power = group.wrench_noise[:, 3:].sum(1)
+    told = np.flatnonzero(rows >= FEWEST)
+    if len(told) < 2:
+        return 0.0, 1.0
+    rms = float(np.sqrt((power * rows).sum() / rows.sum()))
+    return rms, rms / float(np.sqrt(power[told[-1]]))
+
+
+def _flat(group: Group, count: int) -> Array:
+    """Return of which robots (count,) the forces are noise alone, while those of others are not."""
+    rows = np.sum([part.rows for part in group.parts], axis=0)
+    told = np.flatnonzero(rows >= FEWEST)
+    squares = np.sum([np.einsum("kii->ki", part.scatter[:, 12:-1, 12:-1]) for part in group.parts], axis=0)
+    forces = squares.reshape(len(rows), count, 6)[..., 3:].sum(2)
+    # The lowest band holds the bias.
+    power = forces[told] / rows[told, None]
+    colour = np.sqrt(power[:-1].max(0) / np.maximum(power[-1], 1e-300))
+    return np.asarray((colour < FLAT) & (colour.max() > SLOW))
+
+
+def _listed(names: Sequence[str]) -> str:
+    return " and ".join(f"'{name}'" for name in names)

@@ -1,0 +1,74 @@
+"""Forces that no rigid payload explains and no reading puts right: named, and noise of sensors is not."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_track import Track
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.team.joint import JointTeam
+
+NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.5)
+
+
+def scene(noise: TeamNoise = NOISE, robots: int = 3) -> TeamScene:
+    return TeamScene(noise, robots, kinds=("still", "motion"), sensing="poses", motion_samples=2000)
+
+
+def changed(log: TeamLog, name: str, change: Callable[[Track], Array]) -> TeamLog:
+    """Return the log with other forces of one robot."""
+    made = []
+    for recording in log.recordings:
+        track = recording.tracks[name]
+        track = replace(track, channels={**track.channels, "force": change(track)})
+        made.append(replace(recording, tracks={**recording.tracks, name: track}))
+    return log.with_recordings(*made)
+
+
+def noise_alone(track: Track) -> Array:
+    return np.random.default_rng(0).normal(0, 0.3, track.channels["force"].shape)
+
+
+def in_base_axes(track: Track) -> Array:
+    return track.rotation.apply(track.channels["force"])
+
+
+def half(track: Track) -> Array:
+    return 0.5 * track.channels["force"]
+
+
+def named(log: TeamLog) -> list[Finding]:
+    return [one for one in JointTeam().identify(log).findings if one.code == "wrench-unexplained"]
+
+
+@pytest.mark.parametrize("robots", [3, 4])
+@pytest.mark.parametrize(
+    ("change", "words"),
+    [(noise_alone, "is noise alone"), (half, "is taken 2 times"), (in_base_axes, "that no rigid payload explains")],
+)
+def test_a_wrong_force_is_named(change: Callable[[Track], Array], words: str, robots: int) -> None:
+    log = simulate_team(scene(robots=robots), 3).log
+    name = log.names[1]
+    (finding,) = named(changed(log, name, change))
+    assert words in finding.message
+    assert f"'{name}'" in finding.message or change is in_base_axes
+
+
+@pytest.mark.parametrize("seed", range(3))
+@pytest.mark.parametrize("noise", ["white", "2hz", "loud", "biased"])
+def test_noise_of_sensors_is_not(noise: str, seed: int) -> None:
+    kinds = {
+        "white": NOISE,
+        "2hz": replace(CASES["C"], force_spectrum="2hz"),
+        "loud": replace(NOISE, force_white_N=5.0),
+        "biased": CASES["D"],
+    }
+    assert named(simulate_team(scene(kinds[noise]), seed).log) == []
