@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 from steelyard.errors import BadValue
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 _IDENTITY = np.eye(3)
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.conditioning import noise_std
+from steelyard.logs.runs import runs
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 Numbers = np.ndarray[Any, np.dtype[np.int64]]
@@ -75,10 +76,7 @@ def pose_numbers(time: Array, still: Mask, blocks: int = 12, shortest_s: float =
 
 def _long_enough(time: Array, mask: Mask) -> Mask:
     """Return the mask without stretches shorter than 0.25 s."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2] - 1
-    long = time[ends] - time[starts] >= _SHORTEST_S * 0.95 if len(starts) else np.zeros(0, bool)
-    marks = np.zeros(len(mask) + 1, np.int64)
-    np.add.at(marks, starts[long], 1)
-    np.add.at(marks, ends[long] + 1, -1)
-    return np.asarray(np.cumsum(marks[:-1]) > 0)
+    starts, stops = runs(mask).T
+    kept = np.zeros(len(mask), np.bool_)
+    kept[mask] = np.repeat(time[stops - 1] - time[starts] >= _SHORTEST_S * 0.95, stops - starts)
+    return kept

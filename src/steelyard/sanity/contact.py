@@ -13,6 +13,7 @@ from steelyard.findings import Finding
 from steelyard.identify.regressor import design
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
+from steelyard.logs.runs import runs
 from steelyard.sanity import consensus
 from steelyard.sanity.consensus import LEVER, Consensus, Integers, Mask, Slices
 from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, SHORTEST, LoadChange, find_change
@@ -149,19 +150,13 @@ def _memory(found: Consensus) -> float:
     return 1 + 2 * float((correlation[: quiet[0] if len(quiet) else None] ** 2).sum())
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first and last + 1 of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
 def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
     """Return the stretches left out that no one body, bias and slow drift explains together with what was kept."""
     slices = _with_drift(slices, found.late)
     H, g, c = consensus.sums(slices, found.tolerance)
     base = _least(slices, H, g, c, found.kept)
     out = []
-    for a, b in _runs(~found.kept):
+    for a, b in runs(~found.kept).tolist():
         both = found.kept.copy()
         both[a:b] = True
         gain = max(_least(slices, H, g, c, both) - base, 0.0)
@@ -224,13 +219,13 @@ def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Con
     out = np.zeros(len(slices.y), np.bool_)
     for t in touches:
         out[t.first : t.last] = True
-    if len(touches) < 2 or len(_runs(found.kept)) > 1:
+    if len(touches) < 2 or len(runs(found.kept)) > 1:
         return found
     other = consensus.refine(slices, consensus.fit(slices, out, found.tolerance), out)
     if other is None or (other.kept & out).sum() < ALIKE * out.sum():
         return found
     looser = float(np.log(other.tolerance / found.tolerance).mean())
-    return other if looser < LOOSER and len(_runs(~other.kept)) == 1 else found
+    return other if looser < LOOSER and len(runs(~other.kept)) == 1 else found
 
 
 def _guarded(touches: Sequence[Touch], count: int) -> Mask:
@@ -245,7 +240,7 @@ def _guarded(touches: Sequence[Touch], count: int) -> Mask:
 def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: Mask) -> Finding:
     """Return the finding with the times, their share and the size of the extra wrench."""
     half = float(np.median(np.diff(slices.time))) / 2
-    spans = [(slices.time[a] - half, slices.time[b - 1] + half) for a, b in _runs(~kept)]
+    spans = [(slices.time[a] - half, slices.time[b - 1] + half) for a, b in runs(~kept)]
     named = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in spans[:5]) + (
         f" and {len(spans) - 5} more" if len(spans) > 5 else ""
     )

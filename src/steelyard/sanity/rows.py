@@ -14,6 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.runs import runs
 from steelyard.spatial import cross_matrix
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -135,15 +136,14 @@ def _hung_rows(stream: Stream) -> Mask:
     same = (values[1:] == values[:-1]).all(1)
     length = _run_length(same)
     long = length >= _rows_needed(stream.time)
-    starts = np.flatnonzero(np.diff(long.astype(np.int8), prepend=0) == 1)
-    ends = np.flatnonzero(np.diff(long.astype(np.int8), append=0) == -1)
-    if not 1 <= len(starts) <= 3 or same[~long].mean() > 0.05:
+    held = runs(long)
+    if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
         return none
     steps = np.abs(np.diff(values, axis=0))
     typical = np.maximum(np.median(steps[~long], 0), 1e-300)
-    for start, end in zip(starts, ends, strict=True):
-        if end + 1 < len(steps) and (steps[end + 1] > 5 * typical).any():
-            none[start : end + 2] = True
+    for start, stop in held:
+        if stop < len(steps) and (steps[stop] > 5 * typical).any():
+            none[start : stop + 1] = True
     return none
 
 
@@ -198,19 +198,16 @@ def _more_than_chance(equal: Mask, again: Mask, counted: Mask) -> bool:
 
 def _run_length(mask: Mask) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return for each true entry the length of its run of true entries, zero elsewhere."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    out = np.zeros(len(mask) + 1, np.int64)
-    np.add.at(out, starts, ends - starts)
-    np.add.at(out, ends, starts - ends)
-    return np.asarray(np.cumsum(out)[:-1])
+    lengths = np.ptp(runs(mask), axis=1)
+    out = np.zeros(len(mask), np.int64)
+    out[mask] = np.repeat(lengths, lengths)
+    return out
 
 
 def _longest(repeat: Mask) -> int:
     """Return how long a run of repeats may be: more where a fast logger holds every sample for many rows."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], repeat.astype(np.int8), [0]])))
-    runs = edges[1::2] - edges[::2]
-    return max(LONGEST_RUN, 2 * int(np.median(runs))) if len(runs) > 20 else LONGEST_RUN
+    lengths = np.ptp(runs(repeat), axis=1)
+    return max(LONGEST_RUN, 2 * int(np.median(lengths))) if len(lengths) > 20 else LONGEST_RUN
 
 
 def _many(stamped: Mask) -> bool:
