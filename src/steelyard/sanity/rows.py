@@ -153,11 +153,12 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     for quantity in (q for q in _MEASURED if q in stream.channels):
         values = stream.channels[quantity]
         noisy = _noise_shares(values) > NOISE_SHARE
-        for axis in np.flatnonzero(noisy):
+        for axis in np.flatnonzero(noisy).tolist():
             for extreme in (values[:, axis].min(), values[:, axis].max()):
                 rows = _clipped_rows(values[:, axis], float(extreme))
                 if rows.any():
-                    found.append(_saturated(stream, quantity, int(axis), float(extreme), rows))
+                    count = int(rows.sum())
+                    found.append(_saturated(stream, quantity, axis, extreme, count, "these were left out"))
                     clipped |= rows
     if clipped.mean() > 0.7:
         clipped[:] = False
@@ -269,13 +270,12 @@ def _stuck(stream: Stream, name: str, what: str) -> Finding:
     return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}{left_out}.")
 
 
-def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: Mask) -> Finding:
-    message = (
-        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {int(rows.sum())} of "
-        f"{len(rows)} rows; "
-        "these were left out."
+def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: int, then: str) -> Finding:
+    return Finding.of(
+        "channel-saturated",
+        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {rows} of "
+        f"{len(stream)} rows; {then}.",
     )
-    return Finding.of("channel-saturated", message)
 
 
 def _kept(stream: Stream, rows: Mask) -> Stream:
@@ -322,7 +322,5 @@ def _clipped_table(stream: Stream) -> list[Finding]:
             values, counts = np.unique(column, return_counts=True)
             for end in (0, -1):
                 if len(values) > 4 and counts[end] >= 3 and np.delete(counts, end).max() == 1:
-                    at = column == values[end]
-                    found = _saturated(stream, quantity, axis, float(values[end]), at)
-                    out.append(replace(found, message=found.message.replace("these were left out", "check them")))
+                    out.append(_saturated(stream, quantity, axis, values[end], int(counts[end]), "check them"))
     return out
