@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.logs.conditioning import Signal, noise_std, sampling_rate, signal
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
-from steelyard.spatial import Rotation
+from steelyard.spatial import Rotation, lever_acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +54,7 @@ class Mounting:
         """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning
         of S."""
         turned = self.scale * self.rotation.apply(specific_force - self.bias)
-        return np.asarray(turned - lever(omega, alpha, self.position))
-
-
-def lever(omega: Array, alpha: Array, p: Array) -> Array:
-    """Return alpha x p + omega x (omega x p) (N, 3): what a point at p feels more than the origin."""
-    return np.cross(alpha, p) + np.cross(omega, np.cross(omega, p))
+        return np.asarray(turned - lever_acceleration(omega, alpha, self.position))
 
 
 def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:

@@ -20,6 +20,14 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
+def lever_acceleration(omega: Array, alpha: Array, p: Array) -> Array:
+    """Return alpha x p + omega x (omega x p): how much more a body's point at p (..., 3) accelerates than its origin.
+
+    omega [rad/s], alpha [rad/s^2] and p [m] are of broadcast shapes (..., 3) and in the same axes.
+    """
+    return np.asarray(cross(alpha, p) + cross(omega, cross(omega, p)))
+
+
 def cross_matrix(vector: ArrayLike) -> Array:
     """Return [v]x of shape (..., 3, 3), so that [v]x u = v x u."""
     v = np.asarray(vector, dtype=np.float64)
