@@ -52,6 +52,12 @@ class Stretch:
         """Rows per second [Hz]."""
         return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
 
+    def thinned(self, rows: int) -> Stretch:
+        """Return every k-th row, so that at least `rows` are left where there are as many."""
+        k = max(1, len(self) // rows)
+        names = ("time", "poses", "seen", "wrench", "felt", "carries")
+        return replace(self, **{name: getattr(self, name)[::k] for name in names})
+
 
 def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     """Return every recording with its clocks put right by `late` [s], seconds that each robot's stamps are late.
