@@ -37,6 +37,11 @@ def cross_matrix(vector: ArrayLike) -> Array:
     return out
 
 
+def axial_vector(matrix: Array) -> Array:
+    """Return the vector (3,) of which [v]x is M - M^T, of a matrix M (3, 3): of a rotation, 2 sin(angle) axis."""
+    return np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
+
+
 @dataclass(frozen=True, eq=False)
 class _SixVector:
     """Two three-vectors of one batch shape; only vectors of one kind add."""
