@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from steelyard.bench.asked import Progress
 from steelyard.evaluate import score
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
@@ -46,7 +47,7 @@ def run(
     seed: int = 0,
     count: int = VIEWS,
     pose_std: tuple[float, float] = (0.0, 0.0),
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Return rows per tool, how many volumes are within bounds, and the median time of each stage."""
     names = tuple(tools) or tuple(FAMILIES)
