@@ -67,13 +67,12 @@ def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     rate = sampling_rate(time)
     share = 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate)
     noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * share))
-    mount = stream.mount
     return Imu(
         stream.name,
         curve,
         noise,
-        None if mount is None else mount.rotation,
-        None if mount is None or mount.position is None else np.asarray(mount.position, dtype=float),
+        stream.turn,
+        None if stream.arm is None else np.asarray(stream.arm, dtype=float),
         factor,
     )
 

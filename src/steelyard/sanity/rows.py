@@ -109,15 +109,14 @@ def dead_channels(recording: Recording) -> tuple[bool, ...]:
     """
     dead = np.array(recording.dead)
     for stream in (s for s in recording.streams if "force" in s.channels and s.time is not None):
-        turned = stream.mount is not None and stream.mount.rotation is not None
-        if turned or len(stream) < 4 * FROZEN_ROWS:
+        if stream.turn is not None or len(stream) < 4 * FROZEN_ROWS:
             continue
         for k, quantity in enumerate(("torque", "force")):
             if quantity in stream.channels and stream.frames.get(quantity, "S") == "S":
                 dead[3 * k : 3 * k + 3] |= _dead(stream.channels[quantity])
-        if stream.mount is not None and stream.mount.position is not None:
+        if stream.arm is not None:
             # Moments about the S origin take from the force.
-            dead[:3] |= (cross_matrix(stream.mount.position) != 0) @ dead[3:]
+            dead[:3] |= (cross_matrix(stream.arm) != 0) @ dead[3:]
     return tuple(bool(d) for d in dead)
 
 
