@@ -17,6 +17,7 @@ from steelyard.check import Array
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Imu, Mounting
 from steelyard.logs.kinematics import Kinematics, Motion
+from steelyard.logs.runs import picked
 
 _SCANNED = 3000  # rows that are enough to tell a first delay
 
@@ -144,5 +145,5 @@ def free_residual(values: Array, features: list[Array]) -> Array:
 
 def _thinned(question: Question) -> Question:
     """Return the question with as many rows as a scan looks at, evenly taken."""
-    pick = np.unique(np.linspace(0, len(question.time) - 1, min(_SCANNED, len(question.time))).astype(int))
+    pick = picked(len(question.time), _SCANNED)
     return replace(question, time=question.time[pick], felt=question.felt.rows(pick), _cache={})
