@@ -10,7 +10,10 @@ from numpy.typing import ArrayLike, NDArray
 from steelyard.errors import BadValue
 
 Array = NDArray[np.float64]
+Integers = NDArray[np.int64]
+Mask = NDArray[np.bool_]
 _IDENTITY = np.eye(3)
+_ORTHONORMAL = 1e-6  # how far R^T R of a rotation may be from the identity, entry by entry
 
 
 def frozen(values: Any) -> Array:
@@ -76,7 +79,7 @@ def _number(name: str, value: float) -> float:
         raise BadValue(f"{name} must be a number; got {value!r}.") from None
 
 
-def rotations(name: str, values: ArrayLike, tolerance: float = 1e-6) -> Array:
+def rotations(name: str, values: ArrayLike) -> Array:
     """Return `values` as rotation matrices (..., 3, 3), or name the worst one and how far off it is."""
     array = matrices(name, values)
     # Entries as nine long rows: products of many small matrices cost ten times as much.
@@ -84,12 +87,12 @@ def rotations(name: str, values: ArrayLike, tolerance: float = 1e-6) -> Array:
     gram = a * a + d * d + g * g, b * b + e * e + h * h, c * c + f * f + i * i
     mixed = a * b + d * e + g * h, a * c + d * f + g * i, b * c + e * f + h * i
     far = max(max(np.abs(x - 1).max(initial=0) for x in gram), max(np.abs(x).max(initial=0) for x in mixed))
-    if far > tolerance:
+    if far > _ORTHONORMAL:
         error = np.abs(np.swapaxes(array, -1, -2) @ array - _IDENTITY)
         worst = tuple(int(i) for i in np.unravel_index(int(error.argmax()), error.shape)[:-2])
         raise BadValue(
             f"{name} must be orthonormal; {f'entry {worst}' if worst else 'it'} is off by {error.max():.2g} "
-            f"in R^T R (tolerance {tolerance:g})."
+            f"in R^T R (tolerance {_ORTHONORMAL:g})."
         )
     if (a * (e * i - f * h) - b * (d * i - f * g) + c * (d * h - e * g)).min(initial=1) < 0:
         raise BadValue(f"{name} must be right-handed; at least one has determinant -1 (a mirror image).")

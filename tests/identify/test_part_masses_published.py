@@ -8,7 +8,7 @@ import pytest
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.evaluate import riemannian
 from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior, uniform_body
-from steelyard.identify.part_masses_published import PublishedPartMasses, point_parts
+from steelyard.identify.part_masses_published import PublishedPartMasses
 from steelyard.identify.point_masses import PointMasses
 from steelyard.inertia import InertialParameters, solids
 from steelyard.parts.parts import Parts
@@ -84,16 +84,6 @@ def test_hps_says_what_stops_it():
         PublishedPartMasses(parts).identify(replace(log, acceleration=log.acceleration + 2))
     with pytest.raises(CannotAnswer, match="no part carries mass"):
         PublishedPartMasses(parts).identify(replace(log, wrench=-log.wrench))
-
-
-def test_point_parts_have_the_points_moments_and_no_inertia_of_their_own():
-    points = np.array([[0.0, 0, 0], [0.1, 0, 0], [0, 0.2, 0], [0, 0, 0.3]])
-    parts = point_parts(points, [1.0, 2.0, 3.0, 4.0], [5, 5, 3, 3])
-    np.testing.assert_array_equal(parts.label, [3, 5])
-    expected = InertialParameters.from_point_masses([3.0, 4.0], points[2:]).vector
-    np.testing.assert_allclose(parts.moments[0], expected)
-    with pytest.raises(BadValue, match=r"shapes \(T, 3\), \(T,\) and \(T,\)"):
-        point_parts(points, [1.0, 2.0], [5, 5, 3, 3])
 
 
 def grid(parts):

@@ -48,7 +48,7 @@ def test_nothing_is_claimed_where_nothing_is_wrong(seed):
     aligned = align(recording(Swing(seed, duration=8.0, travel=0.05), seed=seed))
     assert set(aligned.delays_s.values()) == {0.0}
     assert not codes(aligned)
-    assert aligned.rows_left_out == 0
+    assert not len(aligned.left_out)
 
 
 def test_a_given_delay_and_mount_are_used_as_given():

@@ -115,9 +115,7 @@ def test_a_cross_falls_into_bars() -> None:
     x, y = np.abs(mesh.centroids[:, :2]).T
     tree = cluster(mesh.chosen((x < 0.5) | (y < 0.5)), cost=Hollow())
     hollow = (tree.hull - tree.volume) / tree.volume[tree.root]
-    nodes = tree.cheapest_cut(hollow + 0.1)
-    assert 2 <= len(nodes) <= 4
-    assert hollow[nodes].sum() < 0.25 < 1 < hollow[tree.root]
+    assert min(hollow[tree.nodes(count)].sum() for count in (2, 3, 4)) < 0.25 < 1 < hollow[tree.root]
 
 
 @pytest.mark.parametrize("cost", COSTS)

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from itertools import combinations
-
 import numpy as np
 import pytest
 
@@ -26,17 +24,6 @@ def tree(count: int, seed: int = 0, volumes: bool = True) -> Hierarchy:
     cost = np.arange(count - 1, dtype=float)
     node = (np.array(volume), np.array(hull)) if volumes else (None, None)
     return Hierarchy(np.tile(np.arange(count), 2), np.array(merges).reshape(-1, 2), cost, *node)
-
-
-def antichains(one: Hierarchy) -> list[list[int]]:
-    """All ways to cut a small tree."""
-    found = []
-    for size in range(1, len(one) + 1):
-        for nodes in combinations(range(one.root + 1), size):
-            leaves = np.concatenate([one.leaves(n) for n in nodes])
-            if len(leaves) == len(one) == len(set(leaves)):
-                found.append(list(nodes))
-    return found
 
 
 def test_every_cut_has_its_parts_and_refines_the_one_before() -> None:
@@ -71,23 +58,11 @@ def test_leaves_children_and_depth() -> None:
     assert one.cut_at(one.nodes_at_depth(2)).max() + 1 == len(one.nodes_at_depth(2)) <= 4
 
 
-@pytest.mark.parametrize("seed", range(6))
-def test_cheapest_cut_is_the_cheapest_of_all(seed: int) -> None:
-    one = tree(6, seed)
-    all_cuts = antichains(one)
-    rng = np.random.default_rng(seed)
-    for _ in range(5):
-        cost = rng.normal(size=one.root + 1)
-        least = min(cost[nodes].sum() for nodes in all_cuts)
-        assert cost[one.cheapest_cut(cost)].sum() == pytest.approx(least)
-    assert one.cheapest_cut(np.zeros(one.root + 1)) == [one.root]
-
-
 def test_one_piece_is_a_tree() -> None:
     one = Hierarchy(np.zeros(4, int), np.zeros((0, 2), int), np.zeros(0), np.ones(1), np.ones(1))
     assert len(one) == 1
     assert one.cut(1).tolist() == [0, 0, 0, 0]
-    assert one.nodes_at_depth(2) == [0] == one.cheapest_cut(np.ones(1))
+    assert one.nodes_at_depth(2) == [0]
     with pytest.raises(BadValue, match="can be cut into 1 to 1 parts, not 2"):
         one.cut(2)
 
@@ -109,8 +84,6 @@ def test_cuts_that_are_none_are_refused() -> None:
         one.cut_at([one.root, one.root])
     with pytest.raises(BadValue, match=r"nodes of this tree are 0\.\.8; got 9"):
         one.cut_at([9])
-    with pytest.raises(BadValue, match="one cost for each of 9 nodes"):
-        one.cheapest_cut([1.0])
 
 
 @pytest.mark.parametrize(

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
 
 import numpy as np
 
+from steelyard.bench.asked import Progress, require_one
 from steelyard.bench.pool import spread
 from steelyard.check import Array
-from steelyard.errors import BadValue, SteelyardError
+from steelyard.errors import SteelyardError
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.inertia import InertialParameters
 from steelyard.simulate import scenarios, simulate_log
@@ -29,7 +30,6 @@ RULES = (
     "the same over the whole kind at once, each object in its own scale (mass, radius of gyration, half the "
     "trace of the inertia about the centre of mass). An honest interval has a ratio of 1.96."
 )
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -72,8 +72,7 @@ def run(
 
     Without `all_objects` seed k uses object k mod 10. `workers` processes share the fits.
     """
-    if seeds < 1:
-        raise BadValue(f"There must be at least one seed; got {seeds}.")
+    require_one("seed", seeds)
     names = scenarios.object_names()
     jobs = [(s, n) for s in range(seeds) for n in (names if all_objects else (names[s % len(names)],))]
     cases = [Case(motion, noise, spectrum, declared, bias) for spectrum in spectra]
@@ -133,24 +132,23 @@ def summary(outcomes: Sequence[Outcome | str]) -> dict[str, Any]:
     return {
         "logs": len(outcomes),
         "failures": failures,
-        "kinds": {kind: _widths(good, which) for kind, which in KINDS.items()},
-        "entries": {name: _widths(good, slice(k, k + 1)) for k, name in enumerate(ENTRIES)},
+        "kinds": {kind: widths(_by_group(good, which)) for kind, which in KINDS.items()},
+        "entries": {name: widths(_by_group(good, slice(k, k + 1))) for k, name in enumerate(ENTRIES)},
         "objects": objects,
         "all_six_objects": sum(entry["inertia_identified"] == 6 for entry in objects.values()),
     }
 
 
-def _widths(outcomes: Sequence[Outcome], which: slice) -> dict[str, Any]:
-    """Return coverage and width ratios of the chosen entries; None where nothing was identified."""
-    groups = _by_group(outcomes, which)
+def widths(groups: Sequence[Array]) -> dict[str, Any]:
+    """Return coverage and width ratios of groups (n, 2) of errors and half-widths; None where there are none."""
     if not groups:
         return {"coverage_pct": None, "width_ratio": None, "width_ratio_pooled": None, "intervals": 0}
     everything = np.concatenate(groups)
-    ratios = [_ratio(group) for group in groups]
+    ratios = [float(group[:, 1].mean()) / rms_error(group) for group in groups]
     return {
         "coverage_pct": float(100 * np.mean(np.abs(everything[:, 0]) <= everything[:, 1])),
         "width_ratio": float(np.average(ratios, weights=[len(group) for group in groups])),
-        "width_ratio_pooled": _ratio(everything),
+        "width_ratio_pooled": float(everything[:, 1].mean()) / rms_error(everything),
         "intervals": len(everything),
     }
 
@@ -166,9 +164,9 @@ def _by_group(outcomes: Sequence[Outcome], which: slice) -> list[Array]:
     return [np.array(group) for group in groups.values()]
 
 
-def _ratio(pairs: Array) -> float:
-    """Return mean half-width / rms error."""
-    return float(pairs[:, 1].mean() / np.sqrt(np.mean(pairs[:, 0] ** 2)))
+def rms_error(pairs: Array) -> float:
+    """Return the rms of the errors in pairs (n, 2) of error and half-width."""
+    return float(np.sqrt(np.mean(pairs[:, 0] ** 2)))
 
 
 def _identified(outcomes: Sequence[Outcome]) -> dict[str, dict[str, float]]:

@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard import evaluate
 from steelyard.bench import bound
+from steelyard.bench.asked import Progress, require_known, require_one
 from steelyard.bench.conditions import condition_means, conditions
 from steelyard.bench.held_object_cases import (
     METHODS,
@@ -55,7 +56,6 @@ TIMING = (
     "Estimate, since its rows are chosen one by one. A call above 50 ms is timed once."
 )
 SLOW_MS = 50.0
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -115,12 +115,9 @@ def run(
 def _plan(parts: str, noises: tuple[str, ...], seeds: int, methods: tuple[str, ...], repeats: int) -> Plan:
     if parts not in PARTS:
         raise BadValue(f"parts must be one of {', '.join(PARTS)}; got {parts!r}.")
-    if seeds < 1:
-        raise BadValue(f"There must be at least one seed; got {seeds}.")
-    for names, there, what in ((noises, tuple(NOISE), "noise scenario"), (methods, METHODS, "method")):
-        for name in names:
-            if name not in there:
-                raise BadValue(f"There is no {what} '{name}'; there are: {', '.join(there)}.")
+    require_one("seed", seeds)
+    require_known("noise scenario", noises, NOISE)
+    require_known("method", methods, METHODS)
     if "paper-route" in methods and parts != "segmented":
         raise BadValue(f'paper-route finds its own parts in the cloud; give parts "segmented", not {parts!r}.')
     everything = {"truth": (*PART_METHODS, *RIVALS), "segmented": (*PART_METHODS, "paper-route", *RIVALS)}.get(
@@ -132,9 +129,7 @@ def _plan(parts: str, noises: tuple[str, ...], seeds: int, methods: tuple[str, .
 def _chosen(folders: list[Path], names: Sequence[str]) -> list[Path]:
     """Return the folders called `names`, all where none is named."""
     there = {folder.name: folder for folder in folders}
-    for name in names:
-        if name not in there:
-            raise BadValue(f"There is no object '{name}'; there are: {', '.join(there)}.")
+    require_known("object", names, tuple(there))
     return [there[name] for name in names] or folders
 
 

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.bench.asked import Progress
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.hull import TOLERANCE, hull_volume, hull_work, qhull
@@ -41,7 +42,7 @@ KINDS: dict[str, Callable[[np.random.Generator, int], Array]] = {
 }
 
 
-def run(sets: int, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def run(sets: int, progress: Progress | None = None) -> dict[str, Any]:
     """Return per kind the largest error of our volumes and how many sets were given back.
 
     error   |ours - Qhull's|, over Qhull's volume or a thousandth of the cube of the set's size, whichever is larger

@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
 from steelyard import evaluate
 from steelyard.bench import long_log
+from steelyard.bench.asked import Progress
 from steelyard.bench.methods import Method, choose, own_methods
 from steelyard.bench.peers import peer_methods
 from steelyard.bench.timing import REPEATS, thread_ms
@@ -34,7 +35,6 @@ TIMING = (
     "identify_ms: the scored answer from the log, with compression, check of rest and error bars (first "
     "object, no slow methods)."
 )
-Progress = Callable[[int, int], None]
 Row = dict[str, Any]
 
 

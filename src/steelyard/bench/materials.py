@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from steelyard.bench.asked import Progress, require_one
 from steelyard.bench.held_object_cases import SAME_DENSITY, Case, load_case, noisy_rows
 from steelyard.errors import BadValue, SteelyardError
 from steelyard.identify.estimate import Estimate
@@ -37,7 +38,6 @@ RULES = (
     "another one is named as possible too. right_or_tied: the true one is the likeliest or named as possible. "
     "wrong_alone: a wrong one without a tie. all_right_runs_pct: runs in which every counted part is right."
 )
-Progress = Callable[[int, int], None]
 Counts = dict[str, int]
 EMPTY: Counts = {"parts": 0, "right": 0, "tied": 0, "right_or_tied": 0, "wrong_alone": 0, "runs": 0, "all_right": 0}
 
@@ -46,8 +46,7 @@ def run(
     data: Path | str, seeds: int = 5, progress: Progress | None = None, *, objects: Sequence[str] = ()
 ) -> dict[str, Any]:
     """Return how often the right density is picked, over all objects and for each. Empty `objects` means all."""
-    if seeds < 1:
-        raise BadValue(f"There must be at least one seed; got {seeds}.")
+    require_one("seed", seeds)
     folders = [folder for folder in object_folders(data) if not objects or folder.name in objects]
     found: dict[str, Any] = {}
     failures: list[str] = []

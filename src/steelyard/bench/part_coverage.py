@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -10,7 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.coverage import BATCH, HALF_WIDTH, object_scale
+from steelyard.bench.asked import Progress, require_one
+from steelyard.bench.coverage import BATCH, HALF_WIDTH, object_scale, rms_error, widths
 from steelyard.bench.held_object_cases import Case, load_case, noisy_rows
 from steelyard.bench.part_timing import TIMING, timings
 from steelyard.bench.pool import spread
@@ -36,7 +37,6 @@ RULES = (
     "Entries that are never wrong by a millionth of that scale are left out. part_5pct: parts with at least 5 % of "
     "the mass."
 )
-Progress = Callable[[int, int], None]
 Job = tuple[Path, int, str, str]
 
 
@@ -62,8 +62,7 @@ def run(
 
     `repeats` = 0 leaves the times out. `progress(done, fits)` is called after every batch.
     """
-    if seeds < 1:
-        raise BadValue(f"There must be at least one seed; got {seeds}.")
+    require_one("seed", seeds)
     usable = [name for name in NOISE if any(noise_std(name))]
     for name in noises:
         if name not in usable:
@@ -164,22 +163,4 @@ def _groups(outcomes: Sequence[Outcome], kind: str) -> list[Array]:
             if np.isfinite(pair).all():
                 groups.setdefault((outcome.name, k), []).append(pair)
     stacked = [np.stack(group) for group in groups.values()]
-    return [group for group in stacked if _rms(group) > ROUNDING]
-
-
-def widths(groups: Sequence[Array]) -> dict[str, Any]:
-    """Return coverage and width ratios of groups (n, 2) of errors and half-widths; None where there are none."""
-    if not groups:
-        return {"coverage_pct": None, "width_ratio": None, "width_ratio_pooled": None, "intervals": 0}
-    everything = np.concatenate(groups)
-    ratios = [float(group[:, 1].mean()) / _rms(group) for group in groups]
-    return {
-        "coverage_pct": float(100 * np.mean(np.abs(everything[:, 0]) <= everything[:, 1])),
-        "width_ratio": float(np.average(ratios, weights=[len(group) for group in groups])),
-        "width_ratio_pooled": float(everything[:, 1].mean()) / _rms(everything),
-        "intervals": len(everything),
-    }
-
-
-def _rms(pairs: Array) -> float:
-    return float(np.sqrt(np.mean(pairs[:, 0] ** 2)))
+    return [group for group in stacked if rms_error(group) > ROUNDING]

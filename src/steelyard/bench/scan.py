@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
+from steelyard.bench.asked import Progress
 from steelyard.evaluate import score
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
@@ -28,6 +29,7 @@ from steelyard.workshop.finish import painted
 
 WITHIN = (0.85, 1.15)
 NOISE = "high"  # Table III
+_SAMPLES = 20_000  # points that tell how much the views leave unseen
 SCORES = ("mass_pct", "com_pct", "inertia_pct", "riemannian")
 RULES = (
     "Every built tool lies on a table on its most stable side and is seen in 640 x 480 from a wrist's arc above it, "
@@ -45,7 +47,7 @@ def run(
     seed: int = 0,
     count: int = VIEWS,
     pose_std: tuple[float, float] = (0.0, 0.0),
-    progress: Callable[[int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> dict[str, Any]:
     """Return rows per tool, how many volumes are within bounds, and the median time of each stage."""
     names = tuple(tools) or tuple(FAMILIES)
@@ -130,12 +132,12 @@ def _answer(shape: Shape, X_SW: Pose, log: MotionLog) -> Estimate:
     return PartCuts(placed, cuts.prior, bias="none", shape_error=shape.error).identify(log)
 
 
-def _unseen(scanned: Scanned, bounds: Any, samples: int = 20_000) -> float:
+def _unseen(scanned: Scanned, bounds: Any) -> float:
     """Return the volume [m^3] over the table that the views leave unseen, by exact depth at the true poses."""
     from steelyard.shape.sight_lines import seen_past
 
     views = scanned.exact
-    points = np.random.default_rng(0).uniform(bounds[0], bounds[1], (samples, 3))
+    points = np.random.default_rng(0).uniform(bounds[0], bounds[1], (_SAMPLES, 3))
     R, p = views.X_WC.rotation.matrix.copy(), views.X_WC.position.copy()
     lens = views.intrinsics.vector
     past = seen_past(views.depth, views.depth_unit, lens, R, p, points, views.depth_unit, 0.0, 1)

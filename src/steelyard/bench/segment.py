@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
+from steelyard.bench.asked import Progress
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.evaluate.segments import score_segments, surface_gap
@@ -68,7 +69,6 @@ RULES = (
     f"{REPEATS}; supervoxels = colours and pieces, "
     "clustering = the tree and its cut."
 )
-Progress = Callable[[int, int], None]
 
 
 def run(

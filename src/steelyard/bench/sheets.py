@@ -2,9 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from typing import Any
 
+from steelyard.bench.asked import Progress
 from steelyard.bench.tables import block
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sheets import KINDS, sheets
@@ -20,7 +20,7 @@ _COLUMNS = (("count", "count", 0), ("hits", "hits", 0), ("misses warned", "misse
             ("hits warned", "hits_warned", 0))  # fmt: skip
 
 
-def run(count: int = 60, seed: int = 0, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def run(count: int = 60, seed: int = 0, progress: Progress | None = None) -> dict[str, Any]:
     """Return a row per sheet, and per kind and for all: hits, misses, and how many of each carry the warning."""
     rows: list[dict[str, Any]] = []
     for done, sheet in enumerate(sheets(count, seed), start=1):

@@ -10,10 +10,11 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.bench.asked import Progress, require_known, require_one
 from steelyard.bench.pool import spread
 from steelyard.bench.timing import thread_ms
 from steelyard.check import Array
-from steelyard.errors import BadValue, SteelyardError
+from steelyard.errors import SteelyardError
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, TeamTruth, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
@@ -43,7 +44,6 @@ RULES = (
     "error, time = median of five calls. times: one motion with the noise of case C, whole identification, grasps to "
     "inertia, thread CPU in s, median of five calls."
 )
-Progress = Callable[[int, int], None]
 
 
 @dataclass(frozen=True)
@@ -90,9 +90,10 @@ def run(
     late, a grasp slips (`slips` times in two cases) or a robot leaves. An empty choice means all.
     `progress(done, all)` is called after every trial of the cases. Raises BadValue for unknown names.
     """
-    if trials < 1:
-        raise BadValue(f"There must be at least one trial; got {trials}.")
-    chosen, wanted = _chosen("case", cases, CASES), _chosen("method", methods, METHODS)
+    require_one("trial", trials)
+    require_known("case", cases, CASES)
+    require_known("method", methods, METHODS)
+    chosen, wanted = tuple(cases) or tuple(CASES), tuple(methods) or tuple(METHODS)
     jobs = [(name, FIRST_SEED + k, wanted) for name in chosen for k in range(trials)]
     rows: list[dict[str, Any]] = []
     for done, found in enumerate(spread(trial, jobs, workers), start=1):
@@ -129,13 +130,6 @@ def times(robots: int, rows: int) -> dict[str, Any]:
     log = simulate_team(TeamScene(CASES["C"], robots, kinds=("motion",), motion_samples=rows), FIRST_SEED).log
     joint = JointTeam()
     return {"n": robots, "rows": rows, "time_s": thread_ms(lambda: joint.identify(log), repeats=5, warm=1) / 1000}
-
-
-def _chosen(kind: str, asked: Sequence[str], known: Mapping[str, Any]) -> tuple[str, ...]:
-    for name in asked:
-        if name not in known:
-            raise BadValue(f"There is no {kind} '{name}'; there are: {', '.join(known)}.")
-    return tuple(asked) or tuple(known)
 
 
 def trial(job: tuple[str, int, Sequence[str]]) -> list[dict[str, Any]]:

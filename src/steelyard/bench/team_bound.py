@@ -7,13 +7,13 @@ and of accelerations from the best path that the poses allow.
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 import numpy as np
 from scipy.fft import dct
 
+from steelyard.bench.asked import Progress
 from steelyard.bench.team_coverage import errors
 from steelyard.check import Array
 from steelyard.identify.people import people_jacobian
@@ -78,7 +78,7 @@ def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:
     return np.sqrt(np.diag(jacobian @ np.linalg.inv(F) @ jacobian.T))
 
 
-def run(trials: int = 24, progress: Callable[[int, int], None] | None = None) -> dict[str, Any]:
+def run(trials: int = 24, progress: Progress | None = None) -> dict[str, Any]:
     """Return rms error over rms bound by kind, over trials with white noise and no bias."""
     kinds = ("rotation", "position", "mass", "com", "inertia")
     squares = {kind: np.zeros(2) for kind in kinds}

@@ -59,7 +59,7 @@ class Geodesic:
 
     def _fit(self, problem: Problem) -> Solution:
         """Newton's method on the cone: the cost is convex in the parameters (entropic) or along geodesics."""
-        weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+        weights = problem.wrench_weights
         H, g = problem.normal_equations(weights)
         linear = solve_scaled(H, g)
         prior = _neutral(linear) if self.prior is None else forms.pseudo_inertia(self.prior.vector)

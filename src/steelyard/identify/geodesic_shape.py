@@ -50,7 +50,7 @@ class ShapeGeodesic:
     def _fit(self, problem: Problem) -> Solution:
         if not self.weighted:
             problem = replace(problem, wrench=np.ones_like(problem.wrench))
-        weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+        weights = problem.wrench_weights
         mass = self.mass or float(solve_scaled(*problem.normal_equations(weights))[0])
         if not mass > 0:
             raise CannotAnswer(

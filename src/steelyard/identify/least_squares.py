@@ -55,7 +55,7 @@ class LeastSquares:
         if self.kind == "total":
             return Solution.unconstrained(_total(problem))
         if self.kind == "weighted":
-            weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+            weights = problem.wrench_weights
         else:
             weights = np.broadcast_to(np.eye(6), (len(problem.scatter), 6, 6)).copy()
         return Solution.unconstrained(solve_scaled(*problem.normal_equations(weights)), weights)

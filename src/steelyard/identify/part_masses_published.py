@@ -10,14 +10,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 from scipy.optimize import nnls
 
-from steelyard import check
 from steelyard.check import Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
-from steelyard.inertia import InertialParameters
 from steelyard.logs.log import Mask, MotionLog
 from steelyard.parts.parts import Parts
 
@@ -32,7 +29,7 @@ TIE = 1e-12
 class PublishedPartMasses:
     """Options of HPS.
 
-    parts  the parts, in the frame of the sensor; `point_parts` makes them as published, from points
+    parts  the parts, in the frame of the sensor
     gate   rows are used where both measured accelerations are shorter than this [m/s^2, rad/s^2]
     """
 
@@ -121,21 +118,3 @@ def _covariance(A: Array, log: MotionLog, held: Mask) -> Array:
     bread = np.linalg.pinv(A[:, held])
     out[np.ix_(held, held)] = (bread * variance) @ bread.T
     return out
-
-
-def point_parts(points: ArrayLike, volume: ArrayLike, label: ArrayLike) -> Parts:
-    """Return parts made of points (T, 3) [m] of volume (T,) [m^3], one label (T,) each: the published discretisation.
-
-    The published code keeps one point per tetrahedron, its centroid, and leaves out the tetrahedron's own inertia.
-    """
-    places, sizes = check.vectors("points", points), check.finite("volumes", volume)
-    names, row = np.unique(np.asarray(label), return_inverse=True)
-    if places.ndim != 2 or sizes.shape != places.shape[:1] or row.shape != places.shape[:1]:
-        raise BadValue(
-            f"points, volumes and labels must have shapes (T, 3), (T,) and (T,); "
-            f"got {places.shape}, {sizes.shape} and {row.shape}."
-        )
-    moments = [
-        InertialParameters.from_point_masses(sizes[row == k], places[row == k]).vector for k in range(len(names))
-    ]
-    return Parts(names.astype(np.int64), np.stack(moments))

@@ -53,7 +53,7 @@ class PointMasses:
 
     def _fit(self, problem: Problem) -> Solution:
         """Return the best masses m >= 0: |R (B m - phi)|^2 with R^T R the weighted normal matrix of phi."""
-        weights = np.stack([np.diag(1 / w) for w in problem.wrench])
+        weights = problem.wrench_weights
         H, g = problem.normal_equations(weights)
         scale = 1 / np.sqrt(np.maximum(np.diag(H), np.finfo(float).tiny))
         values, vectors = np.linalg.eigh(H * np.outer(scale, scale))

@@ -62,6 +62,11 @@ class Problem:
         """Which channels [tau, f] (6,) measure."""
         return np.asarray((self.wrench < DEAF).any(0))
 
+    @property
+    def wrench_weights(self) -> Array:
+        """Weights (C, 6, 6) of the rows by the noise of the wrench alone."""
+        return np.stack([np.diag(1 / variance) for variance in self.wrench])
+
     def rms(self, square: Array) -> tuple[float, float]:
         """Return the rms [N m] and [N] per axis that measures, from mean squares (6,) of the channels."""
         both = np.where(self.heard, square, 0.0).reshape(2, 3).sum(1) / np.maximum(self.heard.reshape(2, 3).sum(1), 1)

@@ -8,7 +8,6 @@ from collections.abc import Iterable
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.description import default_gravity
 from steelyard.io.rotations import rotation_of
@@ -20,13 +19,13 @@ PENDANT_COLUMNS = "roll pitch yaw (deg, S to W), fx fy fz (N), tx ty tz (N*m)"
 _WITH_COMMA = re.compile(r"[+-]?(\d+|\d*,\d+)([eE][+-]?\d+)?")
 
 
-def read_pendant(lines: Iterable[str], gravity: Array | None = None, on_sensor: bool = True) -> Recording:
+def read_pendant(lines: Iterable[str]) -> Recording:
     """Return still poses typed one per line: roll pitch yaw [deg] of S in W, fx fy fz [N], tx ty tz [N m].
 
-    lines      nine numbers each, between blanks, commas or semicolons, decimals with a comma where none stands between;
-               empty lines and # comments are skipped
-    gravity    (3,) [m/s^2] in W; standard gravity, z up, where left out
-    on_sensor  whether the readings are the reaction on the sensor (most are) or what the robot applies
+    Readings are the reaction on the sensor, as most are, and gravity is the standard one with z of W up.
+
+    lines  nine numbers each, between blanks, commas or semicolons, decimals with a comma where none stands between;
+           empty lines and # comments are skipped
 
     Raises BadValue naming the line.
     """
@@ -39,9 +38,8 @@ def read_pendant(lines: Iterable[str], gravity: Array | None = None, on_sensor: 
         "force": check.frozen(table[:, 3:6]),
         "torque": check.frozen(table[:, 6:]),
     }
-    down = check.vectors("gravity", default_gravity() if gravity is None else gravity)
     stream = Stream("pendant", channels, poses=True)
-    return Recording((stream,), down, -1 if on_sensor else 1, name="pendant")
+    return Recording((stream,), default_gravity(), -1, name="pendant")
 
 
 def _words(line: str) -> list[str]:

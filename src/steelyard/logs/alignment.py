@@ -60,7 +60,6 @@ class Aligned:
     mounts         stream -> how its accelerometer sits on S
     acceleration_from   "linear_acceleration", "linear_velocity", "position", "specific_force" or "none"
     left_out       (K, 2) [s] intervals on the wrench clock that were left out
-    rows_left_out  how many rows those held
     notes          what the data could not tell, in words
     """
 
@@ -72,7 +71,6 @@ class Aligned:
     mounts: Mapping[str, Mounting] = field(default_factory=dict)
     acceleration_from: str = "none"
     left_out: Array = field(default_factory=lambda: np.zeros((0, 2)))
-    rows_left_out: int = 0
     notes: tuple[str, ...] = ()
 
 
@@ -217,7 +215,6 @@ def _align_timed(given: _Prepared) -> Aligned:
         {} if given.imu is None or clocks.mounting is None else {given.imu.name: clocks.mounting},
         given.source,
         taps,
-        int(touched.sum()),
         say.notes(clocks, given.source),
     )
 

@@ -12,6 +12,7 @@ from steelyard.spatial import Rotation
 
 _TURNED = np.radians(5)
 _LOOSE_M, _LOOSE_RAD = 0.1, 0.1
+_THIRD = 0.1  # of its size: below this, gravity hardly sweeps a third direction
 
 
 def delay_findings(clocks: Clocks, names: tuple[str, ...], wrench: str) -> tuple[Finding, ...]:
@@ -65,15 +66,15 @@ def tap_findings(taps: Array, start: float, rows: int, total: int) -> tuple[Find
     return (Finding.of("outliers", f"Found {bursts} at {at} s; {rows} of {total} rows were left out."),)
 
 
-def planar_finding(gravity: Array, smallest: float = 0.1) -> tuple[Finding, ...]:
+def planar_finding(gravity: Array) -> tuple[Finding, ...]:
     """Return `nearly-planar` where gravity (N, 3) in S sweeps two directions and hardly a third.
 
-    Hardly = its standard deviation along the third direction is below `smallest` of its size.
+    Hardly = its standard deviation along the third direction is below a tenth of its size.
     """
     size = float(np.linalg.norm(gravity, axis=1).mean())
     spread, axes = np.linalg.eigh(np.cov(gravity.T, bias=True))
     stds = np.sqrt(np.maximum(spread, 0)) / size
-    if not (stds[0] < smallest < stds[1]):
+    if not (stds[0] < _THIRD < stds[1]):
         return ()
     axis = axes[:, 0] * np.sign(axes[np.abs(axes[:, 0]).argmax(), 0])
     shown = ", ".join(f"{v:.2f}" for v in np.round(axis, 2) + 0.0)

@@ -17,6 +17,9 @@ from steelyard.check import Array
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Imu, Mounting
 from steelyard.logs.kinematics import Kinematics, Motion
+from steelyard.logs.runs import picked
+
+_SCANNED = 3000  # rows that are enough to tell a first delay
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,23 +74,23 @@ class Question:
         return self._cache[key]
 
 
-def scan(question: Question, rows: int = 3000) -> dict[str, float]:
+def scan(question: Question) -> dict[str, float]:
     """Return a first delay [s] for every unknown stream: the lag at which linear fits leave least.
 
     The accelerometer's is told by the wrench; the others' by the wrench and the accelerometer.
     """
     delays = {**question.known, **dict.fromkeys(question.unknown, 0.0)}
     for name in sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name):
-        delays[name] = _best_lag(_thinned(question, rows), delays, name, by_wrench=True)
+        delays[name] = _best_lag(_thinned(question), delays, name, by_wrench=True)
     return {n: delays[n] for n in question.unknown}
 
 
-def scan_without_wrench(question: Question, delays: Mapping[str, float], rows: int = 3000) -> dict[str, float]:
+def scan_without_wrench(question: Question, delays: Mapping[str, float]) -> dict[str, float]:
     """Return the delays with those of orientations and the like found against the accelerometer alone."""
     out = dict(delays)
     for name in question.unknown:
         if question.imu is not None and name != question.imu.name:
-            out[name] = _best_lag(_thinned(question, rows), out, name, by_wrench=False)
+            out[name] = _best_lag(_thinned(question), out, name, by_wrench=False)
     return out
 
 
@@ -140,7 +143,7 @@ def free_residual(values: Array, features: list[Array]) -> Array:
     return np.asarray(values - X @ np.linalg.solve(normal, X.T @ values))
 
 
-def _thinned(question: Question, rows: int) -> Question:
-    """Return the question with at most `rows` rows, evenly taken."""
-    pick = np.unique(np.linspace(0, len(question.time) - 1, min(rows, len(question.time))).astype(int))
+def _thinned(question: Question) -> Question:
+    """Return the question with as many rows as a scan looks at, evenly taken."""
+    pick = picked(len(question.time), _SCANNED)
     return replace(question, time=question.time[pick], felt=question.felt.rows(pick), _cache={})

@@ -36,11 +36,10 @@ class Felt:
     def of(cls, stream: Stream, sign: int, dead: tuple[bool, ...] = (False,) * 6) -> Felt:
         """Return the wrench of a stream; `sign` +1 where it is on the object, -1 on the sensor."""
         world = frozenset(part for part in _PARTS if stream.frames.get(part, "S") == "W")
-        mounted = None if stream.mount is None else stream.mount.rotation
         parts = [stream.channels[part] for part in _PARTS]
-        if mounted is not None:
-            parts = [v if part in world else mounted.apply(v) for part, v in zip(_PARTS, parts, strict=True)]
-        arm = np.zeros(3) if stream.mount is None or stream.mount.position is None else stream.mount.position
+        if stream.turn is not None:
+            parts = [v if part in world else stream.turn.apply(v) for part, v in zip(_PARTS, parts, strict=True)]
+        arm = np.zeros(3) if stream.arm is None else stream.arm
         felt = cls(stream.name, sign * np.concatenate(parts, 1), world, arm, dead)
         # What is all in S is moved to the S origin once and for all.
         return felt if world else replace(felt, values=felt.in_sensor(None), arm=np.zeros(3))

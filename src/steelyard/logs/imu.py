@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.logs.conditioning import Signal, noise_std, sampling_rate, signal
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
-from steelyard.spatial import Rotation
+from steelyard.spatial import Rotation, lever_acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,12 +54,7 @@ class Mounting:
         """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning
         of S."""
         turned = self.scale * self.rotation.apply(specific_force - self.bias)
-        return np.asarray(turned - lever(omega, alpha, self.position))
-
-
-def lever(omega: Array, alpha: Array, p: Array) -> Array:
-    """Return alpha x p + omega x (omega x p) (N, 3): what a point at p feels more than the origin."""
-    return np.cross(alpha, p) + np.cross(omega, np.cross(omega, p))
+        return np.asarray(turned - lever_acceleration(omega, alpha, self.position))
 
 
 def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
@@ -72,13 +67,12 @@ def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     rate = sampling_rate(time)
     share = 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate)
     noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * share))
-    mount = stream.mount
     return Imu(
         stream.name,
         curve,
         noise,
-        None if mount is None else mount.rotation,
-        None if mount is None or mount.position is None else np.asarray(mount.position, dtype=float),
+        stream.turn,
+        None if stream.arm is None else np.asarray(stream.arm, dtype=float),
         factor,
     )
 

@@ -9,9 +9,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
-from steelyard.logs.imu import Imu, Mounting, first_mount, lever
+from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.log import MotionLog
-from steelyard.spatial import Rotation
+from steelyard.spatial import Rotation, lever_acceleration
 
 _BLOCKS = 20
 _ROUNDS = 4
@@ -152,7 +152,7 @@ def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
         own = mounting.at_sensor(raw, motion.omega, motion.alpha)
         if gravity is not None:
             # What a centre of turning away from S adds; absorbs the S acceleration that nothing measures.
-            shift = lever(motion.omega, motion.alpha, layout.get(theta, "centre", np.zeros(3)))
+            shift = lever_acceleration(motion.omega, motion.alpha, layout.get(theta, "centre", np.zeros(3)))
             # Over the scale, so that it multiplies gravity and not the vibration (which would draw it below
             # one).
             extra = [(own - shift + pull) / mounting.scale]

@@ -10,7 +10,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.spatial import Pose, cross_matrix
+from steelyard.spatial import Pose, cross_matrix, lever_acceleration
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 Integers = np.ndarray[Any, np.dtype[np.int64]]
@@ -114,7 +114,7 @@ class MotionLog:
         """Return the same log as a sensor at frame A, fixed to S, would have recorded it (noise, dead dropped)."""
         R, p = X_AS.rotation, X_AS.position
         omega, alpha = R.apply(self.angular_velocity), R.apply(self.angular_acceleration)
-        lever = np.cross(alpha, p) + np.cross(omega, np.cross(omega, p))
+        lever = lever_acceleration(omega, alpha, p)
         force = R.apply(self.wrench[:, 3:])
         torque = R.apply(self.wrench[:, :3]) + np.cross(p, force)
         return replace(

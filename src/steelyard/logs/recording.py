@@ -64,6 +64,16 @@ class Stream:
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
 
+    @property
+    def turn(self) -> Rotation | None:
+        """The rotation of the stream's own frame into S, None where it was not given."""
+        return None if self.mount is None else self.mount.rotation
+
+    @property
+    def arm(self) -> Array | None:
+        """The origin (3,) [m] of the stream's own frame in S, None where it was not given."""
+        return None if self.mount is None else self.mount.position
+
 
 @dataclass(frozen=True)
 class Recording:

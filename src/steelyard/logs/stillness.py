@@ -8,11 +8,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.conditioning import noise_std
+from steelyard.logs.runs import runs
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
 Numbers = np.ndarray[Any, np.dtype[np.int64]]
 
 _SHORTEST_S = 0.25
+_BLOCKS, _SHORTEST_BLOCK_S = 12, 0.3
 _TURNING = 0.02  # [rad/s]
 _MOVING = 0.005  # [m/s]
 _NOISES = 1.5  # times the white noise of a channel: its spread at rest, and a little
@@ -56,12 +58,12 @@ def steady(time: Array, values: Array, limit: float | None = None) -> Mask:
     return np.asarray(hits[high] > hits[np.minimum(low, len(calm))])
 
 
-def pose_numbers(time: Array, still: Mask, blocks: int = 12, shortest_s: float = 0.3) -> Numbers:
+def pose_numbers(time: Array, still: Mask) -> Numbers:
     """Return a number per row (N,): one per still stretch, and one per block of the moving stretches between.
 
-    Blocks are a `blocks`-th of the log long, but no shorter than `shortest_s` [s].
+    Blocks are a twelfth of the log long, but no shorter than 0.3 s.
     """
-    length = max((time[-1] - time[0]) / blocks, shortest_s)
+    length = max((time[-1] - time[0]) / _BLOCKS, _SHORTEST_BLOCK_S)
     change = np.flatnonzero(np.diff(still)) + 1
     starts = np.concatenate([[0], change])
     stretch = np.searchsorted(change, np.arange(len(time)), "right")
@@ -75,10 +77,7 @@ def pose_numbers(time: Array, still: Mask, blocks: int = 12, shortest_s: float =
 
 def _long_enough(time: Array, mask: Mask) -> Mask:
     """Return the mask without stretches shorter than 0.25 s."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2] - 1
-    long = time[ends] - time[starts] >= _SHORTEST_S * 0.95 if len(starts) else np.zeros(0, bool)
-    marks = np.zeros(len(mask) + 1, np.int64)
-    np.add.at(marks, starts[long], 1)
-    np.add.at(marks, ends[long] + 1, -1)
-    return np.asarray(np.cumsum(marks[:-1]) > 0)
+    starts, stops = runs(mask).T
+    kept = np.zeros(len(mask), np.bool_)
+    kept[mask] = np.repeat(time[stops - 1] - time[starts] >= _SHORTEST_S * 0.95, stops - starts)
+    return kept

@@ -54,8 +54,7 @@ def _gravity(recording: Recording, rotation: Rotation | None, wrench: Array) -> 
     for stream, values in _with("gravity", recording):
         return _turned(stream, values)
     for stream, values in _with("specific_force", recording):
-        known = stream.mount.rotation if stream.mount is not None else None
-        return -(known or first_mount(values, None, wrench[:, 3:])).apply(values)
+        return -(stream.turn or first_mount(values, None, wrench[:, 3:])).apply(values)
     raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
 
 
@@ -66,9 +65,7 @@ def _with(quantity: str, recording: Recording) -> Iterator[tuple[Stream, Array]]
 
 
 def _turned(stream: Stream, values: Array) -> Array:
-    if stream.mount is not None and stream.mount.rotation is not None:
-        return stream.mount.rotation.apply(values)
-    return values
+    return values if stream.turn is None else stream.turn.apply(values)
 
 
 def _log_of_rows(recording: Recording, wrench: Array, gravity: Array, rotation: Rotation | None) -> MotionLog:
@@ -84,9 +81,9 @@ def _log_of_rows(recording: Recording, wrench: Array, gravity: Array, rotation: 
             motion[quantity] = values
             break
     if motion["linear_acceleration"] is zero:
-        for _stream, values in _with("specific_force", recording):
-            if rotation is not None and _stream.mount is not None and _stream.mount.rotation is not None:
-                motion["linear_acceleration"] = _stream.mount.rotation.apply(values) + gravity
+        for stream, values in _with("specific_force", recording):
+            if rotation is not None and stream.turn is not None:
+                motion["linear_acceleration"] = stream.turn.apply(values) + gravity
             break
     still = np.full(len(wrench), not any(m is not zero for m in motion.values()))
     return MotionLog(

@@ -14,6 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.runs import runs
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import TeamRows, channel_at, common_time, mean_rotation
 from steelyard.logs.team_track import Mask
@@ -172,11 +173,10 @@ def _forget_ends(columns: Sequence[_Columns], time: Array, seconds: float) -> No
 
 def _near_gaps(good: Mask, bridged: float, spread: float) -> Mask:
     """Return rows within `spread` rows of a gap longer than `bridged` rows."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[True], good, [True]]).astype(np.int8)))
     near = np.zeros(len(good), np.bool_)
-    for start, end in zip(edges[::2], edges[1::2], strict=True):
-        if end - start > bridged:
-            near[max(start - int(spread), 0) : end + int(spread)] = True
+    for start, stop in runs(~good):
+        if stop - start > bridged:
+            near[max(start - int(spread), 0) : stop + int(spread)] = True
     return near
 
 

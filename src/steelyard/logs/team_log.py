@@ -64,8 +64,8 @@ class TeamRecording:
     @property
     def synchronised(self) -> bool:
         """Whether all tracks have the same stamps, to a microsecond."""
-        first, *others = (t.time for t in self.tracks.values())
-        return all(len(t) == len(first) and bool(np.abs(t - first).max() < 1e-6) for t in others)
+        first, *others = self.tracks.values()
+        return all(first.stamped_at(track.time) for track in others)
 
 
 @dataclass(frozen=True, eq=False)

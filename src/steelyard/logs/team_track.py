@@ -94,6 +94,10 @@ class Track:
     def __len__(self) -> int:
         return len(self.time)
 
+    def stamped_at(self, time: Array) -> bool:
+        """Return whether `time` (M,) are the track's own stamps, to a microsecond."""
+        return len(time) == len(self) and bool(np.abs(time - self.time).max() < 1e-6)
+
     def has(self, *names: str) -> bool:
         """Return whether every channel is there, with at least one measured row."""
         return all(name in self.channels and bool(self.valid[name].any()) for name in names)

@@ -122,27 +122,6 @@ class Hierarchy:
         rank[np.lexsort((first, -volume))] = np.arange(len(chosen))
         return np.asarray(rank[labels])
 
-    def cheapest_cut(self, cost: Any) -> list[int]:
-        """Return the nodes, rising, that hold every piece once with the least sum of a cost (2N-1,) per node.
-
-        Exact, in one pass over the tree; where splitting costs as much as not, it does not split.
-        """
-        own = np.asarray(cost, dtype=np.float64)
-        if own.shape != (self.root + 1,) or np.isnan(own).any():
-            raise BadValue(f"a cut needs one cost for each of {self.root + 1} nodes; got {own.shape}.")
-        best = own.copy()
-        for k, (i, j) in enumerate(self.merges):
-            best[len(self) + k] = min(own[len(self) + k], best[i] + best[j])
-        found, open_nodes = [], [self.root]
-        while open_nodes:
-            node = open_nodes.pop()
-            below = self.children(node)
-            if below is None or own[node] <= best[node]:
-                found.append(node)
-            else:
-                open_nodes += below
-        return sorted(found)
-
     def _node(self, node: int) -> int:
         if not 0 <= node <= self.root:
             raise BadValue(f"nodes of this tree are 0..{self.root}; got {node}.")

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.logs.runs import runs
 from steelyard.report.contents import Residuals
 from steelyard.report.markup import Html, tag
 from steelyard.report.numbers import general
@@ -73,12 +74,10 @@ def _means(column: Integers, values: Array) -> tuple[Array, Array]:
 
 def _still_bands(residuals: Residuals, start: float, length: float) -> list[Html]:
     """Return a shade for every stretch of rows at rest."""
-    still = residuals.still.astype(np.int8)
-    turns = np.diff(np.concatenate([[0], still, [0]]))
-    first, last = np.flatnonzero(turns == 1), np.flatnonzero(turns == -1) - 1
+    first, stop = runs(residuals.still).T
     x = (residuals.time - start) / length * COLUMNS
     shades: list[list[float]] = []
-    for a, b in zip(x[first].tolist(), x[last].tolist(), strict=True):
+    for a, b in zip(x[first].tolist(), x[stop - 1].tolist(), strict=True):
         if not shades or a > shades[-1][1] + 0.5:
             shades.append([a, b])
         else:

@@ -13,6 +13,7 @@ from steelyard.findings import Finding
 from steelyard.identify.regressor import design
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
+from steelyard.logs.runs import runs
 from steelyard.sanity import consensus
 from steelyard.sanity.consensus import LEVER, Consensus, Integers, Mask, Slices
 from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, SHORTEST, LoadChange, find_change
@@ -33,7 +34,6 @@ ALIKE, LOOSER = 0.9, 0.3
 SAME = 2.0
 # More of the log than this, or more of the motion than that, is more likely misread than touched.
 MUCH, MOVING = 0.4, 0.8
-TOUCHED = "Something else than the robot touched the object at"
 ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
     "a payload that the controller compensates. If all are right, keep hands and fixtures off the object."
@@ -91,9 +91,8 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
     guarded = _guarded(touches, len(slices.y))
     if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
         return everything, ()
-    finding = _contact(slices, found, touches, guarded)
     moving = np.bincount(row, ~log.still) > 0.5 * np.bincount(row)
-    return guarded[row], (_misfit(finding, guarded) if _unlike_hands(guarded, moving) else finding,)
+    return guarded[row], (_contact(slices, found, touches, guarded, _unlike_hands(guarded, moving)),)
 
 
 def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[Mask, tuple[Finding, ...]]:
@@ -149,19 +148,13 @@ def _memory(found: Consensus) -> float:
     return 1 + 2 * float((correlation[: quiet[0] if len(quiet) else None] ** 2).sum())
 
 
-def _runs(mask: Mask) -> list[tuple[int, int]]:
-    """Return first and last + 1 of each run of True."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
-    return [(int(a), int(b)) for a, b in edges.reshape(-1, 2)]
-
-
 def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
     """Return the stretches left out that no one body, bias and slow drift explains together with what was kept."""
     slices = _with_drift(slices, found.late)
     H, g, c = consensus.sums(slices, found.tolerance)
     base = _least(slices, H, g, c, found.kept)
     out = []
-    for a, b in _runs(~found.kept):
+    for a, b in runs(~found.kept).tolist():
         both = found.kept.copy()
         both[a:b] = True
         gain = max(_least(slices, H, g, c, both) - base, 0.0)
@@ -224,13 +217,13 @@ def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Con
     out = np.zeros(len(slices.y), np.bool_)
     for t in touches:
         out[t.first : t.last] = True
-    if len(touches) < 2 or len(_runs(found.kept)) > 1:
+    if len(touches) < 2 or len(runs(found.kept)) > 1:
         return found
     other = consensus.refine(slices, consensus.fit(slices, out, found.tolerance), out)
     if other is None or (other.kept & out).sum() < ALIKE * out.sum():
         return found
     looser = float(np.log(other.tolerance / found.tolerance).mean())
-    return other if looser < LOOSER and len(_runs(~other.kept)) == 1 else found
+    return other if looser < LOOSER and len(runs(~other.kept)) == 1 else found
 
 
 def _guarded(touches: Sequence[Touch], count: int) -> Mask:
@@ -242,24 +235,31 @@ def _guarded(touches: Sequence[Touch], count: int) -> Mask:
     return kept
 
 
-def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: Mask) -> Finding:
-    """Return the finding with the times, their share and the size of the extra wrench."""
+def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: Mask, unlike_hands: bool) -> Finding:
+    """Return the finding with the times, their share and the size of the extra wrench.
+
+    unlike_hands  whether the words leave open why the wrench does not fit one body
+    """
     half = float(np.median(np.diff(slices.time))) / 2
-    spans = [(slices.time[a] - half, slices.time[b - 1] + half) for a, b in _runs(~kept)]
+    spans = [(slices.time[a] - half, slices.time[b - 1] + half) for a, b in runs(~kept)]
     named = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in spans[:5]) + (
         f" and {len(spans) - 5} more" if len(spans) > 5 else ""
     )
+    share = f"{100 * (1 - kept.mean()):.0f} % of the time"
+    what, left_out = "Something else than the robot touched the object", share
+    if unlike_hands:
+        what, left_out = f"The wrench does not fit one body in {share},", "that time"
     text = (
-        f"{TOUCHED} {named} s, with up to "
-        f"{max(t.force for t in touches):.2g} N and {max(t.torque for t in touches):.2g} N m; "
-        f"{100 * (1 - kept.mean()):.0f} % of the time was left out."
+        f"{what} at {named} s, with up to {max(t.force for t in touches):.2g} N and "
+        f"{max(t.torque for t in touches):.2g} N m; {left_out} was left out."
     )
     if _swappable(slices, found, touches):
         text += (
             " A constant wrench fits as well, so it may be these times that were free and the others that were touched;"
             " mass and centre of mass are the same either way, the bias is not."
         )
-    return Finding.of("contact", text)
+    finding = Finding.of("contact", text)
+    return replace(finding, remedy=ALL_ELSE) if unlike_hands else finding
 
 
 def _unlike_hands(kept: Mask, moving: Mask) -> bool:
@@ -268,14 +268,6 @@ def _unlike_hands(kept: Mask, moving: Mask) -> bool:
     together = (out & moving).sum()
     in_motion = 0 < moving.mean() < 1 and together > MOVING * moving.sum() and together > 0.5 * out.sum()
     return bool(out.mean() > MUCH or in_motion)
-
-
-def _misfit(finding: Finding, kept: Mask) -> Finding:
-    """Return the finding in words that leave open why the wrench does not fit one body."""
-    share = f"{100 * (1 - kept.mean()):.0f} % of the time"
-    text = finding.message.replace(TOUCHED, f"The wrench does not fit one body in {share}, at", 1)
-    text = text.replace(f"; {share} was left out", "; that time was left out", 1)
-    return replace(finding, message=text, remedy=ALL_ELSE)
 
 
 def _swappable(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> bool:

@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.alignment_findings import planar_finding
+from steelyard.logs.runs import picked
 
 # Directions closer than this are one [rad]; three are the bare minimum, the fourth is the first check.
 APART, FEWEST = np.radians(20.0), 4
@@ -30,7 +31,7 @@ def coverage(gravity: Array) -> tuple[Finding, ...]:
 
 def directions(gravity: Array) -> Array:
     """Return unit vectors (K, 3) of gravity (N, 3), each more than 20 degrees from every other."""
-    pick = np.unique(np.linspace(0, len(gravity) - 1, min(len(gravity), _MOST_ROWS)).astype(int))
+    pick = picked(len(gravity), _MOST_ROWS)
     units = gravity[pick] / np.maximum(np.linalg.norm(gravity[pick], axis=1, keepdims=True), 1e-12)
     found = units[:1]
     # Farthest first: each new direction is the one that the others cover least.

@@ -14,6 +14,7 @@ from steelyard.check import Array
 from steelyard.identify.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
+from steelyard.logs.runs import picked
 from steelyard.spatial import cross_matrix
 
 _MOST_ROWS = 3000
@@ -53,7 +54,7 @@ class Rows:
 
         drift  whether six more columns let the bias grow with time
         """
-        pick = np.unique(np.linspace(0, len(log) - 1, min(len(log), _MOST_ROWS)).astype(np.int64))
+        pick = picked(len(log), _MOST_ROWS)
         thin = log.rows(pick)
         rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
         if drift:

@@ -170,12 +170,11 @@ def _area_at(time: Array, values: Array, area: Array, at: Array) -> Array:
 def _wrench(recording: Recording, stream: Stream) -> tuple[Array, bool]:
     """Return [tau, f] (N, 6) on-object in the stream's axes turned into S, and whether they are W axes."""
     torque, force = stream.channels["torque"], stream.channels["force"]
-    mount = stream.mount
     world = stream.frames.get("force", "S") == "W"
-    if mount is not None and mount.rotation is not None and not world:
-        torque, force = mount.rotation.apply(torque), mount.rotation.apply(force)
-    if mount is not None and mount.position is not None and not world:
-        torque = torque + np.cross(mount.position, force)
+    if stream.turn is not None and not world:
+        torque, force = stream.turn.apply(torque), stream.turn.apply(force)
+    if stream.arm is not None and not world:
+        torque = torque + np.cross(stream.arm, force)
     return recording.wrench_sign * np.concatenate([torque, force], 1), world
 
 
@@ -199,10 +198,9 @@ def _pull_channel(recording: Recording, values: list[Array], wrench: Array) -> A
     if found is None or not values:
         return None
     stream, quantity, _ = found
-    turn = None if stream.mount is None else stream.mount.rotation
     if quantity == "gravity":
-        return values[0] if turn is None else turn.apply(values[0])
-    return -(turn or first_mount(values[0], None, wrench[:, 3:])).apply(values[0])
+        return values[0] if stream.turn is None else stream.turn.apply(values[0])
+    return -(stream.turn or first_mount(values[0], None, wrench[:, 3:])).apply(values[0])
 
 
 def _loose(recording: Recording) -> bool:
@@ -210,8 +208,7 @@ def _loose(recording: Recording) -> bool:
     found = next(iter(channel(recording, "gravity", "specific_force")), None)
     if found is None or found[1] == "gravity":
         return False
-    mount = found[0].mount
-    return mount is None or mount.rotation is None
+    return found[0].turn is None
 
 
 def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:

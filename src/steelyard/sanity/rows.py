@@ -14,6 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.runs import runs
 from steelyard.spatial import cross_matrix
 
 Mask = np.ndarray[Any, np.dtype[np.bool_]]
@@ -108,15 +109,14 @@ def dead_channels(recording: Recording) -> tuple[bool, ...]:
     """
     dead = np.array(recording.dead)
     for stream in (s for s in recording.streams if "force" in s.channels and s.time is not None):
-        turned = stream.mount is not None and stream.mount.rotation is not None
-        if turned or len(stream) < 4 * FROZEN_ROWS:
+        if stream.turn is not None or len(stream) < 4 * FROZEN_ROWS:
             continue
         for k, quantity in enumerate(("torque", "force")):
             if quantity in stream.channels and stream.frames.get(quantity, "S") == "S":
                 dead[3 * k : 3 * k + 3] |= _dead(stream.channels[quantity])
-        if stream.mount is not None and stream.mount.position is not None:
+        if stream.arm is not None:
             # Moments about the S origin take from the force.
-            dead[:3] |= (cross_matrix(stream.mount.position) != 0) @ dead[3:]
+            dead[:3] |= (cross_matrix(stream.arm) != 0) @ dead[3:]
     return tuple(bool(d) for d in dead)
 
 
@@ -135,15 +135,14 @@ def _hung_rows(stream: Stream) -> Mask:
     same = (values[1:] == values[:-1]).all(1)
     length = _run_length(same)
     long = length >= _rows_needed(stream.time)
-    starts = np.flatnonzero(np.diff(long.astype(np.int8), prepend=0) == 1)
-    ends = np.flatnonzero(np.diff(long.astype(np.int8), append=0) == -1)
-    if not 1 <= len(starts) <= 3 or same[~long].mean() > 0.05:
+    held = runs(long)
+    if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
         return none
     steps = np.abs(np.diff(values, axis=0))
     typical = np.maximum(np.median(steps[~long], 0), 1e-300)
-    for start, end in zip(starts, ends, strict=True):
-        if end + 1 < len(steps) and (steps[end + 1] > 5 * typical).any():
-            none[start : end + 2] = True
+    for start, stop in held:
+        if stop < len(steps) and (steps[stop] > 5 * typical).any():
+            none[start : stop + 1] = True
     return none
 
 
@@ -153,11 +152,12 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     for quantity in (q for q in _MEASURED if q in stream.channels):
         values = stream.channels[quantity]
         noisy = _noise_shares(values) > NOISE_SHARE
-        for axis in np.flatnonzero(noisy):
+        for axis in np.flatnonzero(noisy).tolist():
             for extreme in (values[:, axis].min(), values[:, axis].max()):
                 rows = _clipped_rows(values[:, axis], float(extreme))
                 if rows.any():
-                    found.append(_saturated(stream, quantity, int(axis), float(extreme), rows))
+                    count = int(rows.sum())
+                    found.append(_saturated(stream, quantity, axis, extreme, count, "these were left out"))
                     clipped |= rows
     if clipped.mean() > 0.7:
         clipped[:] = False
@@ -198,19 +198,16 @@ def _more_than_chance(equal: Mask, again: Mask, counted: Mask) -> bool:
 
 def _run_length(mask: Mask) -> np.ndarray[Any, np.dtype[np.int64]]:
     """Return for each true entry the length of its run of true entries, zero elsewhere."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], mask.astype(np.int8), [0]])))
-    starts, ends = edges[::2], edges[1::2]
-    out = np.zeros(len(mask) + 1, np.int64)
-    np.add.at(out, starts, ends - starts)
-    np.add.at(out, ends, starts - ends)
-    return np.asarray(np.cumsum(out)[:-1])
+    lengths = np.ptp(runs(mask), axis=1)
+    out = np.zeros(len(mask), np.int64)
+    out[mask] = np.repeat(lengths, lengths)
+    return out
 
 
 def _longest(repeat: Mask) -> int:
     """Return how long a run of repeats may be: more where a fast logger holds every sample for many rows."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[0], repeat.astype(np.int8), [0]])))
-    runs = edges[1::2] - edges[::2]
-    return max(LONGEST_RUN, 2 * int(np.median(runs))) if len(runs) > 20 else LONGEST_RUN
+    lengths = np.ptp(runs(repeat), axis=1)
+    return max(LONGEST_RUN, 2 * int(np.median(lengths))) if len(lengths) > 20 else LONGEST_RUN
 
 
 def _many(stamped: Mask) -> bool:
@@ -272,13 +269,12 @@ def _stuck(stream: Stream, name: str, what: str) -> Finding:
     return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}{left_out}.")
 
 
-def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: Mask) -> Finding:
-    message = (
-        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {int(rows.sum())} of "
-        f"{len(rows)} rows; "
-        "these were left out."
+def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: int, then: str) -> Finding:
+    return Finding.of(
+        "channel-saturated",
+        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {rows} of "
+        f"{len(stream)} rows; {then}.",
     )
-    return Finding.of("channel-saturated", message)
 
 
 def _kept(stream: Stream, rows: Mask) -> Stream:
@@ -325,7 +321,5 @@ def _clipped_table(stream: Stream) -> list[Finding]:
             values, counts = np.unique(column, return_counts=True)
             for end in (0, -1):
                 if len(values) > 4 and counts[end] >= 3 and np.delete(counts, end).max() == 1:
-                    at = column == values[end]
-                    found = _saturated(stream, quantity, axis, float(values[end]), at)
-                    out.append(replace(found, message=found.message.replace("these were left out", "check them")))
+                    out.append(_saturated(stream, quantity, axis, values[end], int(counts[end]), "check them"))
     return out

@@ -132,8 +132,7 @@ def _sure(value: Array, std: Array, least: float, better: bool) -> bool:
 
 
 def _turn(found: SensorMatrix, stream: Stream) -> tuple[Finding, ...]:
-    given = stream.mount.rotation if stream.mount is not None else None
-    right = Rotation.exp(-found.turn) if given is None else Rotation.exp(-found.turn) @ given
+    right = Rotation.exp(-found.turn) if stream.turn is None else Rotation.exp(-found.turn) @ stream.turn
     numbers = ", ".join(f"{v:.4f}" for v in right.log() + 0.0)
     size, spread = np.linalg.norm(found.turn), np.linalg.norm(found.turn_std)
     message = (

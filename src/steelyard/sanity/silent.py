@@ -26,7 +26,7 @@ def without_silent(recording: Recording) -> tuple[Recording, tuple[Finding, ...]
     if view is None or view.rate is None or view.world or any(recording.dead):
         return recording, ()
     stream = next(s for s in recording.streams if {"force", "torque"} <= set(s.channels))
-    turned = stream.mount is not None and (stream.mount.rotation is not None or stream.mount.position is not None)
+    turned = stream.turn is not None or stream.arm is not None
     rows = [] if turned else [(*_worst(view, recording.gravity, part), part) for part in (0, 1)]
     silent = [(axis, part, seen, due) for axis, seen, due, part in rows if seen < QUIET * due and due > LEAST[part]]
     dead, found = list(recording.dead), []

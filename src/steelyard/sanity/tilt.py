@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.sanity.glance import Glance, Integers, Seen
 from steelyard.sanity.static_fit import beside, fit, leave_out, solve
-from steelyard.spatial import Rotation
+from steelyard.spatial import Rotation, axial_vector
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
@@ -126,7 +126,7 @@ def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
         return None
     seen, force, down = force_and_weight(view, gravity, mass)
     X = Rotation.aligning(force.T @ down).matrix
-    axis = np.array([X[2, 1] - X[1, 2], X[0, 2] - X[2, 0], X[1, 0] - X[0, 1]]) / 2
+    axis = axial_vector(X) / 2
     angle = float(np.arctan2(np.linalg.norm(axis), (np.trace(X) - 1) / 2))
     _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
     return Turn(angle, axis / max(float(np.linalg.norm(axis)), 1e-12), share)

@@ -20,8 +20,8 @@ NEIGHBOURS = 10
 _ALIKE = 1e-6  # added to a cost that may be zero: a sparse matrix holds no zero
 
 
-def tangent_normals(xyz: Array, k: int = NEIGHBOURS) -> Array:
-    """Return unit normals (N, 3) of points (N, 3) [m]: the thin direction of the k nearest, all turned alike.
+def tangent_normals(xyz: Array) -> Array:
+    """Return unit normals (N, 3) of points (N, 3) [m]: the thin direction of the nearest, all turned alike.
 
     Every separate piece of the neighbour graph is turned so that its highest point looks up. Raises BadValue for
     fewer than four points.
@@ -29,7 +29,7 @@ def tangent_normals(xyz: Array, k: int = NEIGHBOURS) -> Array:
     xyz = check.vectors("points", xyz)
     if xyz.ndim != 2 or len(xyz) < 4:
         raise BadValue(f"normals need at least 4 points (N, 3); got {xyz.shape}.")
-    near = cKDTree(xyz).query(xyz, min(k, len(xyz)))[1]
+    near = cKDTree(xyz).query(xyz, min(NEIGHBOURS, len(xyz)))[1]
     return consistent(xyz, plane_normals(xyz, near), near)
 
 

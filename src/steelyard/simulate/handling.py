@@ -115,18 +115,16 @@ def _slow_turn(reach: float) -> float:
     return float(1.001 * speed.max() / TIP_SPEED)
 
 
-def motion_arrays(
-    variant: str = "paper", body: InertialParameters | None = None, *, rate: float = RATE_HZ, reach: float = REACH
-) -> dict[str, Array]:
-    """Return the noise-free columns of an object folder's `motion.npz`, sampled at `rate` [Hz], N rows.
+def motion_arrays(variant: str = "paper", body: InertialParameters | None = None) -> dict[str, Array]:
+    """Return the noise-free columns of an object folder's `motion.npz`, N rows at 100 Hz.
 
     time (N,) [s], rotation_world_from_sensor (N, 3, 3), position_world (N, 3) [m], and in S axes (N, 3)
     linear_velocity_sensor, angular_velocity_sensor, linear_acceleration_sensor, angular_acceleration_sensor (classical,
     of the S origin, gravity not included) and gravity_sensor. With a `body` in S also force_sensor and torque_sensor,
     what the robot applies to it.
     """
-    motion, duration = handling_motion(variant, reach)
-    seen = motion.at(np.arange(round(duration * rate)) / rate)
+    motion, duration = handling_motion(variant)
+    seen = motion.at(np.arange(round(duration * RATE_HZ)) / RATE_HZ)
     log = exact_log(seen, body)
     columns = {
         "time": seen.time,
@@ -169,21 +167,19 @@ def handling_log(
     seed: int = 0,
     *,
     disturbance: Disturbance = NOTHING,
-    rate: float = RATE_HZ,
-    reach: float = REACH,
 ) -> MotionLog:
     """Return the ordered log of handling `body` (ten parameters in S), with seeded noise.
 
     `noise` is a scenario of `NOISE` or four standard deviations of angular acceleration, acceleration, force, torque;
     gravity in S and angular velocity stay exact. The log declares its noise where there is any on every channel.
     """
-    motion, duration = handling_motion(variant, reach)
-    time = np.arange(round(duration * rate)) / rate
+    motion, duration = handling_motion(variant)
+    time = np.arange(round(duration * RATE_HZ)) / RATE_HZ
     log = exact_log(motion.at(time), body)
     if disturbance.latency:
         late = exact_log(motion.at(np.maximum(time - disturbance.latency, 0.0)), body)
         log = replace(log, wrench=late.wrench)
-    noisy = with_noise(log, noise, np.random.default_rng(seed), disturbance.spectrum, rate)
+    noisy = with_noise(log, noise, np.random.default_rng(seed), disturbance.spectrum)
     return replace(noisy, wrench=_as_read(noisy.wrench, time, disturbance))
 
 
@@ -192,12 +188,11 @@ def with_noise(
     noise: str | tuple[float, float, float, float],
     rng: np.random.Generator,
     spectrum: Spectrum = "white",
-    rate: float = RATE_HZ,
 ) -> MotionLog:
     """Return a noise-free log with noise on both accelerations and the wrench, declared where it is above zero."""
     std = noise_std(noise)
     angular, linear, force, torque = std
-    drawn = unit_noise(rng, len(log), 12, spectrum, rate) * np.repeat([angular, linear, torque, force], 3)
+    drawn = unit_noise(rng, len(log), 12, spectrum, RATE_HZ) * np.repeat([angular, linear, torque, force], 3)
     return replace(
         log,
         wrench=log.wrench + drawn[:, 6:],

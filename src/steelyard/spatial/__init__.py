@@ -2,6 +2,24 @@
 
 from steelyard.spatial.pose import Pose
 from steelyard.spatial.rotation import Rotation
-from steelyard.spatial.vectors import Acceleration, Twist, Wrench, cross, cross_matrix
+from steelyard.spatial.vectors import (
+    Acceleration,
+    Twist,
+    Wrench,
+    axial_vector,
+    cross,
+    cross_matrix,
+    lever_acceleration,
+)
 
-__all__ = ["Acceleration", "Pose", "Rotation", "Twist", "Wrench", "cross", "cross_matrix"]
+__all__ = [
+    "Acceleration",
+    "Pose",
+    "Rotation",
+    "Twist",
+    "Wrench",
+    "axial_vector",
+    "cross",
+    "cross_matrix",
+    "lever_acceleration",
+]

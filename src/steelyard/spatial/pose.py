@@ -16,7 +16,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.spatial.rotation import Rotation
-from steelyard.spatial.vectors import Acceleration, Twist, Wrench, cross
+from steelyard.spatial.vectors import Acceleration, Twist, Wrench, cross, lever_acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -110,7 +110,7 @@ class Pose:
         The point moves by -p_AB, so a_A = R a_B - alpha x p - omega x (omega x p), all in A's axes.
         """
         omega, alpha = self.rotation.apply(angular_velocity), self.rotation.apply(acceleration.angular)
-        lever = cross(alpha, self.position) + cross(omega, cross(omega, self.position))
+        lever = lever_acceleration(omega, alpha, self.position)
         return Acceleration(alpha, self.rotation.apply(acceleration.linear) - lever)
 
     def __getitem__(self, index: Any) -> Pose:

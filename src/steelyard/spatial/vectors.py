@@ -20,6 +20,14 @@ def cross(a: Array, b: Array) -> Array:
     return np.stack([a1 * b2 - a2 * b1, a2 * b0 - a0 * b2, a0 * b1 - a1 * b0], axis=-1)
 
 
+def lever_acceleration(omega: Array, alpha: Array, p: Array) -> Array:
+    """Return alpha x p + omega x (omega x p): how much more a body's point at p (..., 3) accelerates than its origin.
+
+    omega [rad/s], alpha [rad/s^2] and p [m] are of broadcast shapes (..., 3) and in the same axes.
+    """
+    return np.asarray(cross(alpha, p) + cross(omega, cross(omega, p)))
+
+
 def cross_matrix(vector: ArrayLike) -> Array:
     """Return [v]x of shape (..., 3, 3), so that [v]x u = v x u."""
     v = np.asarray(vector, dtype=np.float64)
@@ -27,6 +35,11 @@ def cross_matrix(vector: ArrayLike) -> Array:
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return out
+
+
+def axial_vector(matrix: Array) -> Array:
+    """Return the vector (3,) of which [v]x is M - M^T, of a matrix M (3, 3): of a rotation, 2 sin(angle) axis."""
+    return np.array([matrix[2, 1] - matrix[1, 2], matrix[0, 2] - matrix[2, 0], matrix[1, 0] - matrix[0, 1]])
 
 
 @dataclass(frozen=True, eq=False)

@@ -158,6 +158,16 @@ class Models:
         phi[told_of], covariance[told_of] = _answers(full[told_of], noise, (scale * right)[told_of])
         return cls(scale * phi, unit * covariance, plain, share, np.asarray(chi2), H, g, narrow, kind, common[which])
 
+    def mean(self) -> Array:
+        """Return the parameters (P,), averaged over sizes by their evidence."""
+        return np.asarray(self.share @ self.phi)
+
+    def covariance_about(self, phi: Array) -> Array:
+        """Return the covariance (P, P) of parameters told as `phi` (P,): that of every size, and how they differ."""
+        off = self.phi - phi
+        apart = np.einsum("l,lp,lq->pq", self.share, off, off)
+        return np.asarray(np.tensordot(self.share, self.covariance, 1) + apart)
+
     def recordings(self, model: int) -> Recordings:
         """Return the biases of all recordings in one model."""
         size = self.phi.shape[1]
@@ -212,6 +222,11 @@ def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
     lost = vectors * ~shown[:, None]
     covariance = inverse @ full @ inverse + lost @ lost.swapaxes(1, 2)
     return (inverse @ right[..., None])[..., 0], covariance
+
+
+def condition_of(values: Array, shown: Mask) -> float:
+    """Return the condition number of the rising information (P,) in what is shown, infinite where nothing is."""
+    return float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
 
 
 def shown_of(values: Array, vectors: Array, noise: Array) -> Mask:

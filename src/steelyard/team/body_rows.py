@@ -18,6 +18,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.log import Mask
+from steelyard.logs.runs import runs
 from steelyard.spatial import Pose, Rotation, cross, cross_matrix
 from steelyard.team.stacked import Stretch
 from steelyard.team.turns import turns_between
@@ -116,10 +117,9 @@ def _runs(good: Mask, part: Stretch, still: bool, highest_hz: float) -> list[sli
     change = np.zeros(len(good), np.bool_)
     if not still:
         change[1:] = (part.seen[1:] != part.seen[:-1]).any(1)
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], good, [False]]).astype(np.int8)))
     least = max(3.0, (0.0 if still else LEAST_CYCLES) * part.rate / highest_hz)
     out = []
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in runs(good):
         inner = [start, *(start + np.flatnonzero(change[start + 1 : stop]) + 1), stop]
         out += [slice(int(a), int(b)) for a, b in pairwise(inner) if b - a >= least]
     return out

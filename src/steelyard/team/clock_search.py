@@ -7,15 +7,15 @@ the shift at which their robots turn alike. A fit starts anew from there, and is
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
+from steelyard.team.stacked import punctual
 from steelyard.team.turning_speed import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps of STEP_S.
@@ -60,11 +60,7 @@ def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
 
 def begun_from(log: TeamLog, lags: Mapping[str, float]) -> TeamLog:
     """Return the log with every robot's stamps moved by the seconds that they are late; others are punctual."""
-    return log.with_recordings(*(_punctual(recording, lags) for recording in log.recordings))
-
-
-def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
-    return replace(recording, tracks={n: t.shifted(-late.get(n, 0.0)) for n, t in recording.tracks.items()})
+    return log.with_recordings(*(punctual(recording, lags) for recording in log.recordings))
 
 
 def far_lags(log: TeamLog) -> dict[str, float]:

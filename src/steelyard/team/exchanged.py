@@ -17,7 +17,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.pose_fit import ROUGHLY, fit_poses
 from steelyard.team.pose_start import first_team
-from steelyard.team.poses import TeamMotion
+from steelyard.team.poses import TeamMotion, in_words
 from steelyard.team.stacked import Stretch, all_poses, stretches
 
 # Rows of a recording that are enough to tell; exchanges that are tried at most.
@@ -33,7 +33,7 @@ def require_own_files(log: TeamLog) -> None:
     """
     names, reference = log.names, log.names.index(log.reference)
     parts = stretches(log, {})
-    few = tuple(_thinned(part) for part in parts)
+    few = tuple(part.thinned(ROWS) for part in parts)
     as_given = _noise(few, names, reference)
     tried = list(_exchanges(few))
     if as_given is None or len(tried) > MOST:
@@ -49,8 +49,8 @@ def require_own_files(log: TeamLog) -> None:
     where = " or ".join(f"'{part.name}'" for part in (parts if len(parts) == 2 else parts[number : number + 1]))
     raise BadValue(
         f"the files of '{names[i]}' and '{names[j]}' look exchanged in {where}: with each in the other's place, "
-        f"what robots say of their poses differs by {_size(noise)}, as given by {_size(as_given)}. Exchange their "
-        '"path" there.'
+        f"what robots say of their poses differs by {in_words(noise)}, as given by {in_words(as_given)}. "
+        'Exchange their "path" there.'
     )
 
 
@@ -63,11 +63,6 @@ def _exchanges(parts: Sequence[Stretch]) -> list[tuple[int, tuple[int, int]]]:
         for i, j in combinations(range(parts[0].seen.shape[1]), 2)
         if parts[number].seen[:, i].any() or parts[number].seen[:, j].any()
     ]
-
-
-def _thinned(part: Stretch) -> Stretch:
-    rows = slice(None, None, max(1, len(part) // ROWS))
-    return replace(part, time=part.time[rows], poses=part.poses[rows], seen=part.seen[rows])
 
 
 def _exchanged(part: Stretch, i: int, j: int) -> Stretch:
@@ -85,8 +80,3 @@ def _noise(parts: tuple[Stretch, ...], names: tuple[str, ...], reference: int) -
         return fit_poses(data, first_team(data, reference, names), reference, close=ROUGHLY).noise
     except (CannotAnswer, BadValue, np.linalg.LinAlgError):
         return None
-
-
-def _size(noise: Array) -> str:
-    turn, place = np.sqrt((noise**2).mean(0))
-    return f"{np.rad2deg(turn):.2g} deg and {1e3 * place:.2g} mm"

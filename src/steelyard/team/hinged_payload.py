@@ -13,9 +13,17 @@ from itertools import pairwise
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, shown_of, without_gain
+from steelyard.team.bias_models import (
+    Models,
+    Recordings,
+    condition_of,
+    gain_spread,
+    ladder_of,
+    shown_of,
+    without_gain,
+)
 from steelyard.team.hinged_rows import BIAS, COUNT, Bands, Sums, noisy
-from steelyard.team.payload_model import ROUNDING, Normal
+from steelyard.team.payload_model import Normal, least_noise
 
 ROUNDS = 12
 SETTLED = 0.01
@@ -102,7 +110,7 @@ def fit_hinged_payload(
         normals = [_normal(p, k, W, sums, number > 0) for k, W in zip(kinds, weights, strict=True) for p in k.parts]
         models = Models.of(normals, C, ladder, scale)
         weight = models.share
-        phi, best = weight @ models.phi, int(np.argmax(weight))
+        phi, best = models.mean(), int(np.argmax(weight))
         if number == 0:
             scale = _units(max(abs(float(phi[0])), 1e-3), size)
         beside = models.recordings(best)
@@ -115,14 +123,13 @@ def fit_hinged_payload(
         if (number > 1 and change < SETTLED) or number == ROUNDS - 1:
             break
         kinds = renewed
-    off = models.phi - phi
-    covariance = np.tensordot(weight, models.covariance, 1) + np.einsum("l,lp,lq->pq", weight, off, off)
+    covariance = models.covariance_about(phi)
     noise = sum((n.noise for n in normals), np.zeros((COUNT, COUNT))) * np.outer(scale, scale)
     values, vectors = np.linalg.eigh(models.information[best] * np.outer(scale, scale) - noise)
     shown = shown_of(values, vectors, noise)
     root = scale[:, None] * vectors[:, shown]
     rows = 7 * sum(float(p.rows.sum()) for k in kinds for p in k.parts)
-    condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
+    condition = condition_of(values, shown)
     blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
     return HingedPayload(
         phi, covariance, vectors[:, ~shown], scale, (root / values[shown]) @ root.T,
@@ -174,5 +181,4 @@ def _judged(kind: Kind, W: Array, V: Array, beside: Recordings, start: int) -> K
             seen[band] += float(np.einsum("nip,ij,njp->", pulled, V, pulled, optimize=True))
             size[band] += len(z) * float(np.trace(W[band] @ V))
     share = np.where(size > 0, seen / np.maximum(size, 1e-300), 1.0)
-    least = (ROUNDING * abs(phi[0]) * 9.81) ** 2
-    return Kind(kind.parts, kind.motion, np.maximum(kind.force * share, least))
+    return Kind(kind.parts, kind.motion, np.maximum(kind.force * share, least_noise(phi)))

@@ -233,13 +233,11 @@ class _Normal:
         return np.asarray(np.maximum(noise * np.sqrt(np.exp(np.clip(step, -3.0, 3.0))), LEAST))
 
 
-def fit_hinged(
-    data: TeamMotion, start: Hinged, reference: int, noise: Array, speed: Array | None, steps: int = STEPS
-) -> HingedFit:
+def fit_hinged(data: TeamMotion, start: Hinged, reference: int, noise: Array, speed: Array | None) -> HingedFit:
     """Return the optimum near `start`; delays are estimated where the motion's `speed` (T, 7) is given."""
     count, team = data.count, start
     unknown = _unknown(count, reference, speed is not None)
-    for _ in range(steps):
+    for _ in range(STEPS):
         now = _Normal.of(data, team, noise, speed)
         H, pull = now.H[np.ix_(unknown, unknown)], now.scores[:, unknown].sum(0)
         inverse, null = _inverse(H)

@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, axial_vector
 from steelyard.team.hinged_poses import Hinged
 from steelyard.team.poses import TeamMotion
 
@@ -20,7 +20,7 @@ def from_twists(first: Array, second: Array) -> Pose:
     M = np.linalg.lstsq(first, second, rcond=1e-6)[0].T
     turn = Rotation.nearest(M[:3, :3].T)
     lever = -turn.matrix @ M[3:, :3]
-    return Pose(turn, 0.5 * np.array([lever[2, 1] - lever[1, 2], lever[0, 2] - lever[2, 0], lever[1, 0] - lever[0, 1]]))
+    return Pose(turn, 0.5 * axial_vector(lever))
 
 
 def first_hinged(

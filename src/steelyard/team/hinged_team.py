@@ -30,7 +30,7 @@ from steelyard.team.hinged_rows import COUNT, WHOLE, Bands, Sums, bodies_of, gat
 from steelyard.team.hinged_signs import robot_of_other_sign
 from steelyard.team.hinged_start import first_hinged
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
-from steelyard.team.motion_noise import shares_of
+from steelyard.team.motion_noise import shares_of, tilt_noise
 from steelyard.team.payload_doubt import turned_by_step
 from steelyard.team.pose_statistic import OWN
 from steelyard.team.pose_team import CLOCK_ROUNDS, FEW_ROWS, PUNCTUAL, mean_gravity
@@ -231,9 +231,7 @@ def _motion_noise(ones: list[BodyRows], left: list[Array], fit: HingedFit, edges
     out = np.zeros((len(edges), 7, 7))
     if not ones[0].still:
         out += shares[2, :, None, None] * path
-    down = np.mean([run.motion[:, 3:6].mean(0) for body in ones for run in body.runs], axis=0)
-    tilt = cross_matrix(down) @ path[:3, :3] @ cross_matrix(down).T
-    out[:, 3:6, 3:6] += shares[0, :, None, None] * tilt
+    out[:, 3:6, 3:6] += shares[0, :, None, None] * tilt_noise(ones, path)
     return out
 
 

@@ -20,7 +20,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team.clock_search import begun_from, far_lags
 from steelyard.team.pose_fit import GUESS, ROUGHLY, Rows, fit_poses
 from steelyard.team.pose_start import first_team
-from steelyard.team.poses import TeamMotion
+from steelyard.team.poses import TeamMotion, in_words
 from steelyard.team.stacked import Stretch, all_poses, stretches
 from steelyard.team.turns import turns_between
 
@@ -101,7 +101,7 @@ def require_well_read(log: TeamLog) -> None:
     """
     names, reference = log.names, log.names.index(log.reference)
     try:
-        parts = tuple(_thinned(part) for part in stretches(begun_from(log, far_lags(log)), {}))
+        parts = tuple(part.thinned(ROWS) for part in stretches(begun_from(log, far_lags(log)), {}))
     except BadValue:
         return
     judge = _Judge(names, reference)
@@ -203,12 +203,6 @@ class _Judged:
         """Whether shares are smaller by a factor: all of them (rms), or the largest, as others are noisy either way."""
         return self.cost < given.cost - np.log(factor) or self.worst < given.worst / factor
 
-    @property
-    def words(self) -> str:
-        """How far robots are apart."""
-        turn, place = np.sqrt((self.noise**2).mean(0))
-        return f"{np.rad2deg(turn):.2g} deg and {1e3 * place:.2g} mm"
-
 
 @dataclass(frozen=True)
 class _Judge:
@@ -258,11 +252,6 @@ def _size(data: TeamMotion) -> Array:
     return np.maximum(out, [STILL, 1e-12])
 
 
-def _thinned(part: Stretch) -> Stretch:
-    rows = slice(None, None, max(1, len(part) // ROWS))
-    return replace(part, time=part.time[rows], poses=part.poses[rows], seen=part.seen[rows])
-
-
 def _words(best: list[tuple[Try, _Judged]], names: tuple[str, ...], recordings: Sequence[str], given: _Judged) -> str:
     """Return what is wrong, or may be, and what to do."""
     said = []
@@ -272,5 +261,5 @@ def _words(best: list[tuple[Try, _Judged]], names: tuple[str, ...], recordings: 
     remedies = dict.fromkeys(one.reading.remedy for one, _ in best)
     return (
         f"the robots' poses do not fit one payload, and do so if {' or if '.join(said)}: what they say of it then "
-        f"differs by {best[0][1].words}, as given by {given.words}. {' '.join(remedies)}"
+        f"differs by {in_words(best[0][1].noise)}, as given by {in_words(given.noise)}. {' '.join(remedies)}"
     )

@@ -29,10 +29,14 @@ def motion_noise(
     if not recordings[0].still:
         out += shares[order, :, None, None] * path
     if order == 2:
-        down = np.mean([run.motion[:, 3:6].mean(0) for r in recordings for run in r.runs], axis=0)
-        tilt = cross_matrix(down) @ path[:3, :3] @ cross_matrix(down).T
-        out[:, 3:, 3:] += shares[0, :, None, None] * tilt
+        out[:, 3:, 3:] += shares[0, :, None, None] * tilt_noise(recordings, path)
     return out
+
+
+def tilt_noise(recordings: Sequence[BodyRows], path: Array) -> Array:
+    """Return the covariance (3, 3) of gravity in the body from that of its turns, the first of a path's row."""
+    down = np.mean([run.motion[:, 3:6].mean(0) for recording in recordings for run in recording.runs], axis=0)
+    return np.asarray(cross_matrix(down) @ path[:3, :3] @ cross_matrix(down).T)
 
 
 def shares_of(recordings: Sequence[BodyRows], residuals: Sequence[Array], edges: Array, highest_hz: float) -> Array:

@@ -15,8 +15,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
-from steelyard.team.bias_models import Models, Recordings, gain_spread, ladder_of, shown_of, without_gain
-from steelyard.team.payload_model import ROUNDING, Group, normal, residual_scatter
+from steelyard.team.bias_models import Models, Recordings, condition_of, gain_spread, ladder_of, shown_of, without_gain
+from steelyard.team.payload_model import Group, least_noise, normal, residual_scatter
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
 ROUNDS = 12
@@ -69,7 +69,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
         ]
         models = Models.of(normals, C, ladder, scale)
         weight = models.share
-        phi, best = weight @ models.phi, int(np.argmax(weight))
+        phi, best = models.mean(), int(np.argmax(weight))
         beside = models.recordings(best)
         renewed = tuple(_judged(g, D, beside, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
         change = max(
@@ -80,8 +80,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
         if not left or change < SETTLED:
             break
         groups = renewed
-    off = models.phi - phi
-    covariance = np.tensordot(weight, models.covariance, 1) + np.einsum("l,lp,lq->pq", weight, off, off)
+    covariance = models.covariance_about(phi)
     # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
     # in the noise already.
     last = groups[-1]
@@ -93,7 +92,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     unit = np.outer(scale, scale)
     values, vectors = np.linalg.eigh((models.information[best] - noise) * unit)
     shown = shown_of(values, vectors, noise * unit)
-    condition = float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
+    condition = condition_of(values, shown)
     return PayloadFit(
         phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, gain,
         without_gain(weight, ladder), groups, weights, blind, _residual(groups),
@@ -124,7 +123,7 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
         left += residual_scatter(part, D, first.solution(k), np.zeros((16, 16))).sum(0)
         count += float(part.judged_rows.sum())
     phi = first.phi
-    noise = np.maximum(left / max(count, 1.0), (ROUNDING * abs(phi[0]) * 9.81) ** 2 * unit)
+    noise = np.maximum(left / max(count, 1.0), least_noise(phi) * unit)
     return phi, tuple(replace(g, wrench_noise=np.tile(noise, (len(g.wrench_noise), 1))) for g in groups)
 
 
@@ -143,8 +142,8 @@ def _judged(group: Group, D: Array, beside: Recordings, start: int) -> Group:
     if thin.any() and not thin.all():
         seen[thin] = seen[~thin].mean(0)
     size = np.maximum((D[:, np.arange(D.shape[1]) % 6 >= 3] ** 2).mean(1), 1e-12)
-    seen = np.maximum(seen, (ROUNDING * abs(phi[0]) * 9.81) ** 2 * size)
-    least = np.maximum(0.02 * seen, (ROUNDING * abs(phi[0]) * 9.81) ** 2 * size)
+    seen = np.maximum(seen, least_noise(phi) * size)
+    least = np.maximum(0.02 * seen, least_noise(phi) * size)
     # Where the path errs less than was thought, its noise shrinks with it.
     share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
     return replace(

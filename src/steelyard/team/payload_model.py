@@ -22,6 +22,11 @@ from steelyard.team.spectra import Spectra
 ROUNDING = 1e-6
 
 
+def least_noise(phi: Array) -> float:
+    """Return the variance [N^2] below which no force's noise is judged, for a payload of parameters phi (P,)."""
+    return float((ROUNDING * abs(phi[0]) * 9.81) ** 2)
+
+
 @dataclass(frozen=True, eq=False)
 class Group:
     """Recordings of one kind with common bands, and the noise of each band in B's axes.

@@ -76,6 +76,12 @@ class TeamMotion:
         return [scatter(r.poses.rotation.matrix, r.poses.position, r.twists, r.valid) for r in every]
 
 
+def in_words(noise: Array) -> str:
+    """Return the rms over robots of the noise (N, 2) [rad, m] of their turns and places, in deg and mm."""
+    turn, place = np.sqrt((noise**2).mean(0))
+    return f"{np.rad2deg(turn):.2g} deg and {1e3 * place:.2g} mm"
+
+
 @dataclass(frozen=True, eq=False)
 class Team:
     """Where everything is.

@@ -16,6 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
+from steelyard.logs.runs import runs
 from steelyard.team.stacked import Stretch
 
 # A push below this share of the robot's usual one is idle where it stays so for IDLE_S [s]; forces are averaged over
@@ -49,9 +50,8 @@ def _smoothed(part: Stretch) -> Array:
 
 def _long(rows: Mask, least: float) -> Mask:
     """Return the runs of rows that last at least so many."""
-    edges = np.flatnonzero(np.diff(np.concatenate([[False], rows, [False]]).astype(np.int8)))
     out = np.zeros_like(rows)
-    for start, stop in zip(edges[::2], edges[1::2], strict=True):
+    for start, stop in runs(rows):
         if stop - start >= least:
             out[start:stop] = True
     return out
@@ -70,8 +70,7 @@ def let_go(part: Stretch, idle_rows: Mask, off: Array) -> Stretch:
     idle_rows, off = as_long(idle_rows, len(part)), as_long(off, len(part))
     carries, seen, felt = part.carries.copy(), part.seen.copy(), part.felt.copy()
     for i in range(idle_rows.shape[1]):
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], idle_rows[:, i], [False]]).astype(np.int8)))
-        for start, stop in zip(edges[::2], edges[1::2], strict=True):
+        for start, stop in runs(idle_rows[:, i]):
             there = part.seen[start:stop, i]
             # What stands still beside a payload at rest cannot be told from what holds it.
             if not there.any() or np.sqrt((off[start:stop, i][there] ** 2).mean()) < OFF:
@@ -90,9 +89,7 @@ def presence_findings(before: Sequence[Stretch], after: Sequence[Stretch], names
     out = []
     for was, now in zip(before, after, strict=True):
         for i, name in enumerate(names):
-            gone = was.carries[:, i] & ~now.carries[:, i]
-            edges = np.flatnonzero(np.diff(np.concatenate([[False], gone, [False]]).astype(np.int8)))
-            for start, stop in zip(edges[::2], edges[1::2], strict=True):
+            for start, stop in runs(was.carries[:, i] & ~now.carries[:, i]):
                 if start > 0:
                     text = f"'{name}' let go of the payload at {was.time[start]:.2f} s of '{was.name}'"
                     out.append(Finding.of("robot-left", f"{text}; from then on the others carry it."))

@@ -52,6 +52,12 @@ class Stretch:
         """Rows per second [Hz]."""
         return (len(self.time) - 1) / float(self.time[-1] - self.time[0])
 
+    def thinned(self, rows: int) -> Stretch:
+        """Return every k-th row, so that at least `rows` are left where there are as many."""
+        k = max(1, len(self) // rows)
+        names = ("time", "poses", "seen", "wrench", "felt", "carries")
+        return replace(self, **{name: getattr(self, name)[::k] for name in names})
+
 
 def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     """Return every recording with its clocks put right by `late` [s], seconds that each robot's stamps are late.
@@ -59,12 +65,13 @@ def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     Rows are told by the reference's clock as it is, whatever `late` says of it. Raises BadValue where the corrected
     clocks no longer overlap.
     """
-    made = tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+    made = tuple(_stretch(log, punctual(recording, late)) for recording in log.recordings)
     own = late.get(log.reference, 0.0)
     return tuple(replace(part, time=part.time + own) for part in made) if own else made
 
 
-def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
+def punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
+    """Return the recording with every robot's stamps moved by the seconds that they are late."""
     if not any(late.get(name) for name in recording.tracks):
         return recording
     return replace(recording, tracks={n: t.shifted(-late.get(n, 0.0)) for n, t in recording.tracks.items()})
@@ -108,7 +115,7 @@ def _between(track: Track, time: Array) -> bool:
     """Return whether poses and forces were measured at every stamp, and `time` (M,) is not the stamps."""
     whole = all(name in track.channels and bool(track.valid[name].all()) for name in ("rotation", "position", "force"))
     whole = whole and len(track) > 1 and bool(track.valid.get("torque", track.valid["force"]).all())
-    return whole and not (len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6))
+    return whole and not track.stamped_at(time)
 
 
 def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
@@ -126,7 +133,7 @@ def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
 def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:
     """Return a track's rotations at `time` (M,), and where they were measured."""
     good = track.valid["rotation"]
-    if good.all() and len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6):
+    if good.all() and track.stamped_at(time):
         return track.rotation, good
     vectors, turned = channel_at(track, "rotation", time)
     return mean_rotation(track) @ Rotation.exp(vectors), turned
@@ -138,7 +145,7 @@ def _place_at(track: Track, time: Array) -> tuple[Array, Mask]:
     A curve without overshoot depends on its axes: the grasp's own on average are taken, which no home changes.
     """
     good = track.valid["position"]
-    if good.all() and len(time) == len(track) and bool(np.abs(time - track.time).max() < 1e-6):
+    if good.all() and track.stamped_at(time):
         return track.channels["position"], good
     turn = mean_rotation(track)
     own = replace(track, channels={**track.channels, "position": turn.inverse().apply(track.channels["position"])})

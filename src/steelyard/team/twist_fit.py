@@ -18,7 +18,7 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Integers, Mask
-from steelyard.spatial import Pose, Rotation, cross_matrix
+from steelyard.spatial import Pose, Rotation, axial_vector, cross_matrix
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
 from steelyard.team.pose_covariance import Spread
 from steelyard.team.pose_fit import EXACT
@@ -174,7 +174,7 @@ def _position(S: Array, R: Array) -> tuple[Array, float]:
     u_u = S[3:6, 3:6] - S[3:6, 9:12] @ R.T - R @ S[9:12, 3:6] + R @ S[9:12, 9:12] @ R.T
     A = np.trace(q_q) * np.eye(3) - q_q
     # -sum [q]^T u = sum q x u, entry by entry.
-    b = np.array([u_q[2, 1] - u_q[1, 2], u_q[0, 2] - u_q[2, 0], u_q[1, 0] - u_q[0, 1]])
+    b = axial_vector(u_q)
     p = np.linalg.solve(A + (1e-3 * np.trace(A) + 1e-300) * np.eye(3) * 1e-3, b)
     left = float(np.trace(u_u) - 2 * p @ b + p @ A @ p)
     turned = _turned(S, R)

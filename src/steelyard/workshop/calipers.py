@@ -16,7 +16,7 @@ from steelyard.workshop.materials import (
     STAINLESS_STEEL,
 )  # fmt: skip
 from steelyard.workshop.solids import Solid, block, knurled, prism, rod, rounded, union
-from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
+from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool, scaled
 
 _BUTTONS = ((200, 60, 50), (60, 120, 200), (225, 225, 225))
 
@@ -67,5 +67,5 @@ def electronic_caliper(draw: Draw) -> Tool:
         Piece("cell", cell, CELL),
         Piece("housing", housing - inner, draw.pick(ABS, NYLON)),
     ]
-    pieces = [Piece(p.name, p.solid.scale([k, k, k]), p.material, p.rgb) for p in pieces]
+    pieces = scaled(k, pieces)
     return make_tool("electronic-caliper", pieces, Grasp(((at + 38) * k, 0, 4 * k), "x", "z"), draw)

@@ -42,16 +42,6 @@ FAMILIES: Mapping[str, Callable[[Draw], Tool]] = MappingProxyType({
     "vise-clamp": clamps.vise_clamp,
 })  # fmt: skip
 
-# Mass [kg] and number of parts of the published tools.
-TABLE_II: Mapping[str, tuple[float, int]] = MappingProxyType({
-    "allen-key": (0.128, 1), "box-wrench": (0.206, 1), "measuring-tape": (0.136, 1), "ruler": (0.009, 1),
-    "screwdriver": (0.030, 2), "nut-screwdriver": (0.081, 2), "rubber-mallet": (0.237, 2),
-    "bent-jaw-pliers": (0.255, 3), "machinist-hammer": (0.133, 2), "pliers": (0.633, 3), "c-clamp": (0.598, 5),
-    "adjustable-wrench": (0.719, 4), "hammer": (0.690, 3), "file": (0.020, 3), "socket-wrench": (0.356, 5),
-    "hacksaw": (0.658, 7), "clamp": (0.340, 7), "vise-grip": (0.387, 8), "electronic-caliper": (0.174, 14),
-    "vise-clamp": (0.225, 9),
-})  # fmt: skip
-
 
 def require(name: str, *, graded: bool = False) -> None:
     """Raise BadValue where there is no family of this name, or no graded form of it."""

@@ -20,7 +20,7 @@ from steelyard.workshop.materials import (
     ZINC,
 )  # fmt: skip
 from steelyard.workshop.solids import Solid, ball, block, chain, hexagon, lathe, limb, rod, threaded, union
-from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
+from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool, scaled
 
 
 def upright(solid: Solid) -> Solid:
@@ -54,7 +54,7 @@ def c_clamp(draw: Draw) -> Tool:
     )
     foot = upright(lathe([(10, foot_y), (10.5, foot_y + 3), (7, foot_y + 8)], 28))
     bushing = upright(lathe([(8.4, top - 1), (8.4, top + 18), (10.2, top + 18), (10.2, top + 21)]))
-    pieces = _sized(k, [
+    pieces = scaled(k, [
         Piece("bar", bar, draw.pick(CARBON_STEEL, ALLOY_STEEL)),
         Piece("screw", screw, draw.pick(CARBON_STEEL, ALLOY_STEEL)),
         Piece("foot", foot, draw.pick(BRASS, ZINC)),
@@ -85,7 +85,7 @@ def clamp(draw: Draw) -> Tool:
     grip = lathe([
         (7, at - 118), (12, at - 115), (13, at - 104), (11.2, at - 84), (12.4, at - 62), (9.6, at - 44), (7, at - 42),
     ])  # fmt: skip
-    pieces = _sized(k, [
+    pieces = scaled(k, [
         Piece("bar", bar, draw.pick(CARBON_STEEL, ALLOY_STEEL)),
         Piece("screw", screw, draw.pick(CARBON_STEEL, ALLOY_STEEL), (66, 68, 72)),
         Piece("foot", foot, draw.pick(CARBON_STEEL, BRASS)),
@@ -116,7 +116,7 @@ def vise_clamp(draw: Draw) -> Tool:
     caps = [ball((91, side * 27, z), (5, 6, 5), 16) for side in (-1, 1)]
     screw = union([threaded(3.9, -72, -15, 1.8, 0.5), block((-13, 13), (-2.2, 2.2), (-78, -66))]).translate([24, 0, 0])
     pad = lathe([(9.5, -18), (10, -12.5), (9, -11)], 28).translate([24, 0, 0])
-    pieces = _sized(k, [
+    pieces = scaled(k, [
         Piece("bar", bar, CARBON_STEEL),
         Piece("left cap", caps[0], draw.pick(PVC, NYLON), (30, 30, 32)),
         Piece("right cap", caps[1], draw.pick(PVC, NYLON), (30, 30, 32)),
@@ -128,8 +128,3 @@ def vise_clamp(draw: Draw) -> Tool:
         Piece("body", body - shell, draw.pick(ALUMINIUM, MAGNESIUM, ZINC), (40, 84, 150)),
     ])  # fmt: skip
     return make_tool("vise-clamp", pieces, Grasp((30 * k, 0, 5 * k), "x", "z"), draw)
-
-
-def _sized(k: float, pieces: list[Piece]) -> list[Piece]:
-    """Return the pieces with all lengths times `k`."""
-    return [Piece(piece.name, piece.solid.scale([k, k, k]), piece.material, piece.rgb) for piece in pieces]

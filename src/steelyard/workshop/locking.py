@@ -5,7 +5,7 @@ from __future__ import annotations
 from steelyard.workshop.draw import Draw
 from steelyard.workshop.materials import ALLOY_STEEL, CARBON_STEEL, NYLON, PVC, STAINLESS_STEEL, ZINC
 from steelyard.workshop.solids import Solid, block, knurled, limb, rod, threaded, union
-from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
+from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool, scaled
 
 Path = list[tuple[float, float, float]]  # x, y, radius in the plane
 
@@ -56,6 +56,6 @@ def vise_grip(draw: Draw) -> Tool:
         Piece("upper handle", channel(upper, width, wall, -14), steel),
         Piece("lower handle", channel(lower, width - 0.6, wall, 12), steel),
     ]
-    pieces = [Piece(p.name, p.solid.scale([k, k, k]), p.material, p.rgb) for p in pieces]
+    pieces = scaled(k, pieces)
     grasp, paint = Grasp((-0.6 * length * k, -8 * k, 0), "x", "z"), draw.colour(steel)
     return make_tool("vise-grip", pieces, grasp, draw, finish="scuffed", one_colour=paint)

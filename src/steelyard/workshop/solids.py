@@ -12,6 +12,7 @@ import numpy as np
 Solid = Any  # manifold3d.Manifold, which has no type information
 Point = tuple[float, float]
 ROUND = 36  # facets of a full circle
+SLIVER = 2e-3  # share of a solid's volume below which a piece was left behind by set operations
 
 
 def rod(radius: float, low: float, high: float, top: float | None = None, facets: int = ROUND) -> Solid:
@@ -52,9 +53,9 @@ def ring(outer: float, inner: float, low: float, high: float) -> Solid:
     return rod(outer, low, high) - rod(inner, low - 1, high + 1)
 
 
-def limb(stations: Sequence[tuple[float, float, float, float, float]], facets: int = 20) -> Solid:
+def limb(stations: Sequence[tuple[float, float, float, float, float]]) -> Solid:
     """Return discs (x, y, radius, low, high) with axes along z, joined one to the next by hulls."""
-    return chain([rod(r, low, high, facets=facets).translate([x, y, 0]) for x, y, r, low, high in stations])
+    return chain([rod(r, low, high, facets=20).translate([x, y, 0]) for x, y, r, low, high in stations])
 
 
 def smooth(stations: Sequence[tuple[float, ...]], between: int = 4) -> Any:
@@ -115,12 +116,12 @@ def knurled(radius: float, low: float, high: float, teeth: int, depth: float) ->
     return prism([(r * np.cos(a), r * np.sin(a)) for r, a in zip(radii, angles, strict=True)], low, high)
 
 
-def without_slivers(solid: Solid, share: float = 2e-3) -> Solid:
-    """Return the solid without pieces and voids below a `share` of its volume, which set operations leave behind."""
+def without_slivers(solid: Solid) -> Solid:
+    """Return the solid without pieces and voids below 0.2 % of its volume, which set operations leave behind."""
     pieces = solid.decompose()
     if len(pieces) < 2:
         return solid
-    kept = [piece for piece in pieces if abs(piece.volume()) > share * solid.volume()]
+    kept = [piece for piece in pieces if abs(piece.volume()) > SLIVER * solid.volume()]
     if len(kept) == len(pieces):
         return solid
     voids = union([_inverted(piece) for piece in kept if piece.volume() < 0])

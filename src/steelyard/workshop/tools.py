@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -127,6 +127,11 @@ def make_tool(
         X_OS=grasp.pose(),
         finish=finish,
     )
+
+
+def scaled(k: float, pieces: Sequence[Piece]) -> list[Piece]:
+    """Return the pieces with all lengths times `k`."""
+    return [replace(piece, solid=piece.solid.scale([k, k, k])) for piece in pieces]
 
 
 def apart(solids: Sequence[Solid]) -> list[Solid]:

@@ -14,7 +14,7 @@ from steelyard.workshop.materials import (
     ZINC,
 )
 from steelyard.workshop.solids import block, hexagon, knurled, lathe, limb, prism, rod, union
-from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
+from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool, scaled
 
 
 def adjustable_wrench(draw: Draw) -> Tool:
@@ -74,5 +74,5 @@ def socket_wrench(draw: Draw) -> Tool:
         Piece("selector", lever, draw.pick(NYLON, ZINC)),
         Piece("grip", sleeve, draw.pick(PVC, RUBBER)),
     ]
-    pieces = [Piece(p.name, p.solid.scale([k, k, k]), p.material, p.rgb) for p in pieces]
+    pieces = scaled(k, pieces)
     return make_tool("socket-wrench", pieces, Grasp((0.8 * reach * k, 0, 0), "-x", "z"), draw)

@@ -1,0 +1,18 @@
+"""Rows of a log: runs of those for which something holds, and a few picked evenly."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.check import Integers, Mask
+
+
+def runs(mask: Mask) -> Integers:
+    """Return the first row and the last + 1 of every run of True in a mask (N,), in order (R, 2)."""
+    edges = np.flatnonzero(np.diff(np.concatenate([[False], mask, [False]]).astype(np.int8)))
+    return np.asarray(edges.reshape(-1, 2), np.int64)
+
+
+def picked(rows: int, most: int) -> Integers:
+    """Return the numbers of at most `most` rows, spread evenly over all from the first to the last."""
+    return np.unique(np.linspace(0, rows - 1, min(rows, most)).astype(np.int64))

@@ -1,0 +1,31 @@
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from steelyard.logs.runs import runs
+
+
+@pytest.mark.parametrize(
+    ("mask", "found"),
+    [
+        ([], []),
+        ([0, 0], []),
+        ([1], [[0, 1]]),
+        ([1, 1, 0, 1], [[0, 2], [3, 4]]),
+        ([0, 1, 1, 0, 0, 1, 0], [[1, 3], [5, 6]]),
+    ],
+)
+def test_runs_are_told_by_first_row_and_the_row_after_the_last(mask: list[int], found: list[list[int]]) -> None:
+    assert runs(np.array(mask, bool)).tolist() == found
+    assert runs(np.array(mask, bool)).shape == (len(found), 2)
+
+
+@given(st.lists(st.booleans(), max_size=40))
+def test_runs_are_the_mask_and_do_not_touch(mask: list[bool]) -> None:
+    found = runs(np.array(mask, bool))
+    rows = [k for start, stop in found for k in range(start, stop)]
+    assert rows == [k for k, held in enumerate(mask) if held]
+    assert (found[1:, 0] > found[:-1, 1]).all()
