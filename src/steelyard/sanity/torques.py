@@ -85,9 +85,10 @@ def _compared(felt: Array, spread: float, moment: Array) -> tuple[Finding, ...]:
         return (Finding("force-unit", text, REMEDY),)
     for factor, words in UNITS:
         if abs(ratio / factor - 1) < NEAR + 3 * std / abs(ratio) and abs(ratio - 1) > 5 * std:
+            much, way = ((ratio, std), "large") if ratio > 1 else ((1 / ratio, std / ratio**2), "small")
             text = (
-                f"Forces are {ratio:.3g} ± {std:.2g} times too large beside the torques, as when {words}. The answer "
-                "does not assume this: mass or centre of mass is wrong by as much."
+                f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {words}. The "
+                "answer does not assume this: mass or centre of mass is wrong by as much."
             )
             return (Finding.of("force-unit", text),)
     return ()
