@@ -59,7 +59,7 @@ COMPARABLE = 0.1
 # The mass is open where so much of it lies along what is not shown: mostly it is all of it or next to nothing.
 UNWEIGHED = 0.5
 # Findings that say already why forces do not fit.
-TOLD = {"wrench-unexplained", "payload-not-rigid"}
+TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
 
 
 @dataclass(frozen=True)

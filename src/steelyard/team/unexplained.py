@@ -54,8 +54,11 @@ def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Fin
         f"rigid payload explains, {100 * rms / weight:.0f} % of its weight, and too slow for noise of the sensors. "
         f"{why}The answer is not to be trusted."
     )
-    where = f"the force sensor of {_listed(suspects)}" if suspects else "each robot's force sensor"
-    remedy = f"Check {where}: does it live, and are unit, frame, order and signs of its columns right?"
+    if suspects:
+        where, beside = f"the force sensor of {_listed(suspects)}", ""
+    else:
+        where, beside = "each robot's force sensor", " Does gravity point where the bases say?"
+    remedy = f"Check {where}: does it live, and are unit, frame, order and signs of its columns right?{beside}"
     yield Finding("wrench-unexplained", text, remedy)
 
 
