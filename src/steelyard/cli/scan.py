@@ -53,7 +53,7 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
         "cameras_moved_m": fused.moved_m,
         "cpu_s": round(seconds, 4),
         "stages": {name: round(value, 4) for name, value in fused.stages.items()},
-        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in fused.findings],
+        "findings": [finding.plain() for finding in fused.findings],
         "output": None if output is None else str(output),
     }
 

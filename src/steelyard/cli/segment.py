@@ -59,7 +59,7 @@ def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
             for k, name in enumerate(made.names)
         ],
         "sureness": {n: round(float(s), 4) for n, s in enumerate(sureness, 1) if s > 1e-3},
-        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in shape.findings],
+        "findings": [finding.plain() for finding in shape.findings],
         "output": None if output is None else str(output),
     }
 
