@@ -91,6 +91,15 @@ class Finding:
         """Return the finding with the remedy of its code."""
         return cls(code, message, REMEDIES[code])
 
+    def plain(self) -> dict[str, str]:
+        """Return the finding as JSON has it."""
+        return {"code": self.code, "message": self.message, "remedy": self.remedy}
+
     def instead(self, remedies: Mapping[str, str]) -> Finding:
         """Return the finding with the remedy that `remedies` have for its code, if they have one."""
         return replace(self, remedy=remedies.get(self.code, self.remedy))
+
+
+def percent(share: float) -> str:
+    """Return a share as a message says it: whole per cent, below ten two figures."""
+    return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"

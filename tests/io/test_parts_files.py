@@ -136,6 +136,22 @@ def test_no_archive_no_file_damaged(saved: SavedParts, tmp_path: Path) -> None:
         read_parts(path)
 
 
+def test_whatever_byte_is_wrong_the_file_is_refused_or_read(saved: SavedParts, tmp_path: Path) -> None:
+    path = tmp_path / "p.npz"
+    write_parts(saved, path)
+    right = path.read_bytes()
+    refused = 0
+    for k in range(0, len(right), max(1, len(right) // 500)):
+        wrong = bytearray(right)
+        wrong[k] ^= 255
+        path.write_bytes(wrong)
+        try:
+            read_parts(path)
+        except BadFile:
+            refused += 1
+    assert refused > 400
+
+
 def test_a_file_that_unpacks_to_very_much_is_not_unpacked(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(parts_files, "MOST_BYTES", 2**20)
     with zipfile.ZipFile(tmp_path / "p.npz", "w", zipfile.ZIP_DEFLATED) as archive:

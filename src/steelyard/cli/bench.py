@@ -10,11 +10,14 @@ import click
 from steelyard.bench.timing import one_blas_thread
 from steelyard.cli.console import print_json, progress_bar, say
 from steelyard.cli.groups import Group
+from steelyard.cli.options import HELP, JSON
 
-_JSON = click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+_FOLDERS = click.option(
+    "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
+)
 
 
-@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, context_settings=HELP)
 def bench() -> None:
     """Make every number that the README and BENCHMARK.md claim again: a command per table."""
     one_blas_thread()
@@ -34,7 +37,7 @@ def bench() -> None:
     help="Rows of the long log.",
 )
 @click.option("--data", type=click.Path(path_type=Path), help="Has no effect: the bench makes its own data.")
-@_JSON
+@JSON
 def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> None:
     """Ten bodies, three motions, four noise levels: our methods and, where installed, the peers'."""
     from steelyard.bench import identify as job
@@ -67,7 +70,7 @@ def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> No
     help="The sensor's bias is estimated, or known to be none.",
 )
 @click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
-@_JSON
+@JSON
 def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **choices: Any) -> None:
     """Do 95 % intervals hold the truth 95 % of the time, white and correlated noise?"""
     from steelyard.bench import coverage as job
@@ -81,9 +84,7 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
 
 
 @bench.command("held-object")
-@click.option(
-    "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
-)
+@_FOLDERS
 @click.option(
     "--parts",
     type=click.Choice(["segmented", "truth", "truth-split", "truth-merged"]),
@@ -96,7 +97,7 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
 @click.option("--noise", "noises", multiple=True, help="Only these scenarios: none, low, moderate, high, high-code.")
 @click.option("--methods", multiple=True, help="Only these methods.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
-@_JSON
+@JSON
 def held_object(data: Path, as_json: bool, **choices: Any) -> None:
     """The paper's identification benchmark: every object, four noise scenarios, ours beside its rivals."""
     from steelyard.bench import held_object as job
@@ -106,17 +107,12 @@ def held_object(data: Path, as_json: bool, **choices: Any) -> None:
     print_json(result) if as_json else click.echo(held_object_table(result))
 
 
-_FOLDERS = click.option(
-    "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
-)
-
-
 @bench.command("part-coverage")
 @_FOLDERS
 @click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True, help="Logs per case.")
 @click.option("--noise", "noises", default="low,high", show_default=True, help="Scenarios, with commas between them.")
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
-@_JSON
+@JSON
 def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bool) -> None:
     """Do 95 % intervals of part masses and of the whole hold the truth, and how long does an answer take?"""
     from steelyard.bench import part_coverage as job
@@ -130,7 +126,7 @@ def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bo
 @bench.command()
 @_FOLDERS
 @click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
-@_JSON
+@JSON
 def materials(data: Path, seeds: int, as_json: bool) -> None:
     """How often is the right density picked from a list, at low noise?"""
     from steelyard.bench import materials as job
@@ -147,7 +143,7 @@ def materials(data: Path, seeds: int, as_json: bool) -> None:
 @click.option(
     "--colour-noise", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Of channels 0..255."
 )
-@_JSON
+@JSON
 def segment(data: Path, as_json: bool, **choices: Any) -> None:
     """Parts of unlabelled clouds against the true ones, beside the paper's Tables I and II."""
     from steelyard.bench import segment as job
@@ -165,7 +161,7 @@ def segment(data: Path, as_json: bool, **choices: Any) -> None:
 @click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
 @click.option("--coverage", type=click.IntRange(min=0), default=0, show_default=True, help="Trials of the intervals.")
 @click.option("--slips", type=click.IntRange(min=0), default=40, show_default=True, help="Slips, and logs without.")
-@_JSON
+@JSON
 def team(trials: int, as_json: bool, **choices: Any) -> None:
     """One payload, three robots, noise from clean to that of the paper; and cost against the number of robots."""
     from steelyard.bench import team as job
@@ -182,7 +178,7 @@ def team(trials: int, as_json: bool, **choices: Any) -> None:
 @click.option(
     "--hull-sets", type=click.IntRange(min=0), default=12_000, show_default=True, help="Sets of points against Qhull."
 )
-@_JSON
+@JSON
 def speed(tets: int, many: int, repeats: int, hull_sets: int, as_json: bool) -> None:
     """How fast are clusters and hulls, beside the same algorithm with SciPy's Qhull?"""
     from steelyard.bench import speed as job
@@ -194,7 +190,7 @@ def speed(tets: int, many: int, repeats: int, hull_sets: int, as_json: bool) -> 
 @bench.command()
 @click.option("--count", type=click.IntRange(min=1), default=60, show_default=True, help="Channels, plates and tubes.")
 @click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of sizes and points.")
-@_JSON
+@JSON
 def sheets(count: int, seed: int, as_json: bool) -> None:
     """Thin channels, plates and open tubes from bare points: is the volume right, and are wrong ones named?"""
     from steelyard.bench import sheets as job
@@ -209,7 +205,7 @@ def sheets(count: int, seed: int, as_json: bool) -> None:
 @click.option("--views", "count", type=click.IntRange(min=8), default=127, show_default=True, help="Images per scan.")
 @click.option("--pose-mm", type=float, default=0.0, show_default=True, help="Error of the reported camera positions.")
 @click.option("--pose-deg", type=float, default=0.0, show_default=True, help="Error of the reported camera rotations.")
-@_JSON
+@JSON
 def scan(tools: tuple[str, ...], pose_mm: float, pose_deg: float, as_json: bool, **choices: Any) -> None:
     """Built tools scanned by simulated views on a table: volume against the truth, CPU of every stage."""
     from steelyard.bench import scan as job

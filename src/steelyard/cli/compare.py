@@ -8,14 +8,15 @@ from pathlib import Path
 import click
 
 from steelyard.cli.console import print_json
+from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("first", type=click.Path(path_type=Path))
 @click.argument("second", type=click.Path(path_type=Path))
 @click.option("--any-grasp", is_flag=True, help="Compare only mass and principal moments: the grasps may differ.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@JSON
 def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
     """Say whether two results can be the same object, held the same way."""
     from steelyard.cli.table import plus_minus

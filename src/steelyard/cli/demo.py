@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import click
 
 from steelyard.cli.console import print_json, require_output, say, say_if_compiling
+from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
 SEED = 0
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("story", type=click.Choice(["held-object", "team"]), default="held-object")
 @click.option("--seed", type=int, default=SEED, show_default=True, help="Seed of the made noise.")
 @click.option(
@@ -36,7 +37,7 @@ SEED = 0
     help="Keep the made files and the result in this folder; of the hammer the views too (20 MB, needs "
     "steelyard[images]).",
 )  # fmt: skip
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@JSON
 def demo(story: str, seed: int, output: Path | None, keep: Path | None, as_json: bool) -> None:
     """A whole story on made data, against the truth.
 

@@ -9,6 +9,7 @@ import click
 
 from steelyard import __version__
 from steelyard.cli.console import print_json, say_if_compiling
+from steelyard.cli.options import HELP, JSON
 from steelyard.errors import CannotAnswer
 
 CORE = ("numpy", "scipy", "numba", "click", "manifold3d")
@@ -20,8 +21,8 @@ EXTRAS = {
 TOLERANCE = 1e-4
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@click.command(context_settings=HELP)
+@JSON
 def doctor(as_json: bool) -> None:
     """Show versions and what is installed, and identify a made body whose answer is known."""
     say_if_compiling()

@@ -9,18 +9,15 @@ from typing import Any, cast
 import click
 
 from steelyard.cli.console import print_json, require_output, say, say_if_compiling
+from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 from steelyard.errors import BadValue
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("log", required=False, type=click.Path(path_type=Path))
-@click.option(
-    "--data",
-    type=click.Path(path_type=Path),
-    help="Folder that relative paths in the description start from.",
-)
+@STREAM_FOLDER
 @click.option("--method", type=click.Choice(METHODS), default="auto", show_default=True, help="Estimator.")
 @click.option(
     "--bias",
@@ -64,8 +61,8 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
     help="Rough longest dimension of the object [m]; used only where the data leave the inertia open.",
 )
 @click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@RESULT_FILE
+@RESULT_AS_JSON
 def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, scan: Path | None,
              pendant: bool, pose_in_sensor: str | None, output: Path | None, as_json: bool, **chosen: Any
              ) -> None:  # fmt: skip

@@ -9,6 +9,7 @@ import click
 
 from steelyard import __version__
 from steelyard.cli.groups import Group
+from steelyard.cli.options import HELP
 from steelyard.errors import SteelyardError
 
 # Verb -> (module and function, one line of help).
@@ -49,7 +50,7 @@ class _Verbs(Group):
         return VERBS[name][1]
 
 
-@click.group(cls=_Verbs, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=_Verbs, context_settings=HELP)
 @click.version_option(__version__, prog_name="steelyard")
 def cli() -> None:
     """Tell a robot what it holds: mass, centre of mass and inertia, with honest error bars.

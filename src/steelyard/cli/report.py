@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING, cast
 import click
 
 from steelyard.cli.console import print_json, require_output, say, say_if_compiling
+from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
 
 if TYPE_CHECKING:
@@ -27,7 +28,7 @@ _FILE = click.Path(path_type=Path)
 _SAME_VOLUME = 0.02
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("result", type=_FILE)
 @click.option("--parts", type=_FILE, help="Parts to draw: parts.npz, or a mesh (.ply) with a part per face.")
 @click.option(
@@ -44,7 +45,7 @@ _SAME_VOLUME = 0.02
 @click.option("--rival", "rivals", multiple=True, metavar="NAME=FILE", help="Another method's result; may be repeated.")
 @click.option("--title", help="Heading of the page.")
 @click.option("-o", "--output", type=_FILE, default=Path("report.html"), show_default=True, help="The page to write.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@JSON
 def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None, data: Path | None,
            tool: Path | None, pose_in_sensor: str | None, truth: Path | None, rivals: tuple[str, ...],
            title: str | None, output: Path, as_json: bool) -> None:  # fmt: skip

@@ -9,18 +9,19 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from steelyard.cli.console import print_json, progress_bar, require_output, say_if_compiling
+from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
     from steelyard.shape.scan import Scan
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("views", type=click.Path(path_type=Path))
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the cloud (.ply or .npz).")
 @click.option(
     "--points", type=click.IntRange(200, 50_000), default=3000, show_default=True, help="About so many points."
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@JSON
 def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     """Fuse the posed RGB-D images in the folder VIEWS into one cloud of the object on the table, underside closed."""
     from steelyard.io.cloud_files import write_cloud
@@ -53,7 +54,7 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
         "cameras_moved_m": fused.moved_m,
         "cpu_s": round(seconds, 4),
         "stages": {name: round(value, 4) for name, value in fused.stages.items()},
-        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in fused.findings],
+        "findings": [finding.plain() for finding in fused.findings],
         "output": None if output is None else str(output),
     }
 

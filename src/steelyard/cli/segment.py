@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from steelyard.cli.console import print_json, require_output, say_if_compiling
+from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("scan", type=click.Path(path_type=Path))
 @click.option("--parts", type=click.IntRange(1, 40), help="How many parts; chosen by shape and colour where left out.")
 @click.option(
@@ -24,7 +25,7 @@ if TYPE_CHECKING:
     help="Fill the volume anew with the cells of this mesher, where it is installed (TetGen is under the AGPL).",
 )
 @click.option("-o", "--output", type=click.Path(path_type=Path), help="Write parts.npz.")
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@JSON
 def segment(scan: Path, parts: int | None, cells: str, output: Path | None, as_json: bool) -> None:
     """Close a SCAN, a cloud (.ply, .pcd, .npz) or a folder of views, and cut it into homogeneous parts."""
     require_output(output, "a solid in parts", [".npz"], scan)
@@ -59,7 +60,7 @@ def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
             for k, name in enumerate(made.names)
         ],
         "sureness": {n: round(float(s), 4) for n, s in enumerate(sureness, 1) if s > 1e-3},
-        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in shape.findings],
+        "findings": [finding.plain() for finding in shape.findings],
         "output": None if output is None else str(output),
     }
 

@@ -7,21 +7,20 @@ from pathlib import Path
 import click
 
 from steelyard.cli.console import print_json, require_output, say_if_compiling
+from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 
 METHODS = ("joint", "paper")
 
 
-@click.command(context_settings={"help_option_names": ["-h", "--help"]})
+@click.command(context_settings=HELP)
 @click.argument("team", type=click.Path(path_type=Path))
-@click.option(
-    "--data", type=click.Path(path_type=Path), help="Folder that relative paths in the description start from."
-)
+@STREAM_FOLDER
 @click.option(
     "--method", type=click.Choice(METHODS), default="joint", show_default=True,
     help="One joint estimate, or the paper's steps one after another.",
 )  # fmt: skip
-@click.option("-o", "--output", type=click.Path(path_type=Path), help="Write the result as JSON.")
-@click.option("--json", "as_json", is_flag=True, help="Print the result as one JSON object.")
+@RESULT_FILE
+@RESULT_AS_JSON
 def team(team: Path, data: Path | None, method: str, output: Path | None, as_json: bool) -> None:
     """Find where every robot of TEAM (.toml) holds one payload, and its mass, centre of mass and inertia."""
     require_output(output, "a result", [".json"], team)

@@ -11,10 +11,11 @@ import click
 
 from steelyard.cli.console import print_json, progress_bar, say, say_if_compiling
 from steelyard.cli.groups import Group
+from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
 
 
-@click.group(cls=Group, context_settings={"help_option_names": ["-h", "--help"]})
+@click.group(cls=Group, context_settings=HELP)
 def workshop() -> None:
     """Make the embedded data set: twenty families of workshop tools with exact truth."""
 
@@ -43,7 +44,7 @@ def workshop() -> None:
     is_flag=True,
     help="RGB-D views of each tool on a table too, for scan and identify --scan (20 MB each; needs steelyard[images]).",
 )
-@click.option("--json", "as_json", is_flag=True, help="Print one JSON object.")
+@JSON
 def build(
     folder: Path,
     variants: int,

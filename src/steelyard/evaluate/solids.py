@@ -3,20 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.parts.known import KnownObject
 from steelyard.shape.mesh import Integers, TriangleMesh, part_moments
 from steelyard.shape.tets import TetMesh
 
 SAMPLES = 150_000
 _PAD = 0.02  # of the diagonal of the box, on every side
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 @dataclass(frozen=True, eq=False)

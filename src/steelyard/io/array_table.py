@@ -21,7 +21,8 @@ from steelyard.errors import BadFile
 from steelyard.io.table_header import Columns, Header
 
 _WIDEST = 4096
-_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, zlib.error, zipfile.BadZipFile)
+# What reading an array of a damaged NPZ raises.
+DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
@@ -68,11 +69,16 @@ class ArrayTable:
 def _numeric(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
     try:
         array: np.ndarray[Any, np.dtype[Any]] = archive[key]
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise BadFile(f'{path}: array "{key}" is damaged ({error}). Save the file again.') from None
+    require_numbers(path, key, array)
+    return array
+
+
+def require_numbers(path: Path, key: str, array: Any) -> None:
+    """Raise BadFile where an array of an NPZ holds anything but real numbers."""
     if array.dtype.kind not in "fiub":
         raise BadFile(f'{path}: array "{key}" must hold real numbers; it holds {array.dtype}.')
-    return array
 
 
 def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
@@ -81,7 +87,7 @@ def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
         with zipfile.ZipFile(path) as archive:
             members = [name for name in archive.namelist() if name.endswith(".npy")]
             return {name.removesuffix(".npy"): _shape(path, archive, name) for name in members}
-    except zipfile.BadZipFile:
+    except (zipfile.BadZipFile, RuntimeError):  # the latter of a zip of another make or version
         raise BadFile(
             f"{path}: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."
         ) from None
@@ -89,14 +95,14 @@ def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
 
 def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
     key = name.removesuffix(".npy")
-    with archive.open(name) as member:
-        try:
+    try:
+        with archive.open(name) as member:
             version = npy.read_magic(member)
             read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
             shape, _, dtype = read(member)
-        except _DAMAGED:
-            raise BadFile(f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.') from None
-        size = archive.getinfo(name).file_size
+    except DAMAGED:
+        raise BadFile(f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.') from None
+    size = archive.getinfo(name).file_size
     if dtype.hasobject:
         raise BadFile(
             f'{path}: array "{key}" holds pickled Python objects, which can run code when opened; '

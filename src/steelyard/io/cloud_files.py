@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.array_table import ArrayTable
+from steelyard.io.array_table import ArrayTable, require_numbers
 from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
 from steelyard.shape.cloud import Cloud
@@ -87,8 +87,8 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
                 values = archive.get(name)
             except Exception as error:  # zip, zlib and numpy each raise their own
                 raise BadFile(f'{path}: array "{name}" is damaged ({error}). Save the file again.') from None
-            if values is not None and values.dtype.kind not in "fiub":
-                raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {values.dtype}.')
+            if values is not None:
+                require_numbers(path, name, values)
             found.append(values)
     return tuple(found)
 

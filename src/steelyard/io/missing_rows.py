@@ -12,14 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import frozen
+from steelyard.check import Mask, frozen
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.io.channels import known_rows, rows_text, unfit_text
 from steelyard.io.stream_entries import StreamSpec
 from steelyard.logs.recording import Stream
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 MOST_MISSING = 0.1
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import io
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -13,14 +11,13 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.array_table import ArrayTable
+from steelyard.io.array_table import DAMAGED, ArrayTable
 from steelyard.io.in_file import in_file
 from steelyard.logs.log import Integers, Noise
 from steelyard.logs.moments import SIZE, Moments
 from steelyard.whole_files import write_bytes
 
 _NAMES = ("scatter", "noise_class", "block", "still", "acceleration_variance", "wrench_variance")
-_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
 _EVEN = 1e-9  # how far a scatter matrix may be from symmetric, over its largest entry
 
 
@@ -46,7 +43,7 @@ def read_moments(path: Path | str) -> Moments:
             if missing:
                 raise BadFile(f'{path}: array "{missing[0]}" is missing. Moments have {", ".join(_NAMES)}.')
             arrays = {name: archive[name] for name in _NAMES}
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
     return in_file(path, lambda: _moments(arrays))
 

@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
-import zlib
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.io.array_table import ArrayTable
+from steelyard.io.array_table import DAMAGED, ArrayTable, require_numbers
 from steelyard.io.in_file import in_file
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
@@ -28,7 +26,6 @@ from steelyard.spatial import Pose
 FILES = ("mesh.ply", "points.npz", "motion.npz", "truth.json")
 # The published folders keep the physical wrench (gravity down) beside one in a world whose gravity points up.
 _DOWN = {"gravity": "gravity_sensor_down", "force": "force_sensor_gdown", "torque": "torque_sensor_gdown"}
-_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
 
 
 def object_folders(folder: Path | str) -> list[Path]:
@@ -176,9 +173,8 @@ def _loaded(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
             raise BadFile(f'{path}: array "{missing[0]}" is missing. It needs {", ".join(names)}.')
         try:
             found = {name: archive[name] for name in names}
-        except _DAMAGED as error:
+        except DAMAGED as error:
             raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
     for name, values in found.items():
-        if values.dtype.kind not in "fiub":
-            raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {values.dtype}.')
+        require_numbers(path, name, values)
     return found

@@ -19,7 +19,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.array_table import ArrayTable
+from steelyard.io.array_table import DAMAGED, ArrayTable
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers
@@ -33,7 +33,6 @@ _LONGEST_NAME = 80
 _AGREE = 1e-6
 _SAME = 1e-4  # volumes of one part, computed twice
 _TREE = ("merges", "cost", "piece")
-_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +192,7 @@ def _arrays(path: Path) -> dict[str, Array]:
             size = sum(member.file_size for member in archive.infolist())
     except OSError as error:
         raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
-    except zipfile.BadZipFile:
+    except (zipfile.BadZipFile, RuntimeError):
         size = 0  # the next line says what the file should be
     if size > MOST_BYTES:
         raise BadFile(
@@ -205,7 +204,7 @@ def _arrays(path: Path) -> dict[str, Array]:
         with np.load(path, allow_pickle=False) as archive:
             for name in archive.files:
                 found[name] = archive[name]
-    except _DAMAGED as error:
+    except DAMAGED as error:
         raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
     for name, array in found.items():
         kinds, wanted = ("U", "text") if name == "names" else ("fiub", "real numbers")

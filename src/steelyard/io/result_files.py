@@ -46,7 +46,7 @@ def result_dict(estimate: Estimate) -> dict[str, Any]:
         "delays_s": dict(estimate.delays_s),
         "parts": [_part(part) for part in estimate.parts],
         "evidence": _evidence(estimate.evidence),
-        "findings": [{"code": f.code, "message": f.message, "remedy": f.remedy} for f in estimate.findings],
+        "findings": [finding.plain() for finding in estimate.findings],
         "notes": list(estimate.notes),
     }
     if isinstance(estimate, TeamEstimate):

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs import alignment_findings as say
@@ -22,7 +22,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
 from steelyard.logs.outliers import bursts, inside, merged
 from steelyard.logs.recording import Recording, Stream
-from steelyard.logs.stillness import Mask, pose_numbers, still_rows
+from steelyard.logs.stillness import pose_numbers, still_rows
 from steelyard.logs.tables import align_tables
 from steelyard.spatial import Rotation
 

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.logs.delays import features, free_residual
 from steelyard.logs.kinematics import Motion
-from steelyard.logs.stillness import Numbers
 
 # [Hz] where the bands begin that are judged; the last ends where the low-pass does, at this multiple at least.
 BANDS, NARROWEST = (5.0, 7.0, 10.0, 14.0, 20.0, 28.0), 1.25
@@ -42,7 +41,7 @@ def rigid_up_to(rate: float, cutoff: float, wrench: Array, motion: Motion) -> fl
     return float(low) if low < cutoff else None
 
 
-def _per_hz(values: Array, band: Numbers, edges: Array) -> Array:
+def _per_hz(values: Array, band: Integers, edges: Array) -> Array:
     """Return the mean variance per Hz of evenly sampled `values` (N, D) in each band."""
     window = np.hanning(len(values))[:, None]
     power = (np.abs(np.fft.rfft((values - values.mean(0)) * window, axis=0)) ** 2).sum(1)

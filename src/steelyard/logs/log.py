@@ -9,11 +9,10 @@ import numpy as np
 
 from steelyard import check
 from steelyard.check import Array
+from steelyard.check import Integers as Integers
+from steelyard.check import Mask as Mask
 from steelyard.errors import BadValue
 from steelyard.spatial import Pose, cross_matrix, lever_acceleration
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -6,15 +6,14 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.logs.log import Noise
-from steelyard.logs.stillness import Mask, Numbers
 from steelyard.spatial import cross_matrix
 
 _FEWEST_ROWS = 30
 
 
-def classes(still: Mask, alpha_variance: Array) -> Numbers:
+def classes(still: Mask, alpha_variance: Array) -> Integers:
     """Return a class (N,) per row: still rows, and moving rows binned by factors of four of their variance
     (N,)."""
     base = float(np.median(alpha_variance)) or 1.0
@@ -29,7 +28,7 @@ def classes(still: Mask, alpha_variance: Array) -> Numbers:
 
 
 def levels(
-    index: Numbers, alpha_variance: Array, acceleration_variance: Array, residual: Array, body: Array,
+    index: Integers, alpha_variance: Array, acceleration_variance: Array, residual: Array, body: Array,
     least: Array, declared: Mapping[str, float],
 ) -> tuple[Noise, ...]:  # fmt: skip
     """Return one Noise per class from the variances of the motion (N,) and the wrench residual (N, 6) of a

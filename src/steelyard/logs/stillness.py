@@ -2,16 +2,11 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.logs.conditioning import noise_std
 from steelyard.logs.runs import runs
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
-Numbers = np.ndarray[Any, np.dtype[np.int64]]
 
 _SHORTEST_S = 0.25
 _BLOCKS, _SHORTEST_BLOCK_S = 12, 0.3
@@ -58,7 +53,7 @@ def steady(time: Array, values: Array, limit: float | None = None) -> Mask:
     return np.asarray(hits[high] > hits[np.minimum(low, len(calm))])
 
 
-def pose_numbers(time: Array, still: Mask) -> Numbers:
+def pose_numbers(time: Array, still: Mask) -> Integers:
     """Return a number per row (N,): one per still stretch, and one per block of the moving stretches between.
 
     Blocks are a twelfth of the log long, but no shorter than 0.3 s.

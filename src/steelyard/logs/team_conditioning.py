@@ -12,12 +12,11 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.runs import runs
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import TeamRows, channel_at, common_time, mean_rotation
-from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose, Rotation, cross
 from steelyard.spatial.screws import log_pose
 

@@ -14,9 +14,9 @@ from typing import Literal, get_args
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
-from steelyard.logs.team_track import Mask, Track
+from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose
 
 Kind = Literal["grasp", "still", "motion"]

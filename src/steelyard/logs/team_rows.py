@@ -7,11 +7,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array, frozen
+from steelyard.check import Array, Mask, frozen
 from steelyard.errors import BadValue
 from steelyard.logs.cubic import cubic
 from steelyard.logs.team_log import TeamRecording
-from steelyard.logs.team_track import Mask, Track
+from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
 
 _EVEN = 0.01  # a step that differs from the median by less than this share is jitter of the stamps

@@ -9,11 +9,10 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.logs.recording import Mount, Stream
 from steelyard.logs.team_rows import between, near_samples
-from steelyard.logs.team_track import Mask
 from steelyard.spatial import Rotation, cross
 
 # Whose clock is kept: what is differentiated is not to be interpolated.

@@ -16,11 +16,10 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
 from steelyard.spatial import Pose, Rotation
 
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
 CHANNELS: Mapping[str, str] = MappingProxyType(
     {
         "rotation": "G to H, matrices (T, 3, 3)",

@@ -9,18 +9,15 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.parts.interior import Interior
 from steelyard.spatial import Pose
-
-Labels = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -35,7 +32,7 @@ class Parts:
              centre of mass per axis [m], and of the second moments as a share of each; see `ShapeError`
     """
 
-    label: Labels
+    label: Integers
     moments: Array
     rgb: Array | None = None
     interior: Interior | None = None

@@ -11,7 +11,7 @@ Their product is the cost of keeping the two together. Colours are joined last, 
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -19,26 +19,16 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.hulls import vertices_of_both
+from steelyard.parts.seam_costs import AREA, LENGTH, PAINT, TURN, VECTOR, WIDTH, price_of, support_of
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import HullWork, hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.stand_ins import StandIns, sure_hull, with_stand_ins
 from steelyard.shape.tets import TetMesh
 
-STRAIGHT, CREASED = 0.07, 0.25  # mean turn [rad] across a border that is no seam, and that is one
-NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cube cut in half has 1.6
-POINT = 0.02  # the same where two clusters only touch in a point or along an edge
-PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part
-FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surface are worth a part of their own
-_BLUNT = (
-    0.005  # hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them
-)
-_SIZE = 0.02  # small clusters first (as in clustering.Hollow)
+# Hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them.
+_BLUNT = 0.005
 _NEARER = 1e-3  # of all bits equally dear to join, the nearest: per cube root of the volume between their middles
-_STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
-# Columns of the table of contacts between two clusters.
-_AREA, _VECTOR, _LENGTH, _TURN = 0, 1, 4, 10  # scalar, 3, 6 and 6 numbers
-_WIDTH = 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,6 +43,43 @@ class SeamTree:
     seam: Array
 
 
+class _Clusters(NamedTuple):
+    """The clusters, each in the row of one of its N pieces; one that was joined to another is no longer alive.
+
+    volume, share, colour (N,)  share of the surface; colour -1 where there are several     middle (N, 3)
+    hull     (N,) volume of the convex hull       node (N,) in the tree
+    changed  (N,) since its pairs were priced     best (N,) the row above with the least price, -1 without one
+    contact  (N, N, 16) and touch (N, N) with every other
+    known    (N, N) a bound from below of the pair's hull, and whether it is exact
+    price    (N, N) what orders merges, infinite where a pair is not to be joined
+    """
+
+    volume: Array
+    share: Array
+    colour: Any
+    middle: Array
+    hull: Array
+    node: Any
+    alive: Any
+    changed: Any
+    contact: Any
+    touch: Any
+    known: Array
+    exact: Any
+    price: Array
+    best: Any
+
+    @classmethod
+    def of(cls, volume: Array, share: Array, colour: Integers, middle: Array, contact: Array, touch: Any) -> _Clusters:
+        """Return the pieces as clusters, in arrays of their own, with hulls still to come."""
+        count, square = len(volume), touch.shape
+        return cls(
+            volume.copy(), share.copy(), colour.astype(np.int64), middle.copy(), np.empty(count), np.arange(count),
+            np.ones(count, np.bool_), np.ones(count, np.bool_), contact.copy(), touch.copy(),
+            np.zeros(square), np.zeros(square, np.bool_), np.full(square, np.inf), np.full(count, -1),
+        )  # fmt: skip
+
+
 def seam_tree(
     mesh: TetMesh, skin: Skin, piece: Integers, colour: Integers, pairs: Integers, corners: Integers
 ) -> SeamTree:
@@ -63,7 +90,7 @@ def seam_tree(
     middle, scale = mesh.vertices[corner.any(0)].mean(0), mesh.volume ** (1 / 3)
     xyz = np.ascontiguousarray((mesh.vertices - middle) / scale)
     contact = _contacts(xyz, skin, piece, count, pairs, corners, scale)
-    touch = contact[:, :, _AREA] > 0
+    touch = contact[:, :, AREA] > 0
     _join_by_corners(corner, touch)
     owner, member = np.nonzero(corner)
     start = np.searchsorted(owner, np.arange(count + 1))
@@ -72,10 +99,10 @@ def seam_tree(
     weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
     moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
     centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
-    leaves = (start, member.astype(np.int64), volume, centre, share, colour.astype(np.int64))
-    work, limits = hull_work(len(xyz)), (STRAIGHT, CREASED, NECK, FLANK)
+    given = volume, share, colour, centre, contact, touch
+    work, leaves = hull_work(len(xyz)), (start, member.astype(np.int64))
     merges, cost, seam, node_volume, hull = with_stand_ins(
-        xyz, lambda known: _merge(xyz, *leaves, contact.copy(), touch.copy(), _BLUNT, limits, work, known)
+        xyz, lambda known: _merge(xyz, leaves, _Clusters.of(*given), _BLUNT, work, known)
     )
     whole = mesh.volume
     return SeamTree(Hierarchy(piece, merges, cost, node_volume * whole, hull * whole), seam)
@@ -89,18 +116,18 @@ def _contacts(
     The border's sums are of edge length l over d d^T and of l times the turn over d d^T, d the unit vector across: with
     them, the mean turn along any direction is known, for any union of pieces.
     """
-    table = np.zeros((count, count, _WIDTH))
+    table = np.zeros((count, count, WIDTH))
     ends = piece[pairs]
     apart = ends[:, 0] != ends[:, 1]
     a, b, c = (xyz[corners[apart, k]] for k in range(3))
     vector = np.cross(b - a, c - a) / 2
     area = np.linalg.norm(vector, axis=1)
     i, j = ends[apart].T
-    np.add.at(table, (i, j, _AREA), area)
-    np.add.at(table, (j, i, _AREA), area)
+    np.add.at(table, (i, j, AREA), area)
+    np.add.at(table, (j, i, AREA), area)
     for k in range(3):
-        np.add.at(table, (i, j, _VECTOR + k), vector[:, k])
-        np.add.at(table, (j, i, _VECTOR + k), -vector[:, k])
+        np.add.at(table, (i, j, VECTOR + k), vector[:, k])
+        np.add.at(table, (j, i, VECTOR + k), -vector[:, k])
     ends = piece[skin.cell[skin.beside]]
     apart = ends[:, 0] != ends[:, 1]
     i, j = ends[apart].T
@@ -108,8 +135,8 @@ def _contacts(
     for k, (p, q) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
         part = length * across[:, p] * across[:, q]
         for one, two in ((i, j), (j, i)):
-            np.add.at(table, (one, two, _LENGTH + k), part)
-            np.add.at(table, (one, two, _TURN + k), part * turn)
+            np.add.at(table, (one, two, LENGTH + k), part)
+            np.add.at(table, (one, two, TURN + k), part * turn)
     return table
 
 
@@ -125,51 +152,41 @@ def _join_by_corners(corner: Any, touch: Any) -> None:
     touch |= shared & (body[:, None] != body)
 
 
-@numba.njit(cache=True, nogil=True)
-def _support(row: Any, smaller: float, limits: tuple[float, float, float, float]) -> float:
-    """Return how much of a seam, 0..1, the contact `row` (16,) is: creased around, a neck of the smaller cluster."""
-    straight_most, creased, neck_most, flank = limits
-    area, length = row[_AREA], row[_LENGTH] + row[_LENGTH + 1] + row[_LENGTH + 2]
-    if area <= POINT * smaller ** (2 / 3):
-        return 1.0 / FAR
-    if length <= 0:
-        return 0.0
-    neck = (flank - area / smaller ** (2 / 3)) / (flank - neck_most)
-    if neck <= 0:
-        return 0.0
-    x, y, z = row[_VECTOR] / area, row[_VECTOR + 1] / area, row[_VECTOR + 2] / area
-    straight = x * x + y * y + z * z  # 1 where the contact is plane, 0 where it goes all around
-    # Along the normal of a plane contact; any way across the border where there is no such normal.
-    plane = min(max((np.sqrt(straight) - 0.2) / 0.3, 0.0), 1.0)
-    if straight > 0:
-        x, y, z = x / np.sqrt(straight), y / np.sqrt(straight), z / np.sqrt(straight)
-    turn, over = 0.0, 0.0
-    for first, result in ((_TURN, 0), (_LENGTH, 1)):
-        along = (
-            x * x * row[first] + y * y * row[first + 1] + z * z * row[first + 2]
-            + 2 * (x * y * row[first + 3] + x * z * row[first + 4] + y * z * row[first + 5])
-        )  # fmt: skip
-        mixed = plane * along + (1 - plane) * (row[first] + row[first + 1] + row[first + 2])
-        if result == 0:
-            turn = mixed
-        else:
-            over = mixed
-    crease = (turn / max(over, 1e-3 * length) - straight_most) / (creased - straight_most)
-    return float(min(max(crease, 0.0), 1.0) * min(neck, 1.0))
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _stage(at: _Clusters, a: int, b: int) -> int:
+    """Return 0 for a pair of one colour that touches, 1 for one of one colour that does not, 2 for two colours."""
+    if at.colour[a] != at.colour[b] or at.colour[a] < 0:
+        return 2
+    return 0 if at.touch[a, b] else 1
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _price(at: _Clusters, a: int, b: int, hull: float) -> tuple[float, float]:
+    """Return what orders the merge of a pair whose union has this hull, and its seam."""
+    support = support_of(at.contact[a, b], min(at.volume[a], at.volume[b]))
+    paint = PAINT * min(at.share[a], at.share[b])
+    return price_of(hull, support, at.volume[a], at.volume[b], paint, _stage(at, a, b))
 
 
 @numba.njit(cache=True, nogil=True)
-def _price(hull: float, support: float, va: float, vb: float, paint: float, stage: int) -> tuple[float, float]:
-    """Return what orders a merge, and its seam: what a part that holds both sides costs.
-
-    stage  0 one colour and touching, 1 one colour and apart, 2 two colours
-    """
-    if stage == 1:
-        return _STAGE + paint / FAR, paint / FAR
-    hollow = max(0.0, hull - va - vb)
-    seam = min(hollow, paint) * support
-    price = hollow * (0.1 + support) + _SIZE * (va + vb)
-    return (price, seam) if stage == 0 else (2 * _STAGE + price + paint, seam + paint)
+def _price_changed(at: _Clusters) -> None:
+    """Price all pairs of which one changed, by the largest hull known to lie in their union."""
+    n = len(at.alive)
+    for a in range(n):
+        if not at.alive[a]:
+            continue
+        for b in range(a + 1, n):
+            if not at.alive[b] or not (at.changed[a] or at.changed[b]):
+                continue
+            stage = _stage(at, a, b)
+            if stage == 2 and not at.touch[a, b]:
+                at.price[a, b] = np.inf
+                continue
+            at.exact[a, b] = stage == 1
+            at.known[a, b] = max(at.known[a, b], at.hull[a], at.hull[b])
+            at.price[a, b] = _price(at, a, b, at.known[a, b])[0]
+            if stage == 1:
+                at.price[a, b] += _NEARER * np.sqrt(((at.middle[a] - at.middle[b]) ** 2).sum())
 
 
 @numba.njit(cache=True, nogil=True)
@@ -183,134 +200,134 @@ def _best_partner(a: int, price: Array, alive: Any) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
+def _find_partners(at: _Clusters) -> None:
+    """Find the best partner of every cluster once prices have changed."""
+    n, alive, changed, best = len(at.alive), at.alive, at.changed, at.best
+    for a in range(n):
+        if not alive[a]:
+            continue
+        if changed[a] or best[a] < 0 or not alive[best[a]] or changed[best[a]]:
+            best[a] = _best_partner(a, at.price, alive)
+            continue
+        for b in range(a + 1, n):
+            if alive[b] and changed[b] and at.price[a, b] < at.price[a, best[a]]:
+                best[a] = b
+
+
+@numba.njit(cache=True, nogil=True)
+def _cheapest(at: _Clusters) -> int:
+    """Return the lower row of the cheapest pair, -1 where no pair is to be joined."""
+    p = -1
+    for a in range(len(at.alive)):
+        if at.alive[a] and at.best[a] >= 0 and (p < 0 or at.price[a, at.best[a]] < at.price[p, at.best[p]]):
+            p = a
+    return p
+
+
+@numba.njit(cache=True, nogil=True)
+def _two_smallest(at: _Clusters) -> tuple[int, int]:
+    """Return the rows of the two smallest clusters, rising."""
+    p, q = -1, -1
+    for a in range(len(at.alive)):
+        if not at.alive[a]:
+            continue
+        if p < 0 or at.volume[a] < at.volume[p]:
+            p, q = a, p
+        elif q < 0 or at.volume[a] < at.volume[q]:
+            q = a
+    return min(p, q), max(p, q)
+
+
+@numba.njit(cache=True, nogil=True)
+def _join(at: _Clusters, p: int, q: int, hull: float, node: int) -> None:
+    """Join cluster q to p, which becomes that node of the tree; bounds of hulls pass on to its pairs."""
+    at.alive[q] = False
+    if at.colour[p] != at.colour[q]:
+        at.colour[p] = -1
+    at.middle[p] = (at.volume[p] * at.middle[p] + at.volume[q] * at.middle[q]) / (at.volume[p] + at.volume[q])
+    at.volume[p] += at.volume[q]
+    at.share[p] += at.share[q]
+    at.hull[p], at.node[p] = hull, node
+    for c in range(len(at.alive)):
+        if at.alive[c] and c != p:
+            for k in range(WIDTH):
+                at.contact[p, c, k] += at.contact[q, c, k]
+                at.contact[c, p, k] += at.contact[c, q, k]
+            at.touch[p, c] = at.touch[c, p] = at.touch[p, c] or at.touch[q, c]
+            low, high = min(p, c), max(p, c)
+            at.known[low, high] = max(at.known[low, high], at.known[min(q, c), max(q, c)])
+            at.price[low, high] = np.inf
+    at.changed[p] = True
+
+
+@numba.njit(cache=True, nogil=True)
+def _kept(pool: Any, filled: int, point: Any, count: int) -> Any:
+    """Return the pool of vertices, grown where it must be, with those of a hull just found (point[:, 2]) added."""
+    if filled + count > len(pool):
+        larger = np.empty(2 * (filled + count), np.int64)
+        larger[:filled] = pool[:filled]
+        pool = larger
+    for i in range(count):
+        pool[filled + i] = point[i, 2]
+    return pool
+
+
+@numba.njit(cache=True, nogil=True)
 def _merge(
-    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_middle: Array, leaf_share: Array, leaf_colour: Any,
-    contact: Any, touch: Any, tolerance: float, limits: tuple[float, float, float, float],
-    work: HullWork, stand_ins: StandIns,
-) -> tuple[Any, Array, Array, Array, Array]:  # fmt: skip
-    """Return merges, cost, seam, volume and hull of every node. Clusters live in the rows of `contact`.
+    xyz: Array, leaves: tuple[Any, Any], at: _Clusters, tolerance: float, work: HullWork, stand_ins: StandIns
+) -> tuple[Any, Array, Array, Array, Array]:
+    """Return merges, cost, seam, volume and hull of every node; leaf k has the vertices member[start[k]:start[k + 1]].
 
     Hulls only grow: a pair is priced by the larger of the hulls known to lie in its union until it is the cheapest.
     """
-    n = len(leaf_volume)
+    start, member = leaves
+    n = len(start) - 1
     merges = np.empty((n - 1, 2), np.int64)
     cost, seam = np.empty(n - 1), np.empty(n - 1)
     node_volume, node_hull = np.empty(2 * n - 1), np.empty(2 * n - 1)
-    volume, share, colour = leaf_volume.copy(), leaf_share.copy(), leaf_colour.copy()
-    node, alive = np.arange(n), np.ones(n, np.bool_)
-    hull = np.empty(n)
     pool = np.empty(len(member) + 64 * n, np.int64)
     offset, length = np.empty(n, np.int64), np.empty(n, np.int64)
     filled, stamp = 0, 0
     rows, mark = np.empty(len(xyz), np.int64), np.full(len(xyz), -1, np.int64)
     for k in range(n):
-        hull[k], kept = sure_hull(xyz, member[start[k] :], start[k + 1] - start[k], tolerance, work, stand_ins)
+        at.hull[k], kept = sure_hull(xyz, member[start[k] :], start[k + 1] - start[k], tolerance, work, stand_ins)
+        pool = _kept(pool, filled, work.point, kept)
         offset[k], length[k] = filled, kept
-        for i in range(kept):
-            pool[filled + i] = work.point[i, 2]
         filled += kept
-        node_volume[k], node_hull[k] = volume[k], hull[k]
-    known, exact = np.zeros((n, n)), np.zeros((n, n), np.bool_)
-    price, best = np.full((n, n), np.inf), np.full(n, -1, np.int64)
-    changed = np.ones(n, np.bool_)
-    middle = leaf_middle.copy()
-    made = 0
-    while made < n - 1:
-        for a in range(n):
-            if not alive[a]:
-                continue
-            for b in range(a + 1, n):
-                if not alive[b] or not (changed[a] or changed[b]):
-                    continue
-                stage = 2 if colour[a] != colour[b] or colour[a] < 0 else (0 if touch[a, b] else 1)
-                if stage == 2 and not touch[a, b]:
-                    price[a, b] = np.inf
-                    continue
-                exact[a, b] = stage == 1
-                known[a, b] = max(known[a, b], hull[a], hull[b])
-                support = _support(contact[a, b], min(volume[a], volume[b]), limits)
-                paint = PAINT * min(share[a], share[b])
-                price[a, b] = _price(known[a, b], support, volume[a], volume[b], paint, stage)[0]
-                if stage == 1:
-                    price[a, b] += _NEARER * np.sqrt(((middle[a] - middle[b]) ** 2).sum())
-        for a in range(n):
-            if alive[a]:
-                if changed[a] or best[a] < 0 or not alive[best[a]] or changed[best[a]]:
-                    best[a] = _best_partner(a, price, alive)
-                else:
-                    for b in range(a + 1, n):
-                        if alive[b] and changed[b] and price[a, b] < price[a, best[a]]:
-                            best[a] = b
-        changed[:] = False
-        p, q, kept, count, h = -1, -1, -1, 0, 0.0
+        node_volume[k], node_hull[k] = at.volume[k], at.hull[k]
+    for made in range(n - 1):
+        _price_changed(at)
+        _find_partners(at)
+        at.changed[:] = False
+        kept, hull = -1, 0.0
         last_p, last_q = -1, -1
         while True:
-            p = -1
-            for a in range(n):
-                if alive[a] and best[a] >= 0 and (p < 0 or price[a, best[a]] < price[p, best[p]]):
-                    p = a
-            if p < 0:
+            p = _cheapest(at)
+            if p < 0 or at.exact[p, at.best[p]]:
                 break
-            q = best[p]
-            if exact[p, q]:
-                break
+            q = at.best[p]
             stamp += 1
             count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
-            h, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
-            known[p, q] = h
-            exact[p, q] = True
+            hull, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
+            at.known[p, q], at.exact[p, q] = hull, True
             last_p, last_q = p, q
-            stage = 0 if colour[p] == colour[q] and colour[p] >= 0 else 2
-            support = _support(contact[p, q], min(volume[p], volume[q]), limits)
-            paint = PAINT * min(share[p], share[q])
-            price[p, q] = _price(known[p, q], support, volume[p], volume[q], paint, stage)[0]
-            best[p] = _best_partner(p, price, alive)
-        apart = p < 0
-        if apart:  # bodies of different colours that do not touch: the two smallest
-            for a in range(n):
-                if alive[a]:
-                    if p < 0 or volume[a] < volume[p]:
-                        p, q = a, p
-                    elif q < 0 or volume[a] < volume[q]:
-                        q = a
-            p, q = min(p, q), max(p, q)
+            at.price[p, q] = _price(at, p, q, hull)[0]
+            at.best[p] = _best_partner(p, at.price, at.alive)
+        apart = p < 0  # bodies of different colours that do not touch
+        p, q = _two_smallest(at) if apart else (p, at.best[p])
         if last_p != p or last_q != q:
             stamp += 1
             count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
-            h, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
-        paint = PAINT * min(share[p], share[q])
+            hull, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
         if apart:
-            cost[made], seam[made] = np.inf, paint + max(0.0, h - volume[p] - volume[q])
+            paint = PAINT * min(at.share[p], at.share[q])
+            cost[made], seam[made] = np.inf, paint + max(0.0, hull - at.volume[p] - at.volume[q])
         else:
-            stage = 2 if colour[p] != colour[q] or colour[p] < 0 else (0 if touch[p, q] else 1)
-            support = _support(contact[p, q], min(volume[p], volume[q]), limits)
-            cost[made], seam[made] = _price(h, support, volume[p], volume[q], paint, stage)
-        if filled + kept > len(pool):
-            larger = np.empty(2 * (filled + kept), np.int64)
-            larger[:filled] = pool[:filled]
-            pool = larger
-        for i in range(kept):
-            pool[filled + i] = work.point[i, 2]
+            cost[made], seam[made] = _price(at, p, q, hull)
+        pool = _kept(pool, filled, work.point, kept)
         offset[p], length[p] = filled, kept
         filled += kept
-        merges[made, 0], merges[made, 1] = min(node[p], node[q]), max(node[p], node[q])
-        alive[q] = False
-        if colour[p] != colour[q]:
-            colour[p] = -1
-        middle[p] = (volume[p] * middle[p] + volume[q] * middle[q]) / (volume[p] + volume[q])
-        volume[p] += volume[q]
-        share[p] += share[q]
-        hull[p], node[p] = h, n + made
-        node_volume[n + made], node_hull[n + made] = volume[p], h
-        for c in range(n):
-            if alive[c] and c != p:
-                for k in range(_WIDTH):
-                    contact[p, c, k] += contact[q, c, k]
-                    contact[c, p, k] += contact[c, q, k]
-                touch[p, c] = touch[c, p] = touch[p, c] or touch[q, c]
-                low, high = min(p, c), max(p, c)
-                known[low, high] = max(known[low, high], known[min(q, c), max(q, c)])
-                price[low, high] = np.inf
-        changed[p] = True
-        made += 1
+        merges[made, 0], merges[made, 1] = min(at.node[p], at.node[q]), max(at.node[p], at.node[q])
+        _join(at, p, q, hull, n + made)
+        node_volume[n + made], node_hull[n + made] = at.volume[p], hull
     return merges, cost, seam, node_volume, node_hull

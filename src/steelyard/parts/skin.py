@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 from steelyard.shape.spacing import Neighbours
 from steelyard.shape.tets import FACES, TetMesh
-from steelyard.spatial import cross
+from steelyard.spatial import cross, unit_vectors
 
 NEAR = 16
 SMOOTH = 0.8  # weight of a neighbour's normal beside the vertex's own
@@ -71,7 +71,7 @@ class Skin:
     def normals(self) -> Array:
         """Mean outward normal (V, 3) at each vertex, weighted by area; 0 inside."""
         total = self._vertex_sums[0]
-        return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
+        return unit_vectors(total)
 
     @cached_property
     def smooth_normals(self) -> Array:
@@ -80,7 +80,7 @@ class Skin:
         i, j = self.edges.T
         around = [np.bincount(i, total[j, k], len(total)) + np.bincount(j, total[i, k], len(total)) for k in range(3)]
         total = total + SMOOTH * np.stack(around, axis=1)
-        return np.asarray(total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300))
+        return unit_vectors(total)
 
     @cached_property
     def flatness(self) -> Array:
@@ -92,7 +92,7 @@ class Skin:
     def across(self) -> Array:
         """Unit vectors (E, 3) across each edge, from the apex of the first triangle to that of the second."""
         step = self.vertices[self.apex[:, 1]] - self.vertices[self.apex[:, 0]]
-        return np.asarray(step / np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-300))
+        return unit_vectors(step)
 
     @cached_property
     def turning(self) -> Array:

@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
-from steelyard.report.numbers import fixed, mass_unit, principal
+from steelyard.report.numbers import fixed, mass_unit, principal, round_step
 from steelyard.report.palette import density_colours, hexadecimal, part_colour
 from steelyard.report.scene import Body, Scene
 from steelyard.report.surfaces import corner_normals
@@ -159,9 +159,7 @@ def _magnified(half: float, size: float) -> int:
     """Return 1, 2, 5, 10, 20 ... : how many times larger the ellipsoid must be drawn to be seen."""
     if not 0 < half < _VISIBLE * size:
         return 1
-    wanted = _VISIBLE * size / half
-    power = 10.0 ** np.floor(np.log10(wanted))
-    return int(power * max(step for step in (1, 2, 5) if step * power <= wanted * (1 + 1e-9)))
+    return int(round_step(_VISIBLE * size / half))
 
 
 def _shares(xyz: Array, frame: Frame) -> Integers:

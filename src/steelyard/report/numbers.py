@@ -22,6 +22,12 @@ def decimals(std: float) -> int:
     return int(np.clip(1 - np.floor(np.log10(rounded)), 0, 9))
 
 
+def round_step(top: float) -> float:
+    """Return the largest of 1, 2, 5 times a power of ten that is not above `top`."""
+    power = 10.0 ** np.floor(np.log10(top))
+    return float(power * max(step for step in (1, 2, 5) if step * power <= top * (1 + 1e-9)))
+
+
 def fixed(value: float, places: int) -> str:
     """Return a number with a true minus sign."""
     if not np.isfinite(value):

@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.logs.runs import runs
 from steelyard.report.contents import Residuals
 from steelyard.report.markup import Html, tag
-from steelyard.report.numbers import general
+from steelyard.report.numbers import general, round_step
 from steelyard.shape.mesh import Integers
 
 COLUMNS = 420
@@ -30,7 +30,7 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) ->
     np.minimum.at(low, place, values)
     np.maximum.at(high, place, values)
     top = max(float(np.abs([low, high]).max()), 1e-12)
-    step = _round_step(top)
+    step = round_step(top)
     reach = max(top, step) * 1.06
     x = used + 0.5
 
@@ -102,7 +102,7 @@ def _grid(step: float, reach: float, unit: str) -> list[Html]:
 
 def _time_axis(start: float, length: float) -> list[Html]:
     """Return the numbers of the time axis, about six of them."""
-    step = _round_step(length / 3)
+    step = round_step(length / 3)
     marks = np.arange(np.ceil(start / step), np.floor((start + length) / step) + 1) * step
     out = []
     for t in marks.tolist():
@@ -111,12 +111,6 @@ def _time_axis(start: float, length: float) -> list[Html]:
         said = f"{t:g} s" if t == marks[-1] else f"{t:g}"
         out.append(tag("text", said, x=f"{share:.2f}%", y=_HEIGHT - 6, text_anchor=anchor, class_="tick"))
     return out
-
-
-def _round_step(top: float) -> float:
-    """Return the largest of 1, 2, 5 times a power of ten that is below `top`."""
-    power = 10.0 ** np.floor(np.log10(top))
-    return float(power * max(s for s in (1, 2, 5) if s * power <= top * (1 + 1e-9)))
 
 
 def _points(places: Array) -> Html:

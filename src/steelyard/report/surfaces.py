@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES, TetMesh
+from steelyard.spatial import unit_vectors
 
 CREASE = np.cos(np.deg2rad(42.0))  # faces that turn by more than this keep their edge
 
@@ -53,7 +54,7 @@ def corner_normals(vertices: Array, triangles: Integers) -> Array:
     """Return a unit normal (F, 3, 3) at every corner: the mean, by area, of the faces there that turn little."""
     a, b, c = np.moveaxis(vertices[triangles], 1, 0)
     across = np.cross(b - a, c - a)
-    unit = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-300)
+    unit = unit_vectors(across)
     corner = triangles.ravel()
     order = np.argsort(corner, kind="stable")
     count = np.bincount(corner, minlength=len(vertices))

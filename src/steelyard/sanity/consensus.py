@@ -9,16 +9,12 @@ cheapest path through touched and untouched, refit.
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.identify.dense import solved
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 # Nodes of the candidates' time grid, and the smallest share of time a kept set may cover.
 NODES, LEAST_KEPT = 36, 0.25

@@ -8,14 +8,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from scipy.stats import chi2
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.identify.regressor import design
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.logs.runs import runs
 from steelyard.sanity import consensus
-from steelyard.sanity.consensus import LEVER, Consensus, Integers, Mask, Slices
+from steelyard.sanity.consensus import LEVER, Consensus, Slices
 from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, SHORTEST, LoadChange, find_change
 
 # Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.

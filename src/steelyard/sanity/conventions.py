@@ -19,7 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, percent
 from steelyard.logs.misread import MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
@@ -167,8 +167,8 @@ def _varies(view: Glance, reading: Reading) -> bool:
 
 def _rival_finding(best: Reading, given: Reading) -> Finding:
     message = (
-        f"{best.words[0].upper()}{best.words[1:]}; so read, {_percent(best.fit.force_share)} of the force variance is "
-        f"left unexplained instead of {_percent(given.fit.force_share)}. The answer assumes this."
+        f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.fit.force_share)} of the force variance is "
+        f"left unexplained instead of {percent(given.fit.force_share)}. The answer assumes this."
     )
     if best.view is not None:
         remedy = f'Set frame = "{"W" if best.view.world else "S"}" in force and torque of this stream.'
@@ -248,15 +248,15 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):
         message = (
             f"S seems turned by {np.degrees(turned.angle):.0f} degrees about ({_shown(turned.axis)}) of S against the "
-            f"frame whose rotation is given: so read, {_percent(turned.force_share)} of the force variance is left "
-            f"unexplained instead of {_percent(reading.fit.force_share)}; the answer does not assume this."
+            f"frame whose rotation is given: so read, {percent(turned.force_share)} of the force variance is left "
+            f"unexplained instead of {percent(reading.fit.force_share)}; the answer does not assume this."
         )
         return recording, (Finding.of("gravity-frame", message),)
     mirror = mirrored(view, reading.gravity, reading.fit.mass)
     if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
         message = (
-            f"The forces fit one body if they are read as {mirror.words}: so, {_percent(mirror.force_share)} of their "
-            f"variance is left unexplained instead of {_percent(reading.fit.force_share)}; the answer does not assume "
+            f"The forces fit one body if they are read as {mirror.words}: so, {percent(mirror.force_share)} of their "
+            f"variance is left unexplained instead of {percent(reading.fit.force_share)}; the answer does not assume "
             "this."
         )
         remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
@@ -296,10 +296,6 @@ def _plain(tilt: GlanceTilt, given: StaticFit) -> bool:
         and tilt.force_share < 0.3
         and tilt.torque_share < 1.1 * given.torque_share + 1e-3
     )
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"
 
 
 def _shown(vector: Array) -> str:

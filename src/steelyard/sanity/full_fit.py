@@ -6,11 +6,10 @@ Extra columns (a drift, a tilt of gravity) are judged by how much they explain a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
@@ -20,8 +19,6 @@ from steelyard.spatial import cross_matrix
 _MOST_ROWS = 3000
 _BLOCKS = 12
 _SMALLEST = 1e-9
-
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.imu import first_mount
 from steelyard.logs.recording import Recording, Stream
@@ -23,8 +23,6 @@ _RATE_HZ = 60.0
 _MOST_ROWS = 20_000
 _FEWEST_ROWS = 60
 _BLOCKS = 12
-
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 
 
 @dataclass(frozen=True, eq=False)

@@ -11,13 +11,11 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
 from steelyard.spatial import cross_matrix
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 # Repeats beyond three times what the quantum of the channels explains, and at least this share of the rows.
 REPEATED_SHARE, CHANCE = 0.02, 3.0

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.sanity.glance import Integers, Seen
+from steelyard.check import Array, Integers
+from steelyard.sanity.glance import Seen
 from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.

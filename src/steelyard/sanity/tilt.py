@@ -9,8 +9,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.sanity.glance import Glance, Integers, Seen
+from steelyard.check import Array, Integers
+from steelyard.sanity.glance import Glance, Seen
 from steelyard.sanity.static_fit import beside, fit, leave_out, solve
 from steelyard.spatial import Rotation, axial_vector
 

@@ -9,13 +9,12 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import Colours, Integers
 from steelyard.shape.spacing import Neighbours
 from steelyard.spatial import Pose
 
-Flags = np.ndarray[Any, np.dtype[np.bool_]]
 _BRIGHT = 2.0  # floats up to here are 0..1, some of them overexposed: read as 0..255 they would all be black
 
 
@@ -35,7 +34,7 @@ class Cloud:
     rgb: Colours | None = None
     label: Integers | None = None
     normals: Array | None = None
-    seen: Flags | None = None
+    seen: Mask | None = None
 
     def __post_init__(self) -> None:
         xyz = check.vectors("points", self.xyz)

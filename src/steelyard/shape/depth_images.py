@@ -108,7 +108,6 @@ def surfels(
     size = 4096
     sums, last = np.zeros((size, 8)), np.full(size, -1, np.int32)
     n = 0
-    d, e = np.empty(3), np.empty(3)
     for k in range(count):
         window = _window_of(box, camera, R, p, k, width, height)
         for v in range(_first(window[2], step, stride), min(height - step, window[3] + 1), stride):
@@ -134,28 +133,13 @@ def surfels(
                     continue
                 if max(abs(left - z), abs(right - z), abs(up - z), abs(down - z)) > most:
                     continue
-                # tangents along the image's rows and columns, in the camera's axes
-                s = step / fx
-                d[0], d[1], d[2] = a * (right - left) + s * (right + left), b * (right - left), right - left
-                s = step / fy
-                e[0], e[1], e[2] = a * (down - up), b * (down - up) + s * (down + up), down - up
-                cxn, cyn, czn = e[1] * d[2] - e[2] * d[1], e[2] * d[0] - e[0] * d[2], e[0] * d[1] - e[1] * d[0]
-                # Not made unit: slopes then average without a pull toward the camera, whatever their noise.
-                if czn >= 0:
+                faces, nxc, nyc = _facing(a, b, left, right, up, down, step / fx, step / fy)
+                if not faces:
                     continue
-                cxn, cyn = -cxn / czn, -cyn / czn
-                if (1 - cxn * a - cyn * b) ** 2 < 0.25 * FACING**2 * (1 + cxn * cxn + cyn * cyn) * (1 + a * a + b * b):
-                    continue
-                nxw = R[k, 0, 0] * cxn + R[k, 0, 1] * cyn - R[k, 0, 2]
-                nyw = R[k, 1, 0] * cxn + R[k, 1, 1] * cyn - R[k, 1, 2]
-                nzw = R[k, 2, 0] * cxn + R[k, 2, 1] * cyn - R[k, 2, 2]
-                ax, ay, az = abs(nxw), abs(nyw), abs(nzw)
-                if az >= ax and az >= ay:
-                    main = 4 if nzw > 0 else 5
-                elif ax >= ay:
-                    main = 0 if nxw > 0 else 1
-                else:
-                    main = 2 if nyw > 0 else 3
+                nxw = R[k, 0, 0] * nxc + R[k, 0, 1] * nyc - R[k, 0, 2]
+                nyw = R[k, 1, 0] * nxc + R[k, 1, 1] * nyc - R[k, 1, 2]
+                nzw = R[k, 2, 0] * nxc + R[k, 2, 1] * nyc - R[k, 2, 2]
+                main = _main_direction(nxw, nyw, nzw)
                 i, j = int((x - low[0]) / cell) - i0, int((y - low[1]) / cell) - j0
                 row = index[main, layer, i, j]
                 if row < 0:
@@ -174,13 +158,50 @@ def surfels(
                 if last[row] != k:
                     sums[row, 7] += 1
                     last[row] = k
-    out = sums[:n]
-    for row in range(n):
-        length = np.sqrt(out[row, 3] ** 2 + out[row, 4] ** 2 + out[row, 5] ** 2) + 1e-300
+    return _means(sums[:n])
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _facing(
+    a: float, b: float, left: float, right: float, up: float, down: float, across: float, along: float
+) -> tuple[bool, float, float]:
+    """Return whether a surface faces the camera enough to be asked, and its normal (x, y, -1) in the camera's axes.
+
+    a, b           slopes of the pixel's ray
+    left .. down   depths of the neighbours [m], `across` and `along` in slope from the pixel
+    """
+    # tangents along the image's rows and columns
+    dx, dy, dz = a * (right - left) + across * (right + left), b * (right - left), right - left
+    ex, ey, ez = a * (down - up), b * (down - up) + along * (down + up), down - up
+    x, y, z = ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx
+    # Not made unit: slopes then average without a pull toward the camera, whatever their noise.
+    if z >= 0:
+        return False, 0.0, 0.0
+    x, y = -x / z, -y / z
+    asked = (1 - x * a - y * b) ** 2 >= 0.25 * FACING**2 * (1 + x * x + y * y) * (1 + a * a + b * b)
+    return asked, x, y
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _main_direction(x: float, y: float, z: float) -> int:
+    """Return which of +x, -x, +y, -y, +z, -z (0..5) a vector is nearest to."""
+    ax, ay, az = abs(x), abs(y), abs(z)
+    if az >= ax and az >= ay:
+        return 4 if z > 0 else 5
+    if ax >= ay:
+        return 0 if x > 0 else 1
+    return 2 if y > 0 else 3
+
+
+@numba.njit(cache=True, nogil=True)
+def _means(sums: Any) -> Any:
+    """Turn sums (N, 8) over the pixels of patches into mean points and unit normals, in place."""
+    for row in range(len(sums)):
+        length = np.sqrt(sums[row, 3] ** 2 + sums[row, 4] ** 2 + sums[row, 5] ** 2) + 1e-300
         for i in range(3):
-            out[row, i] /= out[row, 6]
-            out[row, 3 + i] /= length
-    return out
+            sums[row, i] /= sums[row, 6]
+            sums[row, 3 + i] /= length
+    return sums
 
 
 @numba.njit(cache=True, nogil=True)

@@ -2,19 +2,16 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numba
 import numpy as np
 
+from steelyard.check import Mask
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
 _SMALL = 0.01  # of the volume: a larger group is a body of its own
 
 _ENDS = np.triu_indices(4, 1)  # of the edges of a cell
-
-Mask = np.ndarray[Any, np.dtype[np.bool_]]
 
 
 def without_islands(mesh: TetMesh, inside: Mask, longest: float = np.inf) -> Mask:

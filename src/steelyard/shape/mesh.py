@@ -9,11 +9,11 @@ import numpy as np
 
 from steelyard import check
 from steelyard.check import Array
+from steelyard.check import Integers as Integers
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.spatial import Pose, Rotation, cross
 
-Integers = np.ndarray[Any, np.dtype[np.int64]]
 Colours = np.ndarray[Any, np.dtype[np.uint8]]
 
 

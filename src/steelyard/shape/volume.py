@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
-from steelyard.shape.cloud import Cloud, Flags
+from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
 from steelyard.shape.islands import without_islands
 from steelyard.shape.mesh import Integers
@@ -78,7 +78,7 @@ class _Filled:
 
     mesh: TetMesh
     score: Array
-    inside: Flags
+    inside: Mask
     solid: TetMesh
     doubt: float
 

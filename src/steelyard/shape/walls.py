@@ -10,8 +10,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.cloud import Flags
+from steelyard.check import Array, Mask
 from steelyard.shape.complex import Complex
 from steelyard.shape.mesh import Integers
 from steelyard.shape.ties import STEEP
@@ -68,7 +67,7 @@ class Wall:
         leaves = -np.sign(here[crosses]) * weight
         return np.asarray(np.bincount(self.start[crosses], leaves, len(normals)), float)
 
-    def _across(self, normals: Array) -> tuple[Array, Array, Flags]:
+    def _across(self, normals: Array) -> tuple[Array, Array, Mask]:
         """Return how far edges (E,) rise over the plane of their start, the least over both ends, and if steep."""
         here = (normals[self.start] * self.along).sum(1)
         least = np.minimum(np.abs(here), np.abs((normals[self.other] * self.along).sum(1)))

@@ -14,7 +14,7 @@ from steelyard.errors import BadValue
 from steelyard.shape.mesh import Colours, TriangleMesh, part_moments
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.simulate.camera import D435, VIEWS, DepthNoise, disturbed, wrist_arc
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, unit_vectors
 
 _TABLE = (171, 152, 124)
 _TABLE_REACH = 0.6  # half the edge of the square table [m]
@@ -133,7 +133,7 @@ def _shaded(mesh: TriangleMesh) -> Colours:
     """Return the colours (F, 3) of triangles under one lamp and much ambient light."""
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
     normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = unit_vectors(normal)
     light = _AMBIENT + (1 - _AMBIENT) * np.maximum(normal @ _LAMP, 0)
     rgb = mesh.rgb if mesh.rgb is not None else np.full((len(mesh), 3), 128, np.uint8)
     return np.asarray(np.clip(rgb * light[:, None], 0, 255), np.uint8)

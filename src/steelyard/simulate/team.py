@@ -8,11 +8,10 @@ from typing import Any, cast
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import Kind, TeamLog, TeamRecording, TeamRobot
-from steelyard.logs.team_track import Mask
 from steelyard.robots import Omnid
 from steelyard.simulate.motions import Motion
 from steelyard.simulate.team_cases import GRAVITY, RATE_HZ, ROTATION_MAX, TRANSLATION_MAX, TeamScene

@@ -107,8 +107,8 @@ class Presence:
 class Hinge:
     """A payload of two bodies: those `robots` hold the second, which turns about `axis` through `point`, both in C.
 
-    swing_max   largest angle between the bodies [rad], a sum of sines in the motion's band; none while still
-    second      mass [kg], principal moments (3,) [kg m^2] and centre (3,) [m] of the second body, at angle zero in C
+    swing_max  largest angle between the bodies [rad], a sum of sines in the motion's band; none while still
+    mass, moments, centre  [kg], principal (3,) [kg m^2] and (3,) [m] of the second body, at angle zero in C
     """
 
     robots: frozenset[int]

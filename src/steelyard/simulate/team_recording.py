@@ -6,9 +6,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
-from steelyard.logs.team_track import Mask, Track
+from steelyard.logs.team_track import Track
 from steelyard.robots import Omnid
 from steelyard.simulate.motions import Kinematics, Motion
 from steelyard.simulate.team_cases import Slip, TeamScene

@@ -10,6 +10,7 @@ from steelyard.spatial.vectors import (
     cross,
     cross_matrix,
     lever_acceleration,
+    unit_vectors,
 )
 
 __all__ = [
@@ -22,4 +23,5 @@ __all__ = [
     "cross",
     "cross_matrix",
     "lever_acceleration",
+    "unit_vectors",
 ]

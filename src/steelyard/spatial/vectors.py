@@ -28,6 +28,11 @@ def lever_acceleration(omega: Array, alpha: Array, p: Array) -> Array:
     return np.asarray(cross(alpha, p) + cross(omega, cross(omega, p)))
 
 
+def unit_vectors(vectors: Array) -> Array:
+    """Return vectors (..., n) made one long; zero stays zero."""
+    return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+
+
 def cross_matrix(vector: ArrayLike) -> Array:
     """Return [v]x of shape (..., 3, 3), so that [v]x u = v x u."""
     v = np.asarray(vector, dtype=np.float64)

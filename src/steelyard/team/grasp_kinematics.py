@@ -13,9 +13,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
-from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose, Rotation, Twist, cross, cross_matrix
 
 # Second singular value of the angular velocities over the first: below it they are about one axis.

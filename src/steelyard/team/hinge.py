@@ -130,8 +130,8 @@ def find_hinge(first: Array, second: Array, rate: float) -> tuple[Array, Array, 
 class Split:
     """Grasps that are not on one body: `groups` of robots, and between two of them the hinge, if it is one.
 
-    axis, point, swing  of the hinge in the first grasp of the second group; None where it is no hinge
-    twist               (T, N, 6) of all grasps, low-passed
+    hinge  its axis, point and largest angle [rad] in the first grasp of the second group; None where it is no hinge
+    twist  (T, N, 6) of all grasps, low-passed
     """
 
     groups: tuple[tuple[int, ...], ...]

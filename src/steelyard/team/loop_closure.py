@@ -16,8 +16,7 @@ from itertools import permutations
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.team_track import Mask
+from steelyard.check import Array, Mask
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import exp_pose
 from steelyard.team.adjoint import adjoint

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, percent
 from steelyard.identify.regressor import basis
 from steelyard.logs.log import Integers, Mask
 from steelyard.team.payload_model import Group
@@ -283,7 +283,7 @@ def _finding(name: str, reading: Reading, score: float) -> Finding:
         return sign_finding(name)
     text = (
         f"What '{name}' and the others push carries one body, and cancels besides, only with its forces taken as "
-        f"{reading.words()}: that leaves {_percent(float(np.sqrt(score)))} of the variance that is left as given. "
+        f"{reading.words()}: that leaves {percent(float(np.sqrt(score)))} of the variance that is left as given. "
         "They were taken so."
     )
     return Finding("force-unit", text, reading.remedy(name))
@@ -300,7 +300,3 @@ def _undecided(equal: Sequence[tuple[int, int]], names: Sequence[str]) -> Findin
         "not to be trusted."
     )
     return Finding("force-unit", text, f"Check unit, order, signs and frame of the force columns of {robots}.")
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"

@@ -11,7 +11,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Evidence
@@ -20,7 +20,6 @@ from steelyard.inertia.forms import com_jacobian
 from steelyard.logs.team_conditioning import all_conditioned
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_rows import TeamRows
-from steelyard.logs.team_track import Mask
 from steelyard.spatial import Pose
 from steelyard.team import grasp_kinematics
 from steelyard.team.estimate import GraspEstimate, TeamEstimate

@@ -7,11 +7,11 @@ from itertools import combinations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
-from steelyard.logs.team_track import Mask, Track
+from steelyard.logs.team_track import Track
 
 FEWEST = 50  # rows in which noise shows
 VALUES = 10  # different numbers that noise has at the least

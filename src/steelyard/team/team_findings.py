@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, unit_vectors
 from steelyard.team.estimate import GraspEstimate
 
 # A clock is called late from so much [s] and so many standard deviations.
@@ -51,7 +51,7 @@ def _sparse(lost: Array) -> Array:
     rank = int((s > 1e-2).sum())
     mixed = u.T @ lost
     mixed[rank:, :3] = 0.0
-    rows = mixed / np.maximum(np.linalg.norm(mixed, axis=1, keepdims=True), 1e-300)
+    rows = unit_vectors(mixed)
     return np.asarray(np.concatenate([rows[rank:], rows[:rank]]))
 
 

@@ -8,6 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Colours, TriangleMesh
+from steelyard.spatial import unit_vectors
 from steelyard.workshop.tools import Finish, Tool
 
 _SCUFF = np.array([150.0, 148.0, 144.0])
@@ -19,7 +20,7 @@ def painted(tool: Tool) -> TriangleMesh:
     """Return the tool's mesh with its finish on every triangle."""
     a, b, c = np.moveaxis(tool.mesh.corners, 1, 0)
     normal = np.cross(b - a, c - a)
-    normal /= np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-300)
+    normal = unit_vectors(normal)
     flat = tool.mesh.rgb if tool.mesh.rgb is not None else np.full(a.shape, 128, np.uint8)
     return replace(tool.mesh, rgb=finished(tool.finish, (a + b + c) / 3, normal, flat))
 
