@@ -76,6 +76,11 @@ UNMEASURED: dict[str, str] = {
     "inertia-not-identified": "Record the position of the sensor or an accelerometer as well: "
     "without its acceleration only rest counts.",
 }
+# And where the motion, or the wrench, is no body's as it was read.
+UNEXPLAINED: dict[str, str] = {
+    "inertia-not-identified": "See to the findings above first, then identify again.",
+    "stream-delayed": "See to the findings above first: until then, this delay is a guess.",
+}
 
 
 @dataclass(frozen=True)

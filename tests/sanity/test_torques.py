@@ -72,3 +72,15 @@ def still(order: list[int]) -> Recording:
 def test_a_table_of_still_poses_tells_the_order() -> None:
     assert examine(still([0, 1, 2]))[1] == ()
     assert "read as Tx = Ty, Ty = Tx, Tz = Tz" in named(still([1, 0, 2]))
+
+
+def test_an_order_that_leaves_little_unexplained_is_told_too() -> None:
+    """What lies nearly along x changes little where y and z are exchanged."""
+    rng = np.random.default_rng(4)
+    pull = rng.normal(size=(24, 3))
+    pull *= 9.81 / np.linalg.norm(pull, axis=1)[:, None]
+    torque = np.cross([0.002, -0.03, 0.06], -pull) + 1e-4 * rng.normal(size=(24, 3))
+    channels = {"force": -1.3 * pull + 1e-2 * rng.normal(size=(24, 3)), "torque": torque, "gravity": pull}
+    kept = Recording((Stream("poses", channels),), np.array([0, 0, -9.81]), 1)
+    assert examine(kept)[1] == ()
+    assert "read as Tx = Tx, Ty = Tz, Tz = Ty: so" in named(edited(kept, torque=lambda v: v[:, [0, 2, 1]]))

@@ -125,6 +125,7 @@ def test_clean_logs_stay_clean(object_name: str, tmp_path: Path) -> None:
         "rows twice, same stamps",
         "rotation vector, radians as degrees",
         "wrench in W",
+        "force and torque exchanged",
     ],
 )
 def test_the_answer_survives_on_poses(trap: str, examples_dir: Path, data_dir: Path) -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -68,6 +69,40 @@ def test_a_weight_that_a_controller_takes_away_is_told(made: Recording) -> None:
         assert [f.code for f in findings] == ["weight-compensated"], mass
         assert "0.62" in findings[0].message or "0.63" in findings[0].message
     assert examine(compensated(made, 0.0))[1] == ()
+
+
+def test_wrench_and_gravity_both_of_the_other_sign(made: Recording) -> None:
+    both = replace(made, wrench_sign=-made.wrench_sign, gravity=-made.gravity)
+    read, (found,) = examine(both)
+    assert found.code == "wrench-sign-flipped"
+    assert (read.wrench_sign, *read.gravity) == (made.wrench_sign, *made.gravity)
+
+
+def faster(recording: Recording, times: float) -> Recording:
+    """Return the recording with a clock that runs so many times too fast: stamps lie closer together."""
+    streams = (replace(s, time=None if s.time is None else s.time / times) for s in recording.streams)
+    return replace(recording, streams=tuple(streams))
+
+
+@pytest.mark.parametrize("times", [3.0, 6.0])
+def test_a_clock_that_runs_too_fast_is_told(made: Recording, times: float) -> None:
+    first = examine(faster(made, times))[1][0]
+    assert first.code == "motion-mismatch"
+    said = re.search(r"A clock that runs ([0-9.]+) times too fast", first.message)
+    assert said is not None
+    assert float(said[1]) == pytest.approx(times, rel=0.1)
+
+
+def test_it_leaves_the_answer_of_rest(made: Recording) -> None:
+    found = held_object.identify(faster(made, 3.0))
+    assert [f.code for f in found.findings][:2] == ["motion-mismatch", "inertia-not-identified"]
+    assert "findings above" in found.findings[1].remedy
+    assert found.mass == pytest.approx(MASS, abs=3 * found.std[0])
+
+
+def test_a_clock_that_runs_too_slow_looks_like_a_weight_taken_away(made: Recording) -> None:
+    (found,) = (f for f in held_object.identify(faster(made, 0.25)).findings if f.code == "weight-compensated")
+    assert "A clock that runs 4 times too slow, or positions 16 times too small, do so, too" in found.message
 
 
 def test_it_is_said_with_the_refusal_too(made: Recording) -> None:

@@ -68,6 +68,13 @@ def clipped(recording: Recording) -> Recording:
     return edited(recording, force=cut)
 
 
+def exchanged(recording: Recording) -> Recording:
+    """Return the recording with force and torque in each other's columns."""
+    other = {"force": "torque", "torque": "force"}
+    streams = (replace(s, channels={other.get(q, q): v for q, v in s.channels.items()}) for s in recording.streams)
+    return replace(recording, streams=tuple(streams))
+
+
 def reread(recording: Recording, misread: Callable[[Rotation], Rotation]) -> Recording:
     """Return the recording with its rotations as somebody misreads them."""
     return edited(recording, rotation=lambda v: misread(Rotation.nearest(v)).matrix)
@@ -112,6 +119,7 @@ TRAPS: dict[str, tuple[Edit, str]] = {
     "moving axes": (lambda r: reread(r, lambda R: Rotation.from_rpy(-R.inverse().rpy())), "gravity-frame"),
     "torque in N mm": (lambda r: edited(r, torque=lambda v: 1000 * v), "length-in-mm"),
     "force in kN": (lambda r: edited(r, force=lambda v: v / 1000), "force-unit"),
+    "force and torque exchanged": (exchanged, "force-unit"),
     "rows twice, same stamps": (lambda r: repeated(r, False), "rows-duplicated"),
     "rows twice, new stamps": (lambda r: repeated(r, True), "rows-duplicated"),
     "tilt 20": (lambda r: tilted(r, 20, 0, 0), "base-tilted"),

@@ -126,6 +126,10 @@ class Estimate:
         seen = {(f.code, f.message): f for f in (*self.findings, *findings)}
         return replace(self, findings=tuple(seen.values()))
 
+    def with_remedies(self, remedies: Mapping[str, str]) -> Estimate:
+        """Return the estimate with the remedies that `remedies` have for the codes of its findings."""
+        return replace(self, findings=tuple(finding.instead(remedies) for finding in self.findings))
+
     def noted(self, *notes: str) -> Estimate:
         """Return the estimate with more notes."""
         return replace(self, notes=(*self.notes, *notes))

@@ -16,7 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import AT_REST, UNMEASURED, Finding
+from steelyard.findings import AT_REST, UNEXPLAINED, UNMEASURED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
 from steelyard.identify.geodesic import Geodesic
@@ -24,13 +24,13 @@ from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.identify.part_cuts import PartCuts
-from steelyard.identify.rest import RIPPLE
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.alignment import Aligned, align
-from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
+from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.sanity import (
     after,
     allow_softness,
@@ -59,8 +59,6 @@ BALL = 0.5 / np.sqrt(5)
 GRAVITY_FOUND, DRIFT_ALLOWED = "gravity was estimated", "the fit was repeated with a bias that drifts"
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
-# Poses at rest that fix mass, centre of mass and bias without any help from rows in motion.
-FEWEST_POSES = 4
 
 
 @dataclass(frozen=True)
@@ -106,10 +104,11 @@ def identify(
     known = None if known is None else _in_log_sign(known, recording)
     recording, before = examine(recording)
     aligned, level = levelled_as(options.gravity, align(recording), recording)
-    log, unmeasured = _with_known_acceleration(aligned.log, aligned)
+    mistimed = any(f.code == "motion-mismatch" for f in before)
+    log, unmeasured = with_known_acceleration(aligned.log, aligned, mistimed)
     keep, touched = (slice(None), ()) if unmeasured else untouched(log, options.bias == "free")
-    if any(f.code == "weight-compensated" for f in before):
-        touched = ()  # moving rows carry the whole mass, and only look touched
+    if mistimed or any(f.code == "weight-compensated" for f in before):
+        touched = ()  # moving rows carry another mass, and only look touched
     log = without_dead(with_declared(log.rows(keep), recording.noise))
     shape = None if parts is None else _shape(parts, recording.object_pose, recording.object_pose_std)
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
@@ -126,17 +125,19 @@ def identify(
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if aligned.acceleration_from in ENCODERS and parts is None:
         estimate = allow_softness(log, estimate)
-    if unmeasured or log.still.all():
-        better = UNMEASURED if unmeasured else AT_REST
-        estimate = replace(estimate, findings=tuple(finding.instead(better) for finding in estimate.findings))
-    if unmeasured:
-        aligned = replace(aligned, notes=())
+    aligned = replace(aligned, notes=()) if unmeasured else aligned
+    before = before if parts is None or isinstance(parts, Parts) else (*before, *parts.findings)
+    # What is wrong with the log stands before what follows from it.
+    own, estimate = estimate.findings, replace(_with_gain(estimate, aligned), findings=())
+    estimate = estimate.with_findings(*before, *late, *of_sensor, *own, *aligned.findings, *touched)
     if parts is not None and shape is not None:
         estimate = _looked_at(estimate, parts, shape)
-        before = before if isinstance(parts, Parts) else (*before, *parts.findings)
         if not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
-    estimate = _with_gain(estimate, aligned).with_findings(*before, *aligned.findings, *touched, *late, *of_sensor)
+    if estimate.codes() & {"wrench-unexplained", "motion-mismatch"}:
+        estimate = estimate.with_remedies(UNEXPLAINED)
+    elif unmeasured or log.still.all():
+        estimate = estimate.with_remedies(UNMEASURED if unmeasured else AT_REST)
     estimate = replace(estimate, delays_s=dict(aligned.delays_s)).noted(*recording.notes, *aligned.notes)
     return _in_recording_sign(estimate, recording)
 
@@ -233,22 +234,6 @@ def levelled_as(
         raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
     log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
     return replace(aligned, log=log), (f"{GRAVITY_FOUND} {found.words} off the direction given",)
-
-
-def _with_known_acceleration(log: MotionLog, aligned: Aligned) -> tuple[MotionLog, tuple[str, ...]]:
-    """Return the rows whose acceleration is known, and a note where that leaves some out.
-
-    Without a measured acceleration only rows at rest are known; where they are in too few poses, all rows are taken as
-    if at rest and what that misses counts as noise of the wrench. A moving body then looks touched, but is not.
-    """
-    if aligned.acceleration_from != "none" or log.still.all():
-        return log, ()
-    if len(np.unique(log.pose[log.still])) >= FEWEST_POSES:
-        at_rest = log.rows(log.still)
-        at_rest = replace(at_rest, angular_acceleration=np.zeros_like(at_rest.angular_acceleration))
-        return at_rest, ("no stream measures the acceleration: only the rows at rest were used",)
-    quiet = None if log.noise is None else tuple(Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) for n in log.noise)
-    return replace(log, noise=quiet), ("no stream measures the acceleration: it was taken as zero throughout",)
 
 
 def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:

@@ -19,14 +19,15 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding, percent
+from steelyard.findings import REMEDIES, Finding, percent
 from steelyard.logs.misread import MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
-from steelyard.sanity.compensated import both_masses, compensated
+from steelyard.sanity.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.glance import Glance, glance, in_other_axes
 from steelyard.sanity.mirrored import Mirror, mirrored
 from steelyard.sanity.static_fit import StaticFit, fit
+from steelyard.sanity.swapped import examine_swapped
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
 from steelyard.sanity.torques import examine_torques
 from steelyard.sanity.units import scaled
@@ -68,15 +69,17 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     view = glance(recording)
     if view is None:
         return recording, ()
-    found: list[Finding] = []
+    recording, view, swapped = examine_swapped(recording, view)
+    found = list(swapped)
     reading = _reading(view, "", recording.gravity, view.rotation)
     best = _best_rival(recording, view, reading)
     if best is not None:
         found.append(_rival_finding(best, reading))
         recording, reading, view = _as_read(recording, best), best, best.view or view
-    found.extend(less := compensated(view, recording.gravity, reading.rotation))
+    found.extend(masses := examine_both_masses(view, recording.gravity, reading.rotation))
     # What a controller leaves of a weight may have either sign.
-    flipped, findings = (recording, ()) if less else _signs(recording, view, reading)
+    left_over = any(finding.code == "weight-compensated" for finding in masses)
+    flipped, findings = (recording, ()) if left_over else _signs(recording, view, reading)
     if findings:
         reading = _reading(view, "", flipped.gravity, reading.rotation)
     recording = flipped
@@ -191,9 +194,11 @@ def _as_read(recording: Recording, best: Reading) -> Recording:
 
 
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording with the wrench or gravity turned round where the mass comes out negative."""
-    if reading.fit.sign >= 0 or view.sign_free:
+    """Return the recording with the wrench or gravity turned round where the mass comes out negative, or with both."""
+    if reading.fit.sign == 0 or view.sign_free:
         return recording, ()
+    if reading.fit.sign > 0:
+        return _both_signs(recording, view, reading)
     mass = f"The mass comes out as {reading.fit.mass:.3g} ± {reading.fit.mass_std:.2g} kg"
     moved = _moved_sign(view, reading)
     upside_down = moved > 0
@@ -207,6 +212,22 @@ def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     was, now = ("on-object", "on-sensor") if recording.wrench_sign > 0 else ("on-sensor", "on-object")
     message = f'{mass}, so the wrench has the other sign; it was taken as "{now}" instead of "{was}"{doubt}.'
     return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
+
+
+def _both_signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with wrench and gravity turned round where what is accelerated has a negative mass.
+
+    Turned round both, forces at rest stay what they are.
+    """
+    if _moved_sign(view, reading) >= 0:
+        return recording, ()
+    message = (
+        "The force follows gravity as given, but the acceleration as that of a negative mass: wrench and gravity both "
+        "have the other sign; both were turned round."
+    )
+    remedy = f"Check [log] gravity; {REMEDIES['wrench-sign-flipped'][0].lower()}{REMEDIES['wrench-sign-flipped'][1:]}"
+    turned = replace(recording, wrench_sign=-recording.wrench_sign, gravity=-recording.gravity)
+    return turned, (Finding("wrench-sign-flipped", message, remedy),)
 
 
 def _moved_sign(view: Glance, reading: Reading) -> int:

@@ -14,8 +14,9 @@ from steelyard.sanity.glance import Glance, Seen
 from steelyard.sanity.mirrored import REFLECTIONS, in_words
 from steelyard.sanity.static_fit import columns, solve
 
-# Forces must fit so well before torques are judged; torques fit badly, or well, if they leave such shares.
-FORCE, BAD, WELL = 0.1, 0.3, 0.1
+# Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
+# second share, and fit well where they leave less than the third.
+FORCE, BAD, WELL = 0.1, 0.02, 0.1
 # Another order must leave this share of what the order as given leaves.
 MUCH_BETTER = 0.1
 _FEWEST_ROWS = 6
@@ -48,8 +49,9 @@ def examine_torques(view: Glance, gravity: Array, rotation: Array | None) -> tup
     if force_share > FORCE:
         return ()
     felt = force[1:4] if seen.lever is not None else np.zeros(3)
-    if share > BAD:
-        return _ordered(view, seen, turned, share, felt)
+    ordered = _ordered(view, seen, turned, share, felt) if share > BAD else ()
+    if ordered:
+        return ordered
     spread = float(np.linalg.norm(force_std[1:4])) if seen.lever is not None else np.inf
     return _compared(felt, spread, moment[:3]) if share < WELL else ()
 

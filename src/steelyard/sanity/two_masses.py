@@ -13,6 +13,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.both_masses import TAKEN_AWAY, clock_words
 from steelyard.sanity.full_fit import Rows
 from steelyard.spatial import cross_matrix
 
@@ -25,7 +26,7 @@ NOISE, CALM = 3.0, 0.05
 # Below this share a controller has not only taken a weight away.
 TOO_MUCH = -0.7
 _FEWEST_ROWS = 50
-ELSEWHERE = {"weight-compensated", "wrench-unexplained", "base-tilted", "force-unit"}
+ELSEWHERE = {"weight-compensated", "motion-mismatch", "wrench-unexplained", "base-tilted", "force-unit"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,12 +94,12 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         f"gravity as that of {found.weighed:.3g} kg: "
     )
     if short > max(SURE * spread, SHARE * abs(found.mass)):
-        text = (
-            "the controller, or the sensor's driver, takes the weight of a payload away. The answer is what it leaves."
-        )
-        return (Finding.of("weight-compensated", both + text),)
+        other = clock_words(found.mass, found.weighed)
+        return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
-        return (Finding.of("motion-mismatch", f"{both}the load was not accelerated as the poses say."),)
+        other = clock_words(found.mass, found.weighed)
+        text = f"{both}the load was not accelerated as the poses say.{f' {other}.' if other else ''}"
+        return (Finding.of("motion-mismatch", text),)
     far, where = np.abs(found.apart), found.less_std[1:] / max(found.weighed, 1e-9)
     if found.noise < CALM and (far > np.maximum(SURE * where, APART)).any():
         shown = ", ".join(f"{1e3 * v:.0f}" for v in found.apart + 0.0)
