@@ -21,6 +21,7 @@ from steelyard.logs.team_rows import common_time
 from steelyard.team import PublishedTeam, TeamEstimate
 from steelyard.team.angle_units import require_one_angle_unit
 from steelyard.team.joint import JointTeam
+from steelyard.team.length_units import require_one_length_unit
 from steelyard.team.same_numbers import require_own_numbers, stuck_forces
 
 Method = Literal["joint", "paper"]
@@ -41,6 +42,7 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     if method not in METHODS:
         raise BadValue(f"method must be one of {', '.join(METHODS)}; got {method!r}.")
     require_one_angle_unit(log)
+    require_one_length_unit(log)
     require_own_numbers(log)
     found = ESTIMATORS[method].identify(log)
     before = (*stuck_forces(log), *_missing_rows(log), *_missing_wrenches(log, method))

@@ -1,0 +1,39 @@
+"""Whether a robot tells its positions in one unit in all its recordings: how far out they are, how far spread."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.errors import BadValue
+from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_track import Track
+
+# Positions this many times as far from home, and as far spread, are millimetres beside metres.
+MANY = 100.0
+
+
+def require_one_length_unit(log: TeamLog) -> None:
+    """Raise BadValue where the positions of a robot are hundreds of times larger in one recording than in another."""
+    for name in log.names:
+        sizes = {r.name: _size(r.tracks[name]) for r in log.recordings if name in r.tracks}
+        sizes = {where: size for where, size in sizes.items() if size[1] > 0}
+        if len(sizes) < 2:
+            continue
+        small, large = (choose(sizes, key=lambda where: sizes[where][0]) for choose in (min, max))
+        far, spread = (sizes[large][k] / sizes[small][k] for k in (0, 1))
+        if min(far, spread) > MANY:
+            raise BadValue(
+                f"positions of '{name}' are {far:.2g} times as large in '{large}' as in '{small}', and spread "
+                f"{spread:.2g} times as far: one of them is not in the unit that was said. Set the unit "
+                '("m" or "mm") that its "position" has there.'
+            )
+
+
+def _size(track: Track) -> tuple[float, float]:
+    """Return how far from home positions are, and how far spread; zero where there are none."""
+    if "position" not in track.channels:
+        return 0.0, 0.0
+    where = track.channels["position"][track.valid["position"]]
+    if not len(where):
+        return 0.0, 0.0
+    return float(np.median(np.linalg.norm(where, axis=1))), float(np.linalg.norm(where.std(0)))

@@ -1,0 +1,45 @@
+"""Millimetres in one recording of a robot beside metres in another: named, with the key that says so."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import pytest
+
+from steelyard.errors import BadValue
+from steelyard.logs.team_log import TeamLog
+from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.team.length_units import require_one_length_unit
+
+
+def made(case: str, seed: int) -> TeamLog:
+    return simulate_team(TeamScene(CASES[case], motion_samples=400), seed).log
+
+
+def misread(log: TeamLog, number: int, factor: float) -> TeamLog:
+    """Return the log with the positions of its second robot in another unit in one recording."""
+    name, recordings = log.names[1], list(log.recordings)
+    track = recordings[number].tracks[name]
+    channels = {q: factor * v if q == "position" else v for q, v in track.channels.items()}
+    tracks = {**recordings[number].tracks, name: replace(track, channels=channels)}
+    recordings[number] = replace(recordings[number], tracks=tracks)
+    return log.with_recordings(*recordings)
+
+
+@pytest.mark.parametrize("method", METHODS)
+@pytest.mark.parametrize(("number", "factor"), [(0, 1e3), (1, 1e-3), (2, 1e3)])
+def test_it_is_named(method: Method, number: int, factor: float) -> None:
+    with pytest.raises(BadValue, match=r"positions of 'robot1' are .* Set the unit"):
+        identify_team(misread(made("A", 1), number, factor), method)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_sound_logs_pass(case: str) -> None:
+    for seed in range(3):
+        require_one_length_unit(made(case, seed))
+
+
+def test_robots_without_positions_pass() -> None:
+    require_one_length_unit(simulate_team(TeamScene(TeamNoise(), sensing="twists", motion_samples=400), 0).log)
