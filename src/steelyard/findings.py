@@ -108,3 +108,8 @@ class Finding:
 def percent(share: float) -> str:
     """Return a share as a message says it: whole per cent, below ten two figures."""
     return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"
+
+
+def about(value: float) -> str:
+    """Return a factor as a message says it: two figures, without a power of ten."""
+    return f"{float(f'{value:.2g}'):g}"

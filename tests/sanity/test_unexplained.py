@@ -71,6 +71,24 @@ def test_a_weight_that_a_controller_takes_away_is_told(made: Recording) -> None:
     assert examine(compensated(made, 0.0))[1] == ()
 
 
+def test_what_a_controller_leaves_has_no_inertia(made: Recording) -> None:
+    found = held_object.identify(compensated(made, 0.4 * MASS))
+    assert "weight-compensated" in found.codes()
+    assert found.inertia_com is None
+    assert [f.code for f in found.findings].count("inertia-not-identified") == 1
+
+
+def test_positions_a_thousand_times_too_small(made: Recording) -> None:
+    streams = (
+        replace(s, channels={q: v / 1000 if q == "position" else v for q, v in s.channels.items()})
+        for s in made.streams
+    )
+    found = held_object.identify(replace(made, streams=tuple(streams)))
+    assert found.findings[0].code == "motion-mismatch"
+    assert re.search(r"as with positions (9|10)\d+ times too small", found.findings[0].message)
+    assert found.mass == pytest.approx(MASS, abs=3 * found.std[0])
+
+
 def test_wrench_and_gravity_both_of_the_other_sign(made: Recording) -> None:
     both = replace(made, wrench_sign=-made.wrench_sign, gravity=-made.gravity)
     read, (found,) = examine(both)

@@ -126,6 +126,19 @@ class Estimate:
         seen = {(f.code, f.message): f for f in (*self.findings, *findings)}
         return replace(self, findings=tuple(seen.values()))
 
+    def without_inertia(self, message: str) -> Estimate:
+        """Return the estimate with its inertia called not identified, and `inertia-not-identified` with that message.
+
+        Said already of all of it, it is not said again.
+        """
+        known = self.identified.copy()
+        if not known[4:].any():
+            return self
+        known[4:] = False
+        others = (finding for finding in self.findings if finding.code != "inertia-not-identified")
+        told = replace(self, identified=known, findings=tuple(others))
+        return told.with_findings(Finding.of("inertia-not-identified", message))
+
     def with_remedies(self, remedies: Mapping[str, str]) -> Estimate:
         """Return the estimate with the remedies that `remedies` have for the codes of its findings."""
         return replace(self, findings=tuple(finding.instead(remedies) for finding in self.findings))

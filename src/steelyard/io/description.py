@@ -25,6 +25,8 @@ _LOUDEST = 1e6
 _NOISE = ("force", "torque", "acceleration", "angular_acceleration")
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
 
+LEVEL_BASE = f"[log] gives no gravity: {STANDARD_GRAVITY} m/s² along -z of W, a level base, was assumed"
+
 
 def default_gravity() -> Array:
     """Return standard gravity in W, z up (3,) [m/s^2]: what holds where a description does not say."""
@@ -40,7 +42,7 @@ class Description:
     noise        standard deviations, SI
     tool         path of a result, as written
     placed       pose of O in S, None where nothing says
-    notes        what a bare file left to be assumed
+    notes        what was left to be assumed
     """
 
     streams: tuple[StreamSpec, ...]
@@ -85,13 +87,16 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     log.only("gravity", "wrench", "tool")
     gravity = parse_gravity(log) if "gravity" in log else default_gravity()
     placed = parse_object_pose(_section(top, "object"))
+    streams = _streams(top)
+    told = "gravity" in log or any(quantity.name == "gravity" for spec in streams for quantity in spec.quantities)
     return Description(
-        streams=_streams(top),
+        streams=streams,
         gravity=gravity,
         wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
         noise=_noise(_section(top, "noise")),
         tool=log.text("tool"),
         placed=placed,
+        notes=() if told else (LEVEL_BASE,),
     )
 
 

@@ -57,6 +57,8 @@ LARGEST = 2.0
 BALL = 0.5 / np.sqrt(5)
 # How the notes begin that say which direction of gravity was used, and that a drift was found.
 GRAVITY_FOUND, DRIFT_ALLOWED = "gravity was estimated", "the fit was repeated with a bias that drifts"
+# Findings after which motion or wrench are no body's.
+MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
 
@@ -134,7 +136,9 @@ def identify(
         estimate = _looked_at(estimate, parts, shape)
         if not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
-    if estimate.codes() & {"wrench-unexplained", "motion-mismatch"}:
+    if "weight-compensated" in estimate.codes():
+        estimate = estimate.without_inertia("What a controller leaves of a weight has no inertia of its own.")
+    if estimate.codes() & MISREAD:
         estimate = estimate.with_remedies(UNEXPLAINED)
     elif unmeasured or log.still.all():
         estimate = estimate.with_remedies(UNMEASURED if unmeasured else AT_REST)

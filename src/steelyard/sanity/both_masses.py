@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, about
 from steelyard.sanity.glance import Glance
 from steelyard.sanity.static_fit import beside, solve
 
@@ -46,7 +46,8 @@ def clock_words(moved: float, weighed: float) -> str:
     if not TOO_LARGE < ratio < WRONG_RATE**2:
         return ""
     clock, size = ("fast", "large") if weighed > moved else ("slow", "small")
-    return f"A clock that runs {np.sqrt(ratio):.2g} times too {clock}, or positions {ratio:.2g} times too {size}, do so"
+    rate = about(float(np.sqrt(ratio)))
+    return f"A clock that runs {rate} times too {clock}, or positions {about(ratio)} times too {size}, do so"
 
 
 def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) -> tuple[Finding, ...]:
@@ -59,12 +60,16 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     masses, spread, left = both_masses(view, gravity, rotation)
     moved, weighed = float(masses[0]), float(np.sign(masses[0]) * masses[1])
     both = (
-        f"The force follows the acceleration as that of {abs(moved):.3g} ± {spread[0]:.2g} kg, but the direction of "
+        f"The force follows the acceleration as that of {abs(moved):.4g} ± {spread[0]:.2g} kg, but the direction of "
         f"gravity as that of {weighed:.3g} ± {spread[1]:.2g} kg: "
     )
     large = abs(moved) > SURE * spread[0] and TOO_LARGE * (abs(moved) + SURE * spread[0]) < weighed - SURE * spread[1]
     if large and left < CLOSELY:
         text = f"{both}accelerations are too large. {clock_words(abs(moved), weighed)}."
+        return (Finding.of("motion-mismatch", text),)
+    small = weighed > SURE * spread[1] and abs(moved) - SURE * spread[0] > WRONG_RATE**2 * weighed
+    if small and left < CLOSELY:
+        text = f"{both}accelerations are too small, as with positions {about(abs(moved) / weighed)} times too small."
         return (Finding.of("motion-mismatch", text),)
     short = SHARE * abs(moved) - weighed
     sure = abs(moved) > SURE * spread[0] and short > SURE * float(np.hypot(SHARE * spread[0], spread[1]))

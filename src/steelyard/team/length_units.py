@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.errors import BadValue
+from steelyard.findings import about
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 
@@ -23,8 +24,8 @@ def require_one_length_unit(log: TeamLog) -> None:
         far, spread = (sizes[large][k] / sizes[small][k] for k in (0, 1))
         if min(far, spread) > MANY:
             raise BadValue(
-                f"positions of '{name}' are {far:.2g} times as large in '{large}' as in '{small}', and spread "
-                f"{spread:.2g} times as far: one of them is not in the unit that was said. Set the unit "
+                f"positions of '{name}' are {about(far)} times as large in '{large}' as in '{small}', and spread "
+                f"{about(spread)} times as far: one of them is not in the unit that was said. Set the unit "
                 '("m" or "mm") that its "position" has there.'
             )
 
