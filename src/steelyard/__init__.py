@@ -34,7 +34,7 @@ _HOME = {
     "Twist": "steelyard.spatial",
     "Acceleration": "steelyard.spatial",
     "Estimate": "steelyard.identify.estimate",
-    "TeamEstimate": "steelyard.team",
+    "TeamEstimate": "steelyard.team.estimate",
     "Finding": "steelyard.findings",
     "NoiseAware": "steelyard.identify.noise_aware",
     "LeastSquares": "steelyard.identify.least_squares",
@@ -75,7 +75,7 @@ if TYPE_CHECKING:
     from steelyard.spatial import Rotation as Rotation
     from steelyard.spatial import Twist as Twist
     from steelyard.spatial import Wrench as Wrench
-    from steelyard.team import TeamEstimate as TeamEstimate
+    from steelyard.team.estimate import TeamEstimate as TeamEstimate
 
 
 def __getattr__(name: str) -> Any:

@@ -18,13 +18,14 @@ from steelyard.logs.recording import Recording
 from steelyard.logs.team_log import TeamLog
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.parts import Parts
-from steelyard.pipelines import held_object, shared_payload
+from steelyard.pipelines import held_object
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 
 if TYPE_CHECKING:
     from steelyard.io.parts_files import SavedParts
     from steelyard.pipelines.shape_in_parts import Shape
+    from steelyard.pipelines.shared_payload import Method
     from steelyard.shape.cloud import Cloud
     from steelyard.shape.views import Views
 
@@ -74,7 +75,7 @@ def identify(
 
 
 def identify_team(
-    log: str | Path | TeamLog, method: shared_payload.Method = "joint", *, data: str | Path | None = None
+    log: str | Path | TeamLog, method: Method = "joint", *, data: str | Path | None = None
 ) -> TeamEstimate:
     """Return where every robot of a team holds the payload, and its mass, centre of mass and inertia.
 
@@ -85,6 +86,8 @@ def identify_team(
     The answer is in the grasp frame of the reference robot. Raises BadInput where the files make no sense, CannotAnswer
     where they do not determine it.
     """
+    from steelyard.pipelines import shared_payload
+
     return shared_payload.identify_team(log if isinstance(log, TeamLog) else read_team(log, data), method)
 
 

@@ -15,7 +15,7 @@ from click.testing import CliRunner
 
 from steelyard.cli.main import cli, main
 from steelyard.io import read_result
-from steelyard.team import TeamEstimate
+from steelyard.team.estimate import TeamEstimate
 
 EXAMPLE = Path(__file__).parents[2] / "examples" / "omnid_three.toml"
 

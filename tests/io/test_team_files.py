@@ -25,7 +25,7 @@ from steelyard.logs.team_track import Track
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import GraspEstimate, TeamEstimate
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 
 @cache

@@ -19,7 +19,7 @@ from steelyard.report.team_scene import team_scene
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamScene
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import GraspEstimate, TeamEstimate
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 
 def answer(body: InertialParameters, grasps: dict[str, Pose]) -> TeamEstimate:

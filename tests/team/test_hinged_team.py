@@ -22,7 +22,7 @@ from steelyard.report.team_page import team_page
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import TeamEstimate
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge import find_split
 from steelyard.team.hinged_bodies import FROM_TEN, least_mass
 from steelyard.team.hinged_rows import COUNT, EXCHANGED, SEVEN, about_z, equations

@@ -16,9 +16,9 @@ from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import TeamEstimate
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.consistent import consistent
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches

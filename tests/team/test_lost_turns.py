@@ -13,7 +13,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, STILL_TURNS, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
-from steelyard.team import TeamEstimate
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
 NOISY = TeamNoise(force_white_N=0.5, pose_rad=3e-3, pose_m=1e-3)

@@ -13,8 +13,10 @@ from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Presence, TeamNoise, TeamScene, case
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation, Twist
-from steelyard.team import PublishedTeam, TeamEstimate, grasp_kinematics, inertia_matrix, loop_closure, mass_and_com
+from steelyard.team import grasp_kinematics, inertia_matrix, loop_closure, mass_and_com
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.grasps import Grasps
+from steelyard.team.published import PublishedTeam
 
 RNG = np.random.default_rng(11)
 EXACT = TeamScene(sensing="poses", motion_samples=1500)

@@ -15,7 +15,7 @@ from steelyard.logs.team_track import Track
 from steelyard.pipelines.shared_payload import METHODS, Method, _missing_wrenches, identify_team
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
-from steelyard.team import TeamEstimate
+from steelyard.team.estimate import TeamEstimate
 
 
 @cache

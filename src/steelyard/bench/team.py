@@ -19,9 +19,10 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, TeamTruth, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
 from steelyard.spatial import Pose
-from steelyard.team import PublishedTeam, TeamEstimate
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam, needs_twists
 from steelyard.team.pose_team import PoseTeam
+from steelyard.team.published import PublishedTeam
 from steelyard.team.twist_team import TwistTeam
 
 FIRST_SEED = 100

@@ -17,8 +17,8 @@ from steelyard.bench.pool import spread
 from steelyard.check import Array
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
-from steelyard.team import TeamEstimate
 from steelyard.team.adjoint import log as pose_log
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
 FIRST_SEED = 5000

@@ -14,7 +14,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Presence, Slip, TeamScene, case
 from steelyard.spatial import Pose
-from steelyard.team import TeamEstimate
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
 LATE_CASE, LATE_S = "B", 0.013

@@ -40,6 +40,13 @@ def workshop() -> None:
     help="Motion of the log: the paper's brisk one, one below 0.25 m/s everywhere, or still poses only.",
 )
 @click.option(
+    "--noise",
+    type=click.Choice(["none", "low", "moderate", "high"]),
+    default="none",
+    show_default=True,
+    help="Noise of the log that log.toml describes, as in the paper's Table III; motion.npz stays exact.",
+)
+@click.option(
     "--views",
     is_flag=True,
     help="RGB-D views of each tool on a table too, for scan and identify --scan (20 MB each; needs steelyard[images]).",
@@ -52,13 +59,14 @@ def build(
     tools: tuple[str, ...],
     graded: bool,
     motion: str,
+    noise: str,
     views: bool,
     as_json: bool,
 ) -> None:
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
     from steelyard.io.images import require_images
     from steelyard.io.object_writing import write_object, write_object_views
-    from steelyard.simulate.workshop import known_object, scan_of
+    from steelyard.simulate.workshop import known_object, scan_of, sensed
     from steelyard.workshop.catalogue import FAMILIES, build_graded, require
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED
@@ -79,7 +87,8 @@ def build(
         tool = build_tool(name, (seed, k) if variants else None)
         known = known_object(tool, seed, motion)
         known = replace(known, name=f"{tool.name}-s{seed}-{k}" if variants else tool.name)
-        write_object(known, folder / known.name)
+        log = () if noise == "none" or known.track is None else sensed(known.track.columns(), noise, seed)
+        write_object(known, folder / known.name, *log)
         if views:
             write_object_views(*scan_of(known, seed), folder / known.name / "views")
         rows.append({

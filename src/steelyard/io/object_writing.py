@@ -1,14 +1,16 @@
-"""Object folders written: mesh.ply, points.npz, motion.npz, truth.json and log.toml, all or none of them."""
+"""Object folders written: mesh.ply, points.npz, motion.npz, truth.json and log.toml, all or none."""
 
 from __future__ import annotations
 
 import io
 import json
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
@@ -27,26 +29,32 @@ GRADED_NOTE = (
     " Where homogeneous is false the density changes within the part as grading says: density is its mean, and the "
     "whole is exact for the density as it is."
 )
-# motion.npz as a log, so that `steelyard identify log.toml --parts mesh.ply` runs as it stands.
-LOG = """[log]
+# A motion as a log, so that `steelyard identify log.toml --parts mesh.ply` runs as it stands.
+_LOG = """[log]
 gravity = [0, 0, -9.81]   # in the world frame W, m/s^2
-wrench  = "on-object"     # exact: no noise, no bias
+wrench  = "on-object"     # {said}
 
 [[stream]]
-path = "motion.npz"
-time = { columns = ["time"], unit = "s" }
-rotation = { columns = ["rotation_world_from_sensor"], form = "matrix" }
-position = { columns = ["position_world"], unit = "m" }
-force = { columns = ["force_sensor"], unit = "N" }
-torque = { columns = ["torque_sensor"], unit = "N*m" }
+path = "{path}"
+time = {{ columns = ["time"], unit = "s" }}
+rotation = {{ columns = ["rotation_world_from_sensor"], form = "matrix" }}
+position = {{ columns = ["position_world"], unit = "m" }}
+force = {{ columns = ["force_sensor"], unit = "N" }}
+torque = {{ columns = ["torque_sensor"], unit = "N*m" }}
 """
+EXACT = "exact: no noise, no bias"
 
 
-def write_object(known: KnownObject, folder: Path | str) -> None:
+def write_object(
+    known: KnownObject, folder: Path | str, sensed: Mapping[str, Array] | None = None, said: str = EXACT
+) -> None:
     """Write an object folder; it appears complete or not at all. Raises BadFile.
 
     The wrench is the physical one (gravity down), what the sensor applies to the object. `log.toml` describes the
     motion as a log and says where the mesh sits in the sensor.
+
+    sensed  columns of the log as sensors would show them, written beside the exact motion and described in its place;
+            `said` tells in one line how they differ
     """
     folder = Path(folder)
     if known.track is None or known.part_masses is None:
@@ -58,7 +66,10 @@ def write_object(known: KnownObject, folder: Path | str) -> None:
         write_bytes(new / "points.npz", _npz(points))
         write_bytes(new / "motion.npz", _npz(known.track.columns()))
         write_text(new / "truth.json", json.dumps(truth_dict(known), indent=1) + "\n")
-        write_text(new / "log.toml", f"{LOG}\n{object_table(known.X_SO)}")
+        if sensed is not None:
+            write_bytes(new / "log.npz", _npz(dict(sensed)))
+        log = _LOG.format(path="motion.npz" if sensed is None else "log.npz", said=said)
+        write_text(new / "log.toml", f"{log}\n{object_table(known.X_SO)}")
 
 
 def write_object_views(views: Views, X_SW: Pose, folder: Path | str) -> None:

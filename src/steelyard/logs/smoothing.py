@@ -47,8 +47,7 @@ class Smooth:
         held)."""
         times = np.clip(time, self.time[0], self.time[-1])
         left = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.time) - 2)
-        step = self.time[left + 1] - self.time[left]
-        states = _quintic(self.states[left], self.states[left + 1], (times - self.time[left]) / step, step)
+        states = _quintic(self.time, self.states, times, left)
         variance = np.stack([np.interp(times, self.time, v) for v in self.variance.T], 1)
         return states, variance
 
@@ -123,18 +122,23 @@ def _conjugate_times(q: Array, p: Array) -> Array:
     return np.asarray(q[:, :1] * p[:, 1:] - p[:, :1] * q[:, 1:] - np.cross(q[:, 1:], p[:, 1:]))
 
 
-def _quintic(a: Array, b: Array, u: Array, h: Array) -> Array:
-    """Return states between neighbouring states a and b (M, 3, D) at the fraction u (M,) of the step h
-    (M,)."""
-    s, h = u[:, None], h[:, None]
-    gap = b[:, 0] - a[:, 0] - a[:, 1] * h - a[:, 2] * h**2 / 2
-    slope = (b[:, 1] - a[:, 1] - a[:, 2] * h) * h
-    bend = (b[:, 2] - a[:, 2]) * h**2
-    c3, c4, c5 = 10 * gap - 4 * slope + bend / 2, -15 * gap + 7 * slope - bend, 6 * gap - 3 * slope + bend / 2
-    value = a[:, 0] + a[:, 1] * h * s + a[:, 2] * (h * s) ** 2 / 2 + s**3 * (c3 + s * (c4 + s * c5))
-    first = a[:, 1] + a[:, 2] * h * s + s**2 * (3 * c3 + s * (4 * c4 + s * 5 * c5)) / h
-    second = a[:, 2] + s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / h**2
-    return np.stack([value, first, second], 1)
+@njit(cache=True, error_model="numpy")
+def _quintic(knots: Any, states: Any, times: Any, left: Any) -> Any:
+    """Return states (M, 3, D) at times (M,), each right of its knot `left`, from states (N, 3, D) at the knots."""
+    out = np.empty((len(times), 3, states.shape[2]))
+    for k in range(len(times)):
+        a, b, h = states[left[k]], states[left[k] + 1], knots[left[k] + 1] - knots[left[k]]
+        s = (times[k] - knots[left[k]]) / h
+        for c in range(states.shape[2]):
+            gap = b[0, c] - a[0, c] - a[1, c] * h - a[2, c] * h**2 / 2
+            slope = (b[1, c] - a[1, c] - a[2, c] * h) * h
+            bend = (b[2, c] - a[2, c]) * h**2
+            c3, c4 = 10 * gap - 4 * slope + bend / 2, -15 * gap + 7 * slope - bend
+            c5 = 6 * gap - 3 * slope + bend / 2
+            out[k, 0, c] = a[0, c] + a[1, c] * h * s + a[2, c] * (h * s) ** 2 / 2 + s**3 * (c3 + s * (c4 + s * c5))
+            out[k, 1, c] = a[1, c] + a[2, c] * h * s + s**2 * (3 * c3 + s * (4 * c4 + s * 5 * c5)) / h
+            out[k, 2, c] = a[2, c] + s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / h**2
+    return out
 
 
 def _best_ratio(clock: Array, values: Array, order: int) -> tuple[float, int, float]:
@@ -166,7 +170,7 @@ def _pieces(rows: int) -> list[slice]:
 
 
 def _likelihood(clock: Array, values: Array, order: int, scale: float) -> tuple[float, float, float]:
-    _, _, _, _, _, _, quad, log_det, count = _forward(clock, values, _model(order), scale)
+    _, _, _, _, _, _, quad, log_det, count = _forward(clock, values, _model(order), scale, False)
     return float(quad) / values.shape[1], float(log_det), float(count)
 
 
@@ -184,22 +188,26 @@ def _model(order: int) -> tuple[Array, Array]:
 
 def _smooth_kernel(clock: Array, values: Array, order: int, density: float) -> tuple[Any, ...]:
     """Run both passes; return smoothed states, covariances, innovation energy, log-determinant and count."""
-    forward = _forward(clock, values, _model(order), density)
+    forward = _forward(clock, values, _model(order), density, True)
     states, cov = _backward(*forward[:6])
     return states, cov, *forward[6:]
 
 
 @njit(cache=True)
-def _forward(clock, values, model, density):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
-    """Kalman filter with unit measurement noise and process density `density` in the given time unit."""
+def _forward(clock, values, model, density, keep):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Kalman filter with unit measurement noise and process density `density` in the given time unit.
+
+    What only the pass back needs is stored where it is to be kept.
+    """
     base_F, base_Q = model
     n, rows, channels = base_F.shape[0], values.shape[0], values.shape[1]
-    filtered, predicted = np.zeros((rows, n, channels)), np.zeros((rows, n, channels))
-    P_filtered, P_predicted = np.zeros((rows, n, n)), np.zeros((rows, n, n))
-    transition = np.zeros((rows, n, n))
+    stored = rows if keep else 0
+    filtered, predicted = np.zeros((stored, n, channels)), np.zeros((stored, n, channels))
+    P_filtered, P_predicted = np.zeros((stored, n, n)), np.zeros((stored, n, n))
+    transition = np.zeros((stored, n, n))
     x, P = np.zeros((n, channels)), 1e6 * np.eye(n)
     x[0] = values[0]
-    F, Q = np.zeros((n, n)), np.zeros((n, n))
+    F, Q, room, gain = np.zeros((n, n)), np.zeros((n, n)), np.zeros((n, n)), np.zeros(n)
     quad, log_det, count = 0.0, 0.0, 0
     for k in range(rows):
         if k > 0:
@@ -208,12 +216,12 @@ def _forward(clock, values, model, density):  # type: ignore[no-untyped-def]  # 
                 for j in range(n):
                     F[i, j] = base_F[i, j] * dt ** max(j - i, 0)
                     Q[i, j] = density * base_Q[i, j] * dt ** (2 * n - 1 - i - j)
-            x = F @ x
-            P = F @ P @ F.T + Q
-            transition[k] = F
-        predicted[k], P_predicted[k] = x, P
+            _predict(x, P, F, Q, room)
+        if keep:
+            transition[k], predicted[k], P_predicted[k] = F, x, P
         S = P[0, 0] + 1.0
-        gain = P[:, 0] / S
+        for i in range(n):
+            gain[i] = P[i, 0] / S
         for c in range(channels):
             e = values[k, c] - x[0, c]
             for i in range(n):
@@ -223,15 +231,45 @@ def _forward(clock, values, model, density):  # type: ignore[no-untyped-def]  # 
         if k >= _WARM_UP:
             log_det += np.log(S)
             count += 1
-        # Joseph form keeps P positive with a very wide start.
-        A = np.eye(n)
-        A[:, 0] -= gain
-        P = A @ P @ A.T
-        for i in range(n):
-            for j in range(n):
-                P[i, j] += gain[i] * gain[j]
-        filtered[k], P_filtered[k] = x, P
+        _update(P, gain, room)
+        if keep:
+            filtered[k], P_filtered[k] = x, P
     return filtered, P_filtered, predicted, P_predicted, transition, rows, quad, log_det, count
+
+
+@njit(cache=True)
+def _predict(x, P, F, Q, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Move state and covariance one step on, in place; F is upper triangular."""
+    n = len(P)
+    for i in range(n):
+        for c in range(x.shape[1]):
+            total = 0.0
+            for m in range(i, n):
+                total += F[i, m] * x[m, c]
+            x[i, c] = total
+        for j in range(n):
+            total = 0.0
+            for m in range(i, n):
+                total += F[i, m] * P[m, j]
+            room[i, j] = total
+    for i in range(n):
+        for j in range(n):
+            total = Q[i, j]
+            for m in range(j, n):
+                total += room[i, m] * F[j, m]
+            P[i, j] = total
+
+
+@njit(cache=True)
+def _update(P, gain, room):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+    """Take one measurement into the covariance, in place; Joseph's form keeps it positive with a very wide start."""
+    n = len(P)
+    for i in range(n):
+        for j in range(n):
+            room[i, j] = P[i, j] - gain[i] * P[0, j]
+    for i in range(n):
+        for j in range(n):
+            P[i, j] = room[i, j] - room[i, 0] * gain[j] + gain[i] * gain[j]
 
 
 @njit(cache=True)

@@ -18,10 +18,11 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
-from steelyard.team import PublishedTeam, TeamEstimate
 from steelyard.team.angle_units import require_one_angle_unit
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.length_units import require_one_length_unit
+from steelyard.team.published import PublishedTeam
 from steelyard.team.same_numbers import require_own_numbers, stuck_forces
 
 Method = Literal["joint", "paper"]

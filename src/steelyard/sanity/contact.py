@@ -6,7 +6,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from scipy.stats import chi2
+from scipy.special import chdtrc
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
@@ -159,7 +159,7 @@ def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
         both[a:b] = True
         gain = max(_least(slices, H, g, c, both) - base, 0.0)
         freedom = 6 * float(slices.weight[a:b].sum())
-        surprise = -chi2.logsf(gain / memory, freedom / memory) / np.log(10)
+        surprise = -np.log10(max(float(chdtrc(freedom / memory, gain / memory)), 1e-300))
         extra = np.linalg.norm(found.residual[a:b].reshape(-1, 2, 3), axis=2).max(0)
         if surprise > SURPRISE and gain > RATIO * freedom:
             out.append(Touch(a, b, float(extra[1]), float(extra[0])))
