@@ -1,4 +1,4 @@
-"""`steelyard workshop build --views`: views that are read again, with the place of their world in the sensor."""
+"""`steelyard workshop build --views` and `--noise`: views with the place of their world, and logs as sensors show them."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
+import steelyard as sy
 from steelyard.cli.main import cli
 from steelyard.io.object_pose import read_object_pose
 from steelyard.io.view_folders import read_views
@@ -37,3 +38,17 @@ def test_the_place_takes_the_true_tool_to_where_the_robot_holds_it() -> None:
     _, X_SW = scan_of(known, 0, 2)
     X_WO = scan_mesh(known.mesh, 0, count=2).X_WO
     np.testing.assert_allclose((X_SW @ X_WO).matrix(), known.X_SO.matrix(), atol=1e-12)
+
+
+def test_the_log_has_noise_and_the_motion_none(tmp_path: Path) -> None:
+    arguments = ["workshop", "build", str(tmp_path), "--tools", "hammer", "--motion", "slow", "--noise", "low"]
+    assert CliRunner().invoke(cli, arguments).exit_code == 0
+    folder = tmp_path / "hammer"
+    assert "low noise, seed 0: 0.05 N, 0.0025 N m" in (folder / "log.toml").read_text()
+    with np.load(folder / "log.npz") as log, np.load(folder / "motion.npz") as exact:
+        for column, std in (("force_sensor", 0.05), ("torque_sensor", 0.0025), ("position_world", 5e-5)):
+            assert float((log[column] - exact[column]).std()) == pytest.approx(std, rel=0.1)
+    found = sy.identify(folder / "log.toml", parts=folder / "mesh.ply")
+    truth = build("hammer").truth_in_sensor
+    assert found.codes() == set()
+    assert abs(found.mass - float(truth.mass)) < 3 * found.std[0]

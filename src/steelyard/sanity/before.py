@@ -8,6 +8,8 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.conventions import examine_conventions
+from steelyard.sanity.leaps import examine_leaps
+from steelyard.sanity.memory import examine_memory
 from steelyard.sanity.rows import dead_channels, examine_rows
 from steelyard.sanity.silent import without_silent
 from steelyard.sanity.units import examine_units
@@ -27,6 +29,7 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     recording, rows = examine_rows(recording)
     recording = replace(recording, dead=dead_channels(recording))
     recording, units = examine_units(recording)
+    recording = examine_memory(examine_leaps(recording))
     recording, conventions = examine_conventions(recording)
     # Misread rotations leave a channel unexplained, too.
     recording, silent = (recording, ()) if conventions else without_silent(recording)

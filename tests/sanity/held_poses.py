@@ -1,0 +1,35 @@
+"""Logs of a hammer at rest in one pose after another, as rows of one stream."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from steelyard.logs.recording import Recording, Stream
+from steelyard.simulate.handling import RATE_HZ, motion_arrays
+from steelyard.simulate.noise import Spectrum, unit_noise
+from steelyard.workshop.catalogue import build
+
+BODY = build("hammer").truth_in_sensor
+FORCE, TORQUE = 0.05, 0.0025
+NAMES = {"rotation": "rotation_world_from_sensor", "position": "position_world"}
+FELT = {"force": ("force_sensor", FORCE), "torque": ("torque_sensor", TORQUE)}
+
+
+def recorded(variant: str, seed: int, spectrum: Spectrum = "white") -> Recording:
+    """Return a log of handling the hammer with noise of forces and torques, all of it in one stream."""
+    arrays = motion_arrays(variant, BODY)
+    noise = unit_noise(np.random.default_rng(seed), len(arrays["time"]), 6, spectrum, RATE_HZ)
+    channels = {name: arrays[column] for name, column in NAMES.items()}
+    for part, (name, (column, std)) in zip(np.split(noise, 2, axis=1), FELT.items(), strict=True):
+        channels[name] = arrays[column] + std * part
+    return Recording((Stream("log", channels, arrays["time"]),), np.array([0, 0, -9.81]))
+
+
+def rows(recording: Recording, which: np.ndarray, restamped: bool = False) -> Recording:
+    """Return some rows of the log, with their stamps, or stamped anew without a gap."""
+    (stream,) = recording.streams
+    assert stream.time is not None
+    time = stream.time[which]
+    time = np.arange(len(time)) / RATE_HZ if restamped else time
+    cut = Stream(stream.name, {q: v[which] for q, v in stream.channels.items()}, time)
+    return Recording((cut,), recording.gravity, noise=recording.noise)
