@@ -1,4 +1,4 @@
-"""`steelyard workshop build --views` and `--noise`: views with the place of their world, and logs as sensors show them."""
+"""`steelyard workshop build --views` and `--noise`: views with their place, and logs as noisy sensors show them."""
 
 from __future__ import annotations
 
