@@ -11,8 +11,9 @@ from held_poses import BODY, recorded, rows
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
-from steelyard.sanity.leaps import examine_leaps
+from steelyard.sanity.leaps import examine_leaps, examine_sparse
 from steelyard.simulate.handling import motion_arrays
+from steelyard.spatial import Rotation
 
 
 def missed(found: Estimate) -> np.ndarray:
@@ -80,3 +81,26 @@ def test_a_row_that_is_wrong_is_no_leap() -> None:
     stream = replace(log.streams[0], channels={**log.streams[0].channels, "rotation": turned})
     spoilt = replace(log, streams=(stream,))
     assert examine_leaps(spoilt) is spoilt
+
+
+@pytest.mark.parametrize("count", [8, 24])
+def test_a_row_a_stop_is_a_table_whatever_its_stamps(count: int) -> None:
+    rng = np.random.default_rng(5)
+    turns = Rotation.exp(1.2 * rng.normal(size=(count, 3)))
+    pull = turns.inverse().apply(np.array([0, 0, -9.81]))
+    force = -float(BODY.mass) * pull
+    channels = {
+        "rotation": turns.matrix,
+        "force": force + 0.05 * rng.normal(size=(count, 3)),
+        "torque": np.cross(BODY.com, force) + 0.0025 * rng.normal(size=(count, 3)),
+    }
+    log = Recording((Stream("stops", channels, 4.0 * np.arange(count)),), np.array([0, 0, -9.81]))
+    found = held_object.identify(log)
+    assert "rows are 4 s apart, too far to tell a motion: each was read as a still pose" in found.notes
+    assert missed(found).max() < 4
+
+
+def test_stamps_in_another_unit_are_not_sparse() -> None:
+    log = recorded("slow", 0)
+    slow = replace(log, streams=tuple(replace(s, time=1000 * s.time) for s in log.streams if s.time is not None))
+    assert examine_sparse(slow) is slow

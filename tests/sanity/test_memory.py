@@ -44,3 +44,9 @@ def test_it_is_said() -> None:
     (note,) = read.notes
     assert "rows of one pose remember each other over" in note
     assert 6 <= len(read.streams[0]) <= 60
+
+
+def test_a_motion_without_a_clock_is_no_pose() -> None:
+    log = recorded("slow", 0, "2hz")
+    moving = replace(log, streams=tuple(replace(s, time=None, poses=True) for s in log.streams))
+    assert examine_memory(moving) is moving

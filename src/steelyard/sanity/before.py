@@ -8,7 +8,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.conventions import examine_conventions
-from steelyard.sanity.leaps import examine_leaps
+from steelyard.sanity.leaps import examine_leaps, examine_sparse
 from steelyard.sanity.memory import examine_memory
 from steelyard.sanity.rows import dead_channels, examine_rows
 from steelyard.sanity.silent import without_silent
@@ -24,6 +24,7 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     Rows that are no measurements are left out; units, signs and frames are put right where the numbers leave no
     doubt, so that the answer is right all the same. Each finding says what was assumed.
     """
+    recording = examine_sparse(recording)
     _require_rows(recording)
     read, recording = recording.findings, replace(recording, findings=())
     recording, rows = examine_rows(recording)

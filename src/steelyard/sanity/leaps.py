@@ -21,6 +21,8 @@ from steelyard.sanity.still_rows import angles, as_table, spans, split
 TURN, FASTEST_TURN, WAY, FASTEST_WAY = np.radians(5.0), 15.0, 0.03, 10.0
 # A pause is longer than this [s] and than so many steps of the clock.
 PAUSE_S, STEPS = 0.5, 5.0
+# Rows this far apart [s] tell no motion.
+SPARSE_S = 0.5
 # So long [s] is the pause put where poses leap between stretches of motion; where more rows than this share leap, none
 # is.
 PUT_S, MOST = 2.0, 0.01
@@ -28,6 +30,24 @@ PUT_S, MOST = 2.0, 0.01
 REST, AT_REST, FEWEST_ROWS = np.radians(1.0), 0.97, 5
 # Averages are over about so long [s]; streams with clocks of their own may be so late [s].
 WINDOW_S, LATE_S = 0.5, 0.25
+
+
+def examine_sparse(recording: Recording) -> Recording:
+    """Return a log whose rows are too far apart in time to tell a motion as a table of still poses; a note says so.
+
+    Streams with different stamps come back as they are: nothing says which rows belong together. So do rows that turn
+    little by little: their stamps are in another unit.
+    """
+    first = recording.streams[0].time
+    if first is None or any(s.time is None or not np.array_equal(s.time, first) for s in recording.streams):
+        return recording
+    step = float(np.median(np.diff(first))) if len(first) > 1 else 0.0
+    R = next((s.channels["rotation"] for s in recording.streams if "rotation" in s.channels), None)
+    if step < SPARSE_S or R is None or not (angles(np.swapaxes(R[:-1], 1, 2) @ R[1:]) > TURN).any():
+        return recording
+    streams = tuple(replace(s, time=None, poses=True, delay=None) for s in recording.streams)
+    note = f"rows are {step:.3g} s apart, too far to tell a motion: each was read as a still pose"
+    return replace(recording, streams=streams, notes=(*recording.notes, note))
 
 
 def examine_leaps(recording: Recording) -> Recording:

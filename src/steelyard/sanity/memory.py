@@ -30,8 +30,10 @@ def examine_memory(recording: Recording) -> Recording:
     felt = [s.channels[q] for s in recording.streams for q in ("force", "torque") if q in s.channels]
     if down is None or any(len(values) != len(down) for values in felt):
         return recording
-    poses = spans(np.cumsum(np.append(False, _apart(down) > SAME)))
-    if len(down) < FEWEST_ROWS * len(poses):
+    poses = spans(np.cumsum(np.append(False, _apart(down[:-1], down[1:]) > SAME)))
+    middle = np.repeat(down[poses.mean(1).astype(np.int64)], np.diff(poses, axis=1)[:, 0], axis=0)
+    # Rows that turn little by little are a motion.
+    if len(down) < FEWEST_ROWS * len(poses) or (_apart(middle, down) > SAME).any():
         return recording
     worth = _worth(np.hstack(felt), poses)
     if worth < WORTH_LESS:
@@ -50,12 +52,12 @@ def _down(stream: Stream) -> Array | None:
     return next((stream.channels[q] for q in ("rotation", "gravity", "specific_force") if q in stream.channels), None)
 
 
-def _apart(down: Array) -> Array:
-    """Return the angle (N - 1,) [rad] between rows of rotations (N, 3, 3) or of vectors (N, 3)."""
+def _apart(down: Array, other: Array) -> Array:
+    """Return the angle (N,) [rad] between rows of rotations (N, 3, 3) or of vectors (N, 3)."""
     if down.ndim == 3:
-        return angles(np.swapaxes(down[:-1], 1, 2) @ down[1:])
-    unit = down / np.maximum(np.linalg.norm(down, axis=1, keepdims=True), 1e-300)
-    return np.asarray(np.arccos(np.clip((unit[:-1] * unit[1:]).sum(1), -1.0, 1.0)))
+        return angles(np.swapaxes(down, 1, 2) @ other)
+    sizes = np.linalg.norm(down, axis=1) * np.linalg.norm(other, axis=1)
+    return np.asarray(np.arccos(np.clip((down * other).sum(1) / np.maximum(sizes, 1e-300), -1.0, 1.0)))
 
 
 def _worth(values: Array, poses: Integers) -> float:
