@@ -31,6 +31,7 @@ from steelyard.sanity.swapped import examine_swapped
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
 from steelyard.sanity.torques import examine_torques
 from steelyard.sanity.units import scaled
+from steelyard.sanity.weightless import require_weight
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
 MUCH_BETTER = 0.25
@@ -65,7 +66,10 @@ class Reading:
 
 
 def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording in the conventions that explain it, and a finding for each that was not as said."""
+    """Return the recording in the conventions that explain it, and a finding for each that was not as said.
+
+    Raises CannotAnswer where the force shows no weight in any.
+    """
     view = glance(recording)
     if view is None:
         return recording, ()
@@ -94,6 +98,8 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
         blind = None if findings else blind_axis(view, reading.rotation)
         if blind is not None and not found:
             found.extend(blind_tilt(view, recording.gravity, blind))
+    if not found:
+        require_weight(view, recording.gravity, reading.rotation, reading.fit)
     return recording, tuple(found)
 
 
