@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 import pytest
 from parts_blocks import body, solid
+from scipy.spatial import cKDTree
 
 from steelyard.parts.colours import colour_modes
 from steelyard.parts.prints import without_prints
 from steelyard.parts.skin import skin_of
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.volume import enclose
 
 BAR = ((0, 0, 0), (0.12, 0.02, 0.02))
 HALVES = [((0, 0, 0), (0.06, 0.02, 0.02)), ((0.06, 0, 0), (0.12, 0.02, 0.02))]
@@ -117,3 +120,15 @@ def test_the_order_of_points_changes_nothing():
     moved = cloud.chosen(order)
     other = colour_modes(rgb[order], skin_of(solid(moved, [BAR])))
     np.testing.assert_array_equal(colour_modes(rgb, skin).label[order], other.label)
+
+
+def test_a_lamp_on_a_round_body_is_found_under_the_noise_of_a_camera():
+    """Near places of a ball differ little in brightness, less than the noise of one pixel."""
+    k = np.arange(2500) + 0.5
+    z, turn = 1 - 2 * k / 2500, np.pi * (1 + 5**0.5) * k
+    normal = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1)
+    cloud = Cloud(0.03 * normal, noisy(np.array([200, 40, 40]) * (0.85 + 0.15 * normal[:, [0]]), 4))
+    mesh = enclose(cloud).mesh
+    modes = colour_modes(cloud.rgb[cKDTree(cloud.xyz).query(mesh.vertices)[1]], skin_of(mesh))
+    np.testing.assert_allclose(modes.lamp[:3], [0.15 / 0.85, 0, 0], atol=0.03)
+    assert np.bincount(modes.label).max() > 0.97 * len(mesh.vertices)

@@ -24,6 +24,7 @@ FINEST, COARSEST = 0.03, 0.2
 _STEPS = 3.0  # one colour reaches this many median steps between neighbours
 _LEFT = 0.75  # of the noise: what averaging leaves of it is alike in neighbours, and so not seen between them
 _RARE = 0.01  # a colour has at least this share of the points
+_ONE_SIDE = 0.9  # product of the normals of neighbours on one side of a thin body, which a lamp lights alike
 _TURNED = 0.15  # between the normals of a pair, for it to tell of the lamp
 _LAMP_SEEN = 0.1  # weaker shading is below the difference of two colours
 _LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
@@ -59,20 +60,19 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     seen     (V,) whose colour was measured; the rest take the colour that the nearest of those has without the lamp
     """
     seen = np.ones(len(rgb), dtype=bool) if seen is None or not seen.any() else seen
-    colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near
-    facing, flatness = skin.normals, skin.flatness
-    if normals is not None:
-        facing, flatness = normals, np.einsum("id,ikd->ik", normals, normals[near[:, :NEIGHBOURS]]).mean(1)
-    lamp = _lamp(colour, facing, np.where(seen, flatness, 0.0), skin.vertices)
+    colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near[:, :NEIGHBOURS]
+    facing = skin.normals if normals is None else normals
+    alike = np.einsum("id,ikd->ik", facing, facing[near])
+    flatness = skin.flatness if normals is None else alike.mean(1)
+    calm = _without_noise(colour, near, _step(colour, near, seen), alike > _ONE_SIDE)
+    lamp = _lamp(calm, facing, np.where(seen, flatness, 0.0), skin.vertices)
     sure = seen.copy()
     if lamp.any():
         colour = colour / (1 + _harmonics(facing) @ lamp)[:, None]
         sure &= flatness > min(0.95, float(np.median(flatness[seen])))
     colour = _lent(colour, skin.vertices, seen)
-    raw, near = colour, near[:, :NEIGHBOURS]
-    noise = _step(colour, near, sure)
-    if noise > FINEST / _STEPS:
-        colour = _averaged(colour, near, noise)
+    raw, noise = colour, _step(colour, near, sure)
+    colour = _without_noise(colour, near, noise)
     shade = _SHADE * float(np.median(np.linalg.norm(colour, axis=1))) if lamp.any() else 0.0
     reach = float(np.clip(max(_STEPS * _step(colour, near, sure), _LEFT * noise, shade), FINEST, COARSEST))
     modes = _modes(colour, near, sure, reach)
@@ -160,12 +160,14 @@ def _step(colour: Array, near: Integers, sure: Any) -> float:
     return float(np.median(gaps[sure])) if sure.any() else 0.0
 
 
-def _averaged(colour: Array, near: Integers, noise: float) -> Array:
-    """Return colours averaged over neighbours of like colour, twice: noise goes, borders stay."""
+def _without_noise(colour: Array, near: Integers, noise: float, which: Any = True) -> Array:
+    """Return colours averaged over those neighbours (V, K) of like colour, twice: noise goes, borders stay."""
+    if noise <= FINEST / _STEPS:
+        return colour
     width = float(np.clip(_STEPS * noise, FINEST, COARSEST))
     for _ in range(2):
         gap = np.linalg.norm(colour[near] - colour[:, None], axis=2)
-        weight = np.exp(-0.5 * (gap / width) ** 2)
+        weight = which * np.exp(-0.5 * (gap / width) ** 2)
         colour = (colour + (weight[:, :, None] * colour[near]).sum(1)) / (1 + weight.sum(1))[:, None]
     return colour
 
