@@ -92,6 +92,30 @@ def test_a_bend_is_no_seam():
         assert len(segment(cloud, mesh)) == 1
 
 
+def pipe(outer: float = 0.016, inner: float = 0.013, length: float = 0.15, points: int = 2000, seed: int = 0) -> Cloud:
+    """Points evenly over a pipe of one colour, its ends too."""
+    rng = np.random.default_rng(seed)
+    end = (outer**2 - inner**2) / 2
+    face = rng.choice(4, size=points, p=np.array(share := [outer * length, inner * length, end, end]) / sum(share))
+    ring = np.sqrt(rng.uniform(inner**2, outer**2, points))
+    radius = np.choose(face, [outer, inner, ring, ring])
+    height = np.choose(face, [length * rng.uniform(size=points)] * 2 + [np.zeros(points), np.full(points, length)])
+    turn = 2 * np.pi * rng.uniform(size=points)
+    xyz = np.stack([radius * np.cos(turn), radius * np.sin(turn), height], axis=1)
+    return Cloud(xyz, np.tile(np.uint8(STEEL), (points, 1)))
+
+
+@pytest.mark.parametrize("cloud", [pipe(seed=1), pipe(0.02, 0.018)])
+def test_a_pipe_is_one_part_though_its_wall_turns_faster_inside(cloud: Cloud) -> None:
+    assert len(segment(cloud, enclose(cloud))) == 1
+
+
+def test_a_bracket_bent_of_sheet_is_one_part():
+    boxes = [((0, 0, 0), (0.06, 0.04, 0.002)), ((0, 0, 0.002), (0.002, 0.04, 0.06))]
+    cloud, mesh = made(boxes, [STEEL, STEEL])
+    assert len(segment(cloud, mesh)) == 1
+
+
 def test_turned_and_in_another_order_the_parts_are_the_same():
     cloud, mesh = made(MALLET, [RUBBER, STEEL])
     found = segment(cloud, mesh)

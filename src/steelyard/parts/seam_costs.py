@@ -15,13 +15,13 @@ FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surfa
 _SIZE = 0.02  # small clusters first (as in clustering.Hollow)
 _STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
 # Columns of the table of contacts between two clusters.
-AREA, VECTOR, LENGTH, TURN = 0, 1, 4, 10  # scalar, 3, 6 and 6 numbers
-WIDTH = 16
+AREA, VECTOR, LENGTH, TURN, BEHIND = 0, 1, 4, 10, 16  # scalar, 3 and three times 6 numbers
+WIDTH = 22
 
 
 @numba.njit(cache=True, nogil=True)
 def support_of(row: Any, smaller: float) -> float:
-    """Return how much of a seam, 0..1, the contact `row` (16,) is: creased around, a neck of the smaller cluster."""
+    """Return how much of a seam, 0..1, the contact `row` (22,) is: creased around, a neck of the smaller cluster."""
     area, length = row[AREA], row[LENGTH] + row[LENGTH + 1] + row[LENGTH + 2]
     if area <= POINT * smaller ** (2 / 3):
         return 1.0 / FAR
@@ -36,19 +36,21 @@ def support_of(row: Any, smaller: float) -> float:
     plane = min(max((np.sqrt(straight) - 0.2) / 0.3, 0.0), 1.0)
     if straight > 0:
         x, y, z = x / np.sqrt(straight), y / np.sqrt(straight), z / np.sqrt(straight)
-    turn, over = 0.0, 0.0
-    for first, result in ((TURN, 0), (LENGTH, 1)):
-        along = (
-            x * x * row[first] + y * y * row[first + 1] + z * z * row[first + 2]
-            + 2 * (x * y * row[first + 3] + x * z * row[first + 4] + y * z * row[first + 5])
-        )  # fmt: skip
-        mixed = plane * along + (1 - plane) * (row[first] + row[first + 1] + row[first + 2])
-        if result == 0:
-            turn = mixed
-        else:
-            over = mixed
-    crease = (turn / max(over, 1e-3 * length) - STRAIGHT) / (CREASED - STRAIGHT)
+    # What a wall turns up inside and down outside is a bend.
+    turn = _along(row, TURN, x, y, z, plane) + min(_along(row, BEHIND, x, y, z, plane), 0.0)
+    over = max(_along(row, LENGTH, x, y, z, plane), 1e-3 * length)
+    crease = (turn / over - STRAIGHT) / (CREASED - STRAIGHT)
     return float(min(max(crease, 0.0), 1.0) * min(neck, 1.0))
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _along(row: Any, first: int, x: float, y: float, z: float, plane: float) -> float:
+    """Return the sum over a border, along a direction where its contact is plane (1), of all ways across where not."""
+    along = (
+        x * x * row[first] + y * y * row[first + 1] + z * z * row[first + 2]
+        + 2 * (x * y * row[first + 3] + x * z * row[first + 4] + y * z * row[first + 5])
+    )  # fmt: skip
+    return float(plane * along + (1 - plane) * (row[first] + row[first + 1] + row[first + 2]))
 
 
 @numba.njit(cache=True, nogil=True)

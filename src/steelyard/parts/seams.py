@@ -3,7 +3,8 @@
 Between two clusters of one colour a seam shows where three things agree:
 * their union is hollow: hull(a u b) - v_a - v_b over the whole volume (eq. 8 of "The Sum of Its Parts");
 * the surface turns up across the border, on the mean around it. At a bend it turns up inside and down outside, which
-  cancels whatever the radius; where an arm leaves a body or a screw a nut, it turns up all around;
+  cancels; where an arm leaves a body or a screw a nut, it turns up all around. In thin walls, which turn faster inside
+  than outside, what lies behind a place is looked at: what it turns down is taken off;
 * the contact is a neck: small against the smaller cluster. A rib or flange is joined along its whole length.
 Their product is the cost of keeping the two together. Colours are joined last, at the cost of the surface painted over.
 """
@@ -19,7 +20,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.hulls import vertices_of_both
-from steelyard.parts.seam_costs import AREA, LENGTH, PAINT, TURN, VECTOR, WIDTH, price_of, support_of
+from steelyard.parts.seam_costs import AREA, BEHIND, LENGTH, PAINT, TURN, VECTOR, WIDTH, price_of, support_of
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import HullWork, hull_work
 from steelyard.shape.mesh import Integers
@@ -49,7 +50,7 @@ class _Clusters(NamedTuple):
     volume, share, colour (N,)  share of the surface; colour -1 where there are several     middle (N, 3)
     hull     (N,) volume of the convex hull       node (N,) in the tree
     changed  (N,) since its pairs were priced     best (N,) the row above with the least price, -1 without one
-    contact  (N, N, 16) and touch (N, N) with every other
+    contact  (N, N, 22) and touch (N, N) with every other
     known    (N, N) a bound from below of the pair's hull, and whether it is exact
     price    (N, N) what orders merges, infinite where a pair is not to be joined
     """
@@ -111,10 +112,11 @@ def seam_tree(
 def _contacts(
     xyz: Array, skin: Skin, piece: Integers, count: int, pairs: Integers, corners: Integers, scale: float
 ) -> Array:
-    """Return for every two pieces (N, N, 16): contact area, its vector sum, and sums along their common border.
+    """Return for every two pieces (N, N, 22): contact area, its vector sum, and sums along their common border.
 
-    The border's sums are of edge length l over d d^T and of l times the turn over d d^T, d the unit vector across: with
-    them, the mean turn along any direction is known, for any union of pieces.
+    The border's sums are of edge length l over d d^T, of l times the turn and of l times the turn of the other side of
+    a thin wall, d the unit vector across: with them, the mean turns along any direction are known, for any union of
+    pieces.
     """
     table = np.zeros((count, count, WIDTH))
     ends = piece[pairs]
@@ -131,12 +133,13 @@ def _contacts(
     ends = piece[skin.cell[skin.beside]]
     apart = ends[:, 0] != ends[:, 1]
     i, j = ends[apart].T
-    across, length, turn = skin.across[apart], skin.lengths[apart] / scale, skin.turning[apart]
+    across, length = skin.across[apart], skin.lengths[apart] / scale
+    sums = (LENGTH, length), (TURN, length * skin.turning[apart]), (BEHIND, length * skin.turning_behind[apart])
     for k, (p, q) in enumerate(((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))):
-        part = length * across[:, p] * across[:, q]
-        for one, two in ((i, j), (j, i)):
-            np.add.at(table, (one, two, LENGTH + k), part)
-            np.add.at(table, (one, two, TURN + k), part * turn)
+        for column, value in sums:
+            part = value * across[:, p] * across[:, q]
+            np.add.at(table, (i, j, column + k), part)
+            np.add.at(table, (j, i, column + k), part)
     return table
 
 

@@ -14,6 +14,7 @@ from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross, unit_vectors
 
 NEAR = 16
+OPPOSITE = -0.5  # product of the normals of a vertex and one behind it, on the other side of a thin wall
 SMOOTH = 0.8  # weight of a neighbour's normal beside the vertex's own
 
 
@@ -101,7 +102,22 @@ class Skin:
         It is the change of the normals at the two apexes along the way between them, so that it spans three edges:
         single dihedral angles of a surface through scattered points are mostly noise.
         """
+        return self._turn(self.smooth_normals)
+
+    @cached_property
+    def turning_behind(self) -> Array:
+        """How far the other side of a thin wall turns up (E,) along the same ways [rad], 0 where there is none near.
+
+        It is the turn between the vertices behind the apexes: the nearest whose normals are opposite.
+        """
         normals = self.smooth_normals
+        opposite = np.einsum("id,ikd->ik", normals, normals[self.near]) < OPPOSITE
+        nearest = np.take_along_axis(self.near, opposite.argmax(1)[:, None], 1)[:, 0]
+        thin = opposite.any(1)[self.apex].all(1)
+        return np.where(thin, self._turn(normals[nearest]), 0.0)
+
+    def _turn(self, normals: Array) -> Array:
+        """Return how much less normals (V, 3) point along the way (E,) across each edge, at its end than before it."""
         change = normals[self.apex[:, 1]] - normals[self.apex[:, 0]]
         return np.asarray(-(change * self.across).sum(1))
 
