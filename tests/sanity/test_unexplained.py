@@ -10,9 +10,10 @@ import pytest
 
 import steelyard as sy
 from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.pipelines import held_object
-from steelyard.sanity import examine
+from steelyard.sanity import examine, examine_body
 from steelyard.simulate import hammer
 
 MASS = 0.62464
@@ -145,3 +146,22 @@ def test_a_wrench_that_no_body_explains_is_told(made: Recording, std: float) -> 
     assert "wrench-unexplained" in found.codes()
     assert "wrench-unexplained" not in sy.identify(noisy(made, std)).codes()
     assert "wrench-unexplained" not in sy.identify(made).codes()
+
+
+def test_forces_in_kgf_leave_no_body_and_are_named(made: Recording) -> None:
+    """Ten free numbers fit: a tenth of the mass ten times as far out. But no mass has so little inertia there."""
+    found = sy.identify(forces(made, np.eye(3) / 9.80665))
+    (unit,) = (f for f in found.findings if f.code == "force-unit")
+    assert "9.81 times, as when forces in kgf are read as N" in unit.message
+    assert not found.codes() & {"wrench-unexplained", "motion-mismatch"}
+
+
+def test_residuals_that_nothing_explains_are_said(made: Recording) -> None:
+    sound = sy.identify(made)
+    bad = replace(sound, evidence=replace(sound.evidence, chi2_per_dof=6.25))
+    (said,) = examine_body(bad, ())
+    assert said.code == "wrench-unexplained"
+    assert said.message.startswith("The residuals are 2.5 times what the channels scatter from row to row")
+    assert not examine_body(sound, ())
+    for code in ("motion-mismatch", "gains-differ", "noise-level-off"):
+        assert not examine_body(bad, (Finding.of(code, ""),))

@@ -36,8 +36,10 @@ from steelyard.sanity import (
     allow_softness,
     drift_of,
     examine,
+    examine_body,
     examine_masses,
     examine_sensor,
+    examine_wrench_unit,
     fitted_gravity,
     impossible_density,
     levelled,
@@ -123,8 +125,13 @@ def identify(
         estimate = load.estimate().noted(f"{DRIFT_ALLOWED} (most surely {drift.surest_words})")
         late = after(log, estimate, aligned, recording, drift)
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
+    if parts is None:
+        late = examine_wrench_unit(log, estimate, lambda rows: replace(load, log=rows).estimate(), before, late)
+        touched = () if any(f.code == "force-unit" for f in late) else touched  # it only seems so in a wrong unit
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
+    if parts is None:
+        of_sensor = (*of_sensor, *examine_body(estimate, (*before, *late, *of_sensor)))
     if aligned.acceleration_from in ENCODERS and parts is None:
         estimate = allow_softness(log, estimate)
     aligned = replace(aligned, notes=()) if unmeasured else aligned

@@ -5,6 +5,7 @@ from steelyard.sanity.before import examine
 from steelyard.sanity.contact import untouched
 from steelyard.sanity.density import impossible_density
 from steelyard.sanity.gravity import fitted_gravity, levelled
+from steelyard.sanity.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.rows import dead_channels
 from steelyard.sanity.sensor_matrix import examine_sensor
 from steelyard.sanity.soft_arm import allow_softness
@@ -16,8 +17,10 @@ __all__ = [
     "dead_channels",
     "drift_of",
     "examine",
+    "examine_body",
     "examine_masses",
     "examine_sensor",
+    "examine_wrench_unit",
     "fitted_gravity",
     "impossible_density",
     "levelled",

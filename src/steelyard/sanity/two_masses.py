@@ -20,6 +20,8 @@ from steelyard.spatial import cross_matrix
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
 # distance [m], and leaves less of the squared residual.
 SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
+# No tool's tip is farther [m] from the sensor.
+FARTHEST = 5.0
 # Noise of an acceleration lowers the mass that it shows by its share of the variance; so many times that is allowed.
 # Where centres lie is judged below the second share only.
 NOISE, CALM = 3.0, 0.05
@@ -101,7 +103,7 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         text = f"{both}the load was not accelerated as the poses say.{f' {other}.' if other else ''}"
         return (Finding.of("motion-mismatch", text),)
     far, where = np.abs(found.apart), found.less_std[1:] / max(found.weighed, 1e-9)
-    if found.noise < CALM and (far > np.maximum(SURE * where, APART)).any():
+    if found.noise < CALM and far.max() < FARTHEST and (far > np.maximum(SURE * where, APART)).any():
         shown = ", ".join(f"{1e3 * v:.0f}" for v in found.apart + 0.0)
         text = (
             f"What is accelerated lies ({shown}) ± {1e3 * float(np.linalg.norm(where)):.1g} mm from what is weighed: "
