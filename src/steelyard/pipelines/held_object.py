@@ -127,7 +127,8 @@ def identify(
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     if parts is None:
         late = examine_wrench_unit(log, estimate, lambda rows: replace(load, log=rows).estimate(), before, late)
-        touched = () if any(f.code == "force-unit" for f in late) else touched  # it only seems so in a wrong unit
+    if any(f.code == "force-unit" for f in (*before, *late)):
+        touched = ()  # it only seems so in a wrong unit
     estimate = load.without_tool(estimate).noted(*level, *unmeasured)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if parts is None:
