@@ -14,7 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Mask
-from steelyard.team.twist_rows import TwistStretch
+from steelyard.team.twist_rows import TwistStretch, slope_shares
 
 # Windows that a log is cut into, so that correlated noise is noticed; fewer where their scatters have more numbers.
 WINDOWS, FEWEST, NUMBERS = 40, 8, 4e6
@@ -43,7 +43,7 @@ class TwistScatter:
         windows = min(WINDOWS, max(FEWEST, NUMBERS / width**2))
         for part in moving:
             pieces = max(1, round(windows * len(part.rows) / total))
-            change = np.gradient(part.twist, 1 / part.rows.rate, axis=0) if len(part.rows) > 1 else part.twist
+            change = _rate_of_change(part)
             for rows in np.array_split(np.arange(len(part.rows)), pieces):
                 here = slice(int(rows[0]), int(rows[-1]) + 1)
                 patterns, which = np.unique(part.seen[here], axis=0, return_inverse=True)
@@ -89,3 +89,20 @@ class TwistScatter:
         for k in np.flatnonzero(both):
             out += self.scatter[k][np.ix_(place, place)]
         return out
+
+
+def _rate_of_change(part: TwistStretch) -> Array:
+    """Return the slopes (T, N, 6) of all twists, zero in rows around which one that speaks there is not seen.
+
+    A difference of next rows would be mostly noise: clocks that it is compared with seem too near.
+    """
+    shares = slope_shares(part.rows.rate)
+    half, rows = len(shares), len(part.rows)
+    out = np.zeros_like(part.twist)
+    if rows <= 2 * half:
+        return out
+    for k, share in enumerate(shares, start=1):
+        out[half : rows - half] += share * (part.twist[half + k : rows - half + k] - part.twist[half - k : rows - half - k])
+    whole = np.zeros(part.seen.shape, np.bool_)
+    whole[half : rows - half] = np.lib.stride_tricks.sliding_window_view(part.seen, 2 * half + 1, axis=0).all(-1)
+    return out * (whole | ~part.seen).all(1)[:, None, None]

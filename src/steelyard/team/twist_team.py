@@ -18,9 +18,10 @@ from steelyard.team.twist_fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twist_rows import TwistStretch, twist_stretches
 from steelyard.team.twist_statistic import TwistScatter
 
-# Clocks are moved where their step is above this [s] and so many standard deviations.
-PUNCTUAL, DOUBTED = 2e-4, 4.0
-CLOCK_ROUNDS = 6
+# Clocks are moved where they are off by more than this [s] and so many standard deviations, and then until the last
+# step is below the shares of both.
+PUNCTUAL, DOUBTED, SETTLED = 2e-4, 4.0, 0.05
+CLOCK_ROUNDS = 10
 # A level sensor, or a base that is said to be level, is so to within this [rad].
 LEVEL = 0.02
 # Noise above this share of the motion: robots disagree.
@@ -43,7 +44,8 @@ class TwistTeam:
         for left in reversed(range(CLOCK_ROUNDS)):
             parts = twist_stretches(log, late)
             fit = fit_twists(TwistScatter.of(parts), reference, log.names, _level_pairs(parts, reference))
-            settled = bool((np.abs(fit.delays) < np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)).all())
+            enough = (SETTLED if any(late.values()) else 1.0) * np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)
+            settled = bool((np.abs(fit.delays) < enough).all())
             # What is told of clocks is what the rows and the fit were made with.
             if not (clocks and left) or settled:
                 break
