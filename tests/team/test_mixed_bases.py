@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from steelyard.check import Array
+from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
@@ -72,3 +73,10 @@ def test_rows_near_a_gap_have_no_twist() -> None:
     seen[50] = False
     _, good = derived(Pose(Rotation.identity(100), np.zeros((100, 3))), seen, 100.0)
     assert np.flatnonzero(~good).tolist() == [*range(17), *range(33, 68), *range(83, 100)]
+
+
+def test_a_moving_robot_without_twists_is_named() -> None:
+    log = simulate_team(TeamScene(NOISE, sensing="poses", kinds=("still", "motion"), motion_samples=500), 0).log
+    rolls = tuple(replace(one, base="moving") if one.name == "robot1" else one for one in log.robots)
+    with pytest.raises(CannotAnswer, match="'robot1' gives no twists while others move"):
+        JointTeam().identify(replace(log, robots=rolls))

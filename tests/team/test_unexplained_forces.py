@@ -14,6 +14,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.spatial import Rotation
 from steelyard.team.joint import JointTeam
 
 NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.5)
@@ -60,6 +61,16 @@ def test_a_wrong_force_is_named(change: Callable[[Track], Array], words: str, ro
     (finding,) = named(changed(log, name, change))
     assert words in finding.message
     assert f"'{name}'" in finding.message or change is in_base_axes
+
+
+def askew(track: Track) -> Array:
+    return Rotation.exp(np.radians([8.0, -6.0, 4.0])).apply(track.channels["force"])
+
+
+def test_a_factor_of_one_is_not_named() -> None:
+    log = simulate_team(scene(), 3).log
+    (finding,) = named(changed(log, log.names[1], askew))
+    assert f"What '{log.names[1]}' says does not go with the others" in finding.message
 
 
 @pytest.mark.parametrize("seed", range(3))

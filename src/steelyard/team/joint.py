@@ -28,7 +28,7 @@ from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
 from steelyard.team.hinged_team import identify_two_bodies
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
-from steelyard.team.misread_forces import with_one_reading
+from steelyard.team.misread_forces import with_one_reading, with_torque_sign
 from steelyard.team.misread_poses import require_well_read
 from steelyard.team.misread_twists import require_one_velocity_unit
 from steelyard.team.motion_noise import motion_noise
@@ -37,7 +37,7 @@ from steelyard.team.payload_model import Group, unit_bias
 from steelyard.team.pose_covariance import grasp_covariance
 from steelyard.team.pose_team import PoseTeam
 from steelyard.team.published import require_wrenches
-from steelyard.team.signs import with_one_sign
+from steelyard.team.signs import sign_finding, torque_sign_finding, with_one_sign
 from steelyard.team.spectra import band_edges, gathered
 from steelyard.team.team_findings import (
     bad_robots,
@@ -189,7 +189,12 @@ def _with_forces_read(
     else:
         read, doubtful = (), np.zeros(len(names), np.bool_)
     D, signs = with_one_sign(groups, D, names, doubtful)
-    return groups, D, [*(one for one in read if not (signs and one.code == "wrench-unexplained")), *signs]
+    found = [*(one for one in read if not (signs and one.code == "wrench-unexplained")), *signs]
+    odd, D = with_torque_sign(groups, D) if known else (None, D)
+    if odd is not None:
+        whole = sign_finding(names[odd])
+        found = [*(one for one in found if one != whole), torque_sign_finding(names[odd], whole in found)]
+    return groups, D, found
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:

@@ -122,6 +122,22 @@ def with_one_reading(
     return read, found, _left(_scatter(read), D).by_sign()
 
 
+def with_torque_sign(groups: Sequence[Group], D: Array) -> tuple[int | None, Array]:
+    """Return the one robot whose torques must have the other sign for moments to balance, and D with it turned.
+
+    D  (6, 6 N) sums the pushes at B
+    """
+    S, E = _scatter(groups), basis()[1:, :3]
+    ways = np.tile(D[:3], (D.shape[1] // 6, 1, 1))
+    for i, way in enumerate(ways):
+        way[:, 6 * i : 6 * i + 3] *= -1
+    left = [_unexplained(way, E, S) for way in ways]
+    robot = int(np.argmin(left))
+    if left[robot] * FALLS**2 > _unexplained(D[:3], E, S):
+        return None, D
+    return robot, np.concatenate([ways[robot], D[3:]])
+
+
 def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequence[_Left]) -> tuple[Finding, ...]:
     """Return the finding of a robot whose forces fit turned by some angle, though with no reading."""
     if both[0].misfit < UNFIT:

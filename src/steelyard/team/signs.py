@@ -66,6 +66,16 @@ def sign_finding(name: str) -> Finding:
     return Finding.of("wrench-sign-flipped", text)
 
 
+def torque_sign_finding(name: str, turned: bool) -> Finding:
+    """Return the finding of a robot whose torques have another sign than its forces, which were `turned` or not."""
+    which, other = ("force", "torques") if turned else ("torque", "forces")
+    text = (
+        f"The torques of '{name}' fit one body only with the sign opposite to that of its forces: the sign of its "
+        f"{which}s was turned, that of its {other} was not."
+    )
+    return Finding("wrench-sign-flipped", text, f"Turn the signs of the {which} columns of '{name}', and of no others.")
+
+
 def _beside_one_another(S: Array, forces: Array) -> Array:
     """Return products (N, N) of what any motion and bias leave of the robots' forces; `forces` (3, N, 6) of pushes."""
     inner = np.r_[:12, len(S) - 1]

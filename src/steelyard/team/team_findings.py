@@ -116,10 +116,12 @@ def gains(gain: float, gainless: float) -> Iterator[Finding]:
 def open_parameters(identified: Mask, rank: int, count: int = 10) -> Iterator[Finding]:
     """Yield inertia-not-identified where some of the inertia is left open; `count` parameters are asked for."""
     if not identified[4:].all():
+        asked = "ten" if count == 10 else f"{count}"
+        told = f"fix {rank} of the {asked} parameters" if rank < count else f"show the {asked} parameters, but not well"
         yield Finding.of(
             "inertia-not-identified",
-            f"The rows fix {rank} of the {'ten' if count == 10 else count} parameters; the inertia is not given"
-            f"{_weighed(identified)}. Turn the payload about all three axes, faster and slower.",
+            f"The rows {told}; the inertia is not given{_weighed(identified)}. Turn the payload about all three axes, "
+            "faster and slower.",
         )
 
 

@@ -118,14 +118,22 @@ def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...], lev
             continue
         S = data.pair(reference, i)
         if not S.any():
-            raise CannotAnswer(
-                f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; "
-                "record them together."
-            )
+            raise CannotAnswer(_never_together(data, reference, i, names))
         R, p = _pair(S, np.zeros((3, 3)) if level is None else level[i])
         turns.append(R)
         places.append(p)
     return Pose(Rotation(np.stack(turns)), np.stack(places))
+
+
+def _never_together(data: TwistScatter, reference: int, i: int, names: tuple[str, ...]) -> str:
+    """Say why no row has the twists of two robots."""
+    for k in (i, reference):
+        if not data.spoke[:, k].any():
+            return (
+                f"'{names[k]}' gives no twists while others move: give its angular_velocity and linear_velocity, or, "
+                'if its base stands, its poses without base = "moving".'
+            )
+    return f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; record them together."
 
 
 def _pair(S: Array, level: Array) -> tuple[Array, Array]:

@@ -66,13 +66,13 @@ def _read(made: TwistStretch, i: int, track: Track, gravity: Array | None, movin
             made.seen[:, i] = good if k == 0 else made.seen[:, i] & good
     elif not moving and track.has("rotation", "position"):
         made.twist[:, i], made.seen[:, i] = derived(made.rows.poses[:, i], made.rows.seen[:, i], made.rows.rate)
-    made.seen[:, i] = bridged(made.seen[:, i])
+    made.seen[:, i] = bridged(made.seen[:, i], time)
     if track.has("gravity"):
         made.down[:, i], good = channel_at(track, "gravity", time)
-        made.level[:, i] = bridged(good)
+        made.level[:, i] = bridged(good, time)
     elif not moving and gravity is not None and track.has("rotation"):
         turn, good = rotation_at(track, time)
-        made.down[:, i], made.level[:, i] = turn.inverse().apply(gravity), bridged(good)
+        made.down[:, i], made.level[:, i] = turn.inverse().apply(gravity), bridged(good, time)
 
 
 def slope_shares(rate: float) -> Array:

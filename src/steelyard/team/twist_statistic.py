@@ -102,7 +102,9 @@ def _rate_of_change(part: TwistStretch) -> Array:
     if rows <= 2 * half:
         return out
     for k, share in enumerate(shares, start=1):
-        out[half : rows - half] += share * (part.twist[half + k : rows - half + k] - part.twist[half - k : rows - half - k])
+        before, after = part.twist[half - k : rows - half - k], part.twist[half + k : rows - half + k]
+        out[half : rows - half] += share * (after - before)
     whole = np.zeros(part.seen.shape, np.bool_)
     whole[half : rows - half] = np.lib.stride_tricks.sliding_window_view(part.seen, 2 * half + 1, axis=0).all(-1)
-    return out * (whole | ~part.seen).all(1)[:, None, None]
+    told: Mask = np.asarray((whole | ~part.seen).all(1))
+    return out * told[:, None, None]

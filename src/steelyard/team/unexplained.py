@@ -22,6 +22,8 @@ from steelyard.team.payload_model import Group
 SHARE, COLOURED, OF_ONE = 0.03, 4.5, 3.0
 # A robot carries nothing where its forces are hardly slower than noise, while those of another are.
 FLAT, SLOW = 1.5, 5.0
+# A factor nearer to one than this explains nothing; a small turn that goes with it may.
+UNLIKE = 0.05
 # Rows of a band that show its noise.
 FEWEST = 20
 GRAVITY = 9.81
@@ -47,8 +49,10 @@ def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Fin
     why = ""
     if silent:
         why = f"What {_listed(silent)} measures is noise alone, as if nothing were carried there. "
-    elif factor is not None:
+    elif factor is not None and abs(factor[1] - 1) > UNLIKE:
         why = f"It falls where what {_listed(suspects)} says is taken {factor[1]:.2g} times. "
+    elif factor is not None:
+        why = f"What {_listed(suspects)} says does not go with the others, as where it is turned by some degrees. "
     text = (
         f"What the robots push {'at rest' if group.parts[0].still else 'in motion'} leaves {rms:.2g} N rms that no "
         f"rigid payload explains, {100 * rms / weight:.0f} % of its weight, and too slow for noise of the sensors. "

@@ -1,0 +1,55 @@
+"""Rows of a team side by side: what brief gaps of one robot cost."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import TeamNoise, TeamScene
+from steelyard.team.joint import JointTeam
+from steelyard.team.stacked import bridged
+
+NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
+
+
+@pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
+def test_gaps_are_bridged_by_rows_and_by_time(rate: float) -> None:
+    time = np.arange(2000) / rate
+
+    def held(missing: int) -> bool:
+        good = np.ones(len(time), np.bool_)
+        good[100 : 100 + missing] = False
+        return bool(bridged(good, time).all())
+
+    brief = round(0.045 * rate)
+    assert held(3)
+    assert held(max(brief - 1, 3))
+    assert not held(max(round(0.06 * rate), 4))
+
+
+def test_a_gap_at_an_end_is_none() -> None:
+    good = np.arange(50) >= 2
+    np.testing.assert_array_equal(bridged(good, np.arange(50) / 100), good)
+
+
+def test_a_robot_that_loses_four_in_ten_rows_costs_little() -> None:
+    """Rows of all must be there at once: lost rows of one had left the wrench of none."""
+    made = simulate_team(TeamScene(NOISY, sensing="poses", kinds=("still", "motion"), motion_samples=3000), 100)
+    rng = np.random.default_rng(0)
+    lossy = made.log.with_recordings(
+        *(
+            replace(
+                r,
+                tracks={n: t.rows(rng.uniform(size=len(t)) > 0.4) if n == "robot1" else t for n, t in r.tracks.items()},
+            )
+            for r in made.log.recordings
+        )
+    )
+    whole, found = JointTeam().identify(made.log), JointTeam().identify(lossy)
+    assert found.identified.all()
+    assert (found.std < 3 * whole.std).all()
+    apart = np.append(found.mass - whole.mass, found.com - whole.com) / whole.std[:4]
+    assert np.abs(apart).max() < 3
