@@ -20,6 +20,8 @@ from steelyard.sanity.full_fit import Rows
 SURE, LEFT = 6.0, 0.995
 # [Hz] the second derivative is taken below this; poses tell it no better.
 SLOW = 8.0
+# [s^2] Where none is seen, an arm may still have its first mode near 16 Hz, which moves an inertia by a bar of its own.
+USUAL = 1e-4
 _FEWEST_ROWS = 50
 
 
@@ -36,6 +38,12 @@ class Softness:
     std: float
     left: float
     moved: Array
+
+    @property
+    def possible(self) -> float:
+        """How far the wrench may follow [s^2], rms, beside what arms usually do."""
+        share = USUAL**2 / (USUAL**2 + self.std**2)
+        return float(np.hypot(share * self.follows, np.sqrt(share) * self.std))
 
 
 def softness(log: MotionLog) -> Softness | None:
@@ -56,10 +64,16 @@ def softness(log: MotionLog) -> Softness | None:
 
 
 def allow_softness(log: MotionLog, estimate: Estimate) -> Estimate:
-    """Return the estimate with bars that hold what a soft arm or a slow filter moves it by, where the log shows one."""
+    """Return the estimate with bars that hold what a soft arm or a slow filter moves it by.
+
+    That is all of it where the log shows one, and else what a usual arm and the log leave possible.
+    """
     found = softness(log)
-    if found is None or abs(found.follows) < SURE * found.std or found.left > LEFT:
+    if found is None or found.follows == 0:
         return estimate
+    if abs(found.follows) < SURE * found.std or found.left > LEFT:
+        possible = found.moved * found.possible / found.follows
+        return replace(estimate, covariance=estimate.covariance + np.outer(possible, possible))
     rate = 1 / (2 * np.pi * np.sqrt(abs(found.follows)))
     what = f"an arm with its first mode near {rate:.0f} Hz" if found.follows < 0 else "a slow filter of the force"
     wider = replace(estimate, covariance=estimate.covariance + np.outer(found.moved, found.moved))
