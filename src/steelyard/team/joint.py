@@ -28,8 +28,9 @@ from steelyard.team.hinged_bodies import hinge_findings
 from steelyard.team.hinged_rows import COUNT
 from steelyard.team.hinged_team import identify_two_bodies
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
-from steelyard.team.misread_forces import with_one_reading, with_torque_sign
+from steelyard.team.misread_forces import with_one_reading
 from steelyard.team.misread_poses import require_well_read
+from steelyard.team.misread_torques import with_torque_sign
 from steelyard.team.misread_twists import require_one_velocity_unit
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.payload_fit import fit_payload

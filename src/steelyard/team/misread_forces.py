@@ -17,6 +17,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding, percent
 from steelyard.identify.regressor import basis
 from steelyard.logs.log import Integers, Mask
+from steelyard.team.leftover import centred, pseudoinverse, scatter, unexplained
 from steelyard.team.payload_model import Group
 from steelyard.team.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
 from steelyard.team.signs import sign_finding
@@ -60,7 +61,7 @@ class _Left:
 
     def any_map(self) -> tuple[Array, Array]:
         """Return the least (N,) that any linear map of each robot's force leaves, and that map (N, 3, 3)."""
-        change = -np.stack([_inverse(Q) @ g for Q, g in zip(self.curvature, self.slope, strict=True)])
+        change = -np.stack([pseudoinverse(Q) @ g for Q, g in zip(self.curvature, self.slope, strict=True)])
         return self.variance + (self.slope * change).sum(1), np.eye(3) + change.reshape(-1, 3, 3)
 
     def shares(self) -> tuple[Array, Array]:
@@ -94,7 +95,7 @@ def with_one_reading(
     D  (6, 6 N) sums the pushes at B
     """
     groups = tuple(groups)
-    S = _scatter(groups)
+    S = scatter(groups)
     given = _left(S, D)
     # Nothing fits better, and not much is left: so it is with most logs.
     if not np.maximum(*given.shares()).min() < 1.0 and given.misfit < UNFIT:
@@ -119,23 +120,7 @@ def with_one_reading(
     reading = _with_torque(S, D, robot, number)
     read = tuple(_reread(group, robot, reading.wrench()) for group in groups)
     found = (_finding(names[robot], reading, score[robot, number]),)
-    return read, found, _left(_scatter(read), D).by_sign()
-
-
-def with_torque_sign(groups: Sequence[Group], D: Array) -> tuple[int | None, Array]:
-    """Return the one robot whose torques must have the other sign for moments to balance, and D with it turned.
-
-    D  (6, 6 N) sums the pushes at B
-    """
-    S, E = _scatter(groups), basis()[1:, :3]
-    ways = np.tile(D[:3], (D.shape[1] // 6, 1, 1))
-    for i, way in enumerate(ways):
-        way[:, 6 * i : 6 * i + 3] *= -1
-    left = [_unexplained(way, E, S) for way in ways]
-    robot = int(np.argmin(left))
-    if left[robot] * FALLS**2 > _unexplained(D[:3], E, S):
-        return None, D
-    return robot, np.concatenate([ways[robot], D[3:]])
+    return read, found, _left(scatter(read), D).by_sign()
 
 
 def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequence[_Left]) -> tuple[Finding, ...]:
@@ -161,7 +146,7 @@ def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequ
 
 def likely_factor(groups: Sequence[Group], D: Array) -> tuple[int, float] | None:
     """Return the one robot whose forces fit times a factor, and that factor; None where none does clearly."""
-    found = _mapped((_left(_scatter(groups), D), _left(_without_bias(groups), D)))
+    found = _mapped((_left(scatter(groups), D), _left(_without_bias(groups), D)))
     if found is None:
         return None
     robot, X = found
@@ -179,23 +164,13 @@ def _mapped(both: Sequence[_Left]) -> tuple[int, Array] | None:
     return (robot, any_map[0][1][robot]) if clear else None
 
 
-def _scatter(groups: Sequence[Group]) -> Array:
-    """Return the scatter of all recordings and bands."""
-    return np.asarray(sum(part.scatter.sum(0) for group in groups for part in group.parts))
-
-
 def _without_bias(groups: Sequence[Group]) -> Array:
     """Return the scatter with a constant left out of every motion, and one of all that is at rest."""
     out = []
     for group in groups:
         each = [part.scatter.sum(0) for part in group.parts]
-        out += [_centred(S) for S in ([np.sum(each, axis=0)] if group.parts[0].still else each)]
+        out += [centred(S) for S in ([np.sum(each, axis=0)] if group.parts[0].still else each)]
     return np.asarray(np.sum(out, axis=0))
-
-
-def _centred(S: Array) -> Array:
-    """Return a scatter with its constant left out."""
-    return S - np.outer(S[-1], S[-1]) / max(float(S[-1, -1]), 1e-300)
 
 
 def _left(S: Array, D: Array) -> _Left:
@@ -203,7 +178,7 @@ def _left(S: Array, D: Array) -> _Left:
     own, E = _forces(S), basis()[:4, 3:].reshape(12, 12)
     total, count = D[3:, own - 12], len(own) // 3
     both, seen = S[own[:, None], own], (E @ S[:12, own]).reshape(4, -1)
-    inverse = _inverse((E @ S[:12, :12]).reshape(4, 36) @ E.reshape(4, 36).T)
+    inverse = pseudoinverse((E @ S[:12, :12]).reshape(4, 36) @ E.reshape(4, 36).T)
     pushed, along = total @ both, seen @ total.ravel()
     fitted = inverse @ along
     slope = pushed - (fitted @ seen).reshape(3, -1)
@@ -219,13 +194,6 @@ def _left(S: Array, D: Array) -> _Left:
     nine = curvature.reshape(count, 9, 9) - np.swapaxes(mine, 1, 2) @ inverse @ mine
     sloped = back @ np.moveaxis(slope.reshape(3, count, 3), 1, 0)
     return _Left(variance, sloped.reshape(count, 9), nine, np.trace(blocks, axis1=1, axis2=2))
-
-
-def _inverse(G: Array) -> Array:
-    """Return the pseudoinverse of normal equations, which may not show everything."""
-    values, axes = np.linalg.eigh(G)
-    kept = values > 1e-9 * values[-1]
-    return np.asarray((axes[:, kept] / values[kept]) @ axes[:, kept].T)
 
 
 def _forces(S: Array) -> Integers:
@@ -256,26 +224,11 @@ def _unlike(groups: Sequence[Group], D: Array, robot: int, X: Array) -> bool:
     """
     given, read = 0.0, 0.0
     for group in groups:
-        S = _scatter([group])
+        S = scatter([group])
         turned = _turned(S, robot, X)
-        a, b = (_unexplained(D[3:], np.eye(12), one) for one in (S, turned))
+        a, b = (unexplained(D[3:], np.eye(12), one) for one in (S, turned))
         given, read = given + a, read + b
     return read > RISES * given
-
-
-def _unexplained(K: Array, E: Array, S: Array) -> float:
-    """Return what the motion and a constant leave of rows K (k, 6 N) of the pushes.
-
-    E  (p, k, 12) is what parameters make of the motion, or (12, 12): any motion explains any row
-    """
-    S = _centred(S)
-    pushed = K @ S[12:-1, 12:-1] @ K.T
-    seen = K @ S[12:-1, :12]
-    if E.ndim == 2:
-        return float(np.trace(pushed - seen @ _inverse(S[:12, :12]) @ seen.T))
-    G = np.einsum("pix,xy,qiy->pq", E, S[:12, :12], E, optimize=True)
-    along = np.tensordot(E, seen, ([1, 2], [0, 1]))
-    return float(np.trace(pushed) - along @ _inverse(G) @ along)
 
 
 def _with_torque(S: Array, D: Array, robot: int, number: int) -> Reading:
@@ -288,7 +241,7 @@ def _with_torque(S: Array, D: Array, robot: int, number: int) -> Reading:
     if number == SIGN:
         return Reading(number, -given.torque)
     E = basis()[1:, :3]
-    left = [_unexplained(D[:3], E, _turned(S, robot, one.wrench())) for one in (given, *others)]
+    left = [unexplained(D[:3], E, _turned(S, robot, one.wrench())) for one in (given, *others)]
     best = int(np.argmin(left))
     return (given, *others)[best] if CLEAR * left[best] < left[0] else given
 

@@ -14,6 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.team.misread_forces import likely_factor
+from steelyard.team.misread_torques import torque_factor
 from steelyard.team.payload_fit import PayloadFit
 from steelyard.team.payload_model import Group
 
@@ -30,17 +31,19 @@ GRAVITY = 9.81
 
 
 def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
-    """Yield wrench-unexplained where forces at rest or in motion leave so much; names whoever explains it.
+    """Yield wrench-unexplained where forces or moments leave so much; names whoever explains it.
 
     D  (6, 6 N) sums the pushes at B
     """
+    forces = list(_forces(fit, D, names))
+    yield from forces or _moments(fit, D, names)
+
+
+def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
     weight = abs(float(fit.parameters[0])) * GRAVITY
-    left = [_left(group) for group in fit.groups]
-    worst = int(np.argmax([rms for rms, _ in left]))
-    rms, coloured = left[worst]
+    group, rms, coloured = _worst(fit.groups, slice(3, 6))
     if rms < SHARE * weight or coloured < OF_ONE:
         return
-    group = fit.groups[worst]
     silent = [name for name, flat in zip(names, _flat(group, len(names)), strict=True) if flat]
     factor = None if silent else likely_factor(fit.groups, D)
     suspects = silent or ([] if factor is None else [names[factor[0]]])
@@ -54,7 +57,7 @@ def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Fin
     elif factor is not None:
         why = f"What {_listed(suspects)} says does not go with the others, as where it is turned by some degrees. "
     text = (
-        f"What the robots push {'at rest' if group.parts[0].still else 'in motion'} leaves {rms:.2g} N rms that no "
+        f"What the robots push {_when(group)} leaves {rms:.2g} N rms that no "
         f"rigid payload explains, {100 * rms / weight:.0f} % of its weight, and too slow for noise of the sensors. "
         f"{why}The answer is not to be trusted."
     )
@@ -66,10 +69,45 @@ def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Fin
     yield Finding("wrench-unexplained", text, remedy)
 
 
-def _left(group: Group) -> tuple[float, float]:
-    """Return the rms [N] of the force that is left per row, and that over what the highest band has."""
+def _moments(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
+    size = float(fit.scale[1] / fit.scale[0])
+    lever = abs(float(fit.parameters[0])) * GRAVITY * size
+    group, rms, coloured = _worst(fit.groups, slice(0, 3))
+    if rms < SHARE * lever or coloured < COLOURED:
+        return
+    factor = torque_factor(fit.groups, D)
+    who, why = "each robot", ""
+    if factor is not None:
+        who = f"'{names[factor[0]]}'"
+        why = f"They fall where the torques of {who} are taken {factor[1]:.2g} times. "
+    text = (
+        f"What the robots push {_when(group)} leaves moments of {rms:.2g} N m rms that no rigid payload explains, "
+        f"{_part(rms / lever)} its weight at {size:.2g} m, and too slow for noise of the sensors. {why}"
+        "Centre of mass and inertia are not to be trusted."
+    )
+    remedy = f"Check unit, order and signs of the torque columns of {who}, and where its sensor sits beside its grasp."
+    yield Finding("wrench-unexplained", text, remedy)
+
+
+def _part(share: float) -> str:
+    return f"{share:.0f} times" if share > 10 else f"{100 * share:.0f} % of"
+
+
+def _when(group: Group) -> str:
+    return "at rest" if group.parts[0].still else "in motion"
+
+
+def _worst(groups: Sequence[Group], axes: slice) -> tuple[Group, float, float]:
+    """Return the recordings of the kind that leaves most of these axes of the wrench, and what `_left` says of them."""
+    left = [_left(group, axes) for group in groups]
+    worst = int(np.argmax([rms for rms, _ in left]))
+    return groups[worst], *left[worst]
+
+
+def _left(group: Group, axes: slice) -> tuple[float, float]:
+    """Return the rms of what is left of these axes per row, and that over what the highest band has."""
     rows = np.sum([part.rows for part in group.parts], axis=0)
-    power = group.wrench_noise[:, 3:].sum(1)
+    power = group.wrench_noise[:, axes].sum(1)
     told = np.flatnonzero(rows >= FEWEST)
     if len(told) < 2:
         return 0.0, 1.0
