@@ -12,7 +12,7 @@ import steelyard as sy
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.pipelines.shared_payload import METHODS, Method, _missing_wrenches, identify_team
+from steelyard.pipelines.shared_payload import METHODS, Method, _missing_rows, _missing_wrenches, identify_team
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.estimate import TeamEstimate
@@ -52,7 +52,7 @@ def with_gap(log: TeamLog, begin: int, end: int) -> TeamLog:
 def test_missing_rows_are_said_and_cost_only_their_data(method: str) -> None:
     whole, cut = (identify_team(log, method) for log in (trial().log, with_gap(trial().log, 400, 700)))  # type: ignore[arg-type]
     (said,) = [f for f in cut.findings if f.code == "rows-missing"]
-    assert said.message == "'robot1' has no number in 300 of 1500 rows of 'motion-5' (force)."
+    assert said.message == "'robot1' lacks numbers in 300 of 1500 rows of 'motion-5' (force)."
     # Poses are whole, so the grasps are what they were; the payload is as well known as the other rows allow.
     for name, grasp in whole.grasps.items():
         np.testing.assert_allclose(cut.grasps[name].pose.position, grasp.pose.position, atol=2e-5)
@@ -107,3 +107,28 @@ def test_no_forces_no_payload(method: str) -> None:
     bare = [TeamRecording(r.kind, {n: t.without("force") for n, t in r.tracks.items()}, r.name) for r in log.recordings]
     with pytest.raises(CannotAnswer, match="no robot of the team measured a force"):
         identify_team(log.with_recordings(*bare), method)  # type: ignore[arg-type]
+
+
+def test_rows_that_are_not_there_are_said_once_for_each_robot() -> None:
+    rng = np.random.default_rng(0)
+    log = trial().log
+    lossy = [
+        replace(
+            r, tracks={**r.tracks, "robot1": r.tracks["robot1"].rows(rng.uniform(size=len(r.tracks["robot1"])) > 0.25)}
+        )
+        for r in log.recordings
+    ]
+    found = identify_team(log.with_recordings(*lossy))
+    (said,) = [f for f in found.findings if f.code == "rows-missing"]
+    assert said.message.startswith("'robot1' lacks about 2")
+    assert said.message.count("% of the rows of") == len(log.recordings)
+    assert "rows-missing" not in identify_team(log).codes()
+
+
+def test_stamps_in_pairs_lack_nothing() -> None:
+    log = trial().log
+    uneven = [
+        replace(r, tracks={n: replace(t, time=t.time + 4e-3 * (np.arange(len(t)) % 2)) for n, t in r.tracks.items()})
+        for r in log.recordings
+    ]
+    assert not list(_missing_rows(log.with_recordings(*uneven)))

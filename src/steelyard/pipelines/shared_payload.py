@@ -14,10 +14,13 @@ from dataclasses import replace
 from types import MappingProxyType
 from typing import Literal, get_args
 
+import numpy as np
+
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
+from steelyard.logs.team_track import Track
 from steelyard.team.angle_units import require_one_angle_unit
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
@@ -28,6 +31,8 @@ from steelyard.team.same_numbers import require_own_numbers, stuck_forces
 Method = Literal["joint", "paper"]
 METHODS: tuple[Method, ...] = get_args(Method)
 
+# Share of its rows from which on a robot is said to have lost some.
+ABSENT = 0.1
 # joint  every grasp, home and clock at once, then one fit of the ten parameters to still and moving rows together
 # paper  grasps from twists (eq. 1-8), loops closed, mass and centre of mass at rest (9-16), inertia in motion (17-33)
 ESTIMATORS: Mapping[Method, JointTeam | PublishedTeam] = MappingProxyType(
@@ -51,17 +56,29 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
 
 
 def _missing_rows(log: TeamLog) -> Iterator[Finding]:
-    """Yield a finding for every robot that misses numbers in some rows of a recording."""
-    for recording in log.recordings:
-        for name, track in recording.tracks.items():
-            lost = {channel: int((~good).sum()) for channel, good in track.valid.items() if not good.all()}
-            if lost:
-                most = max(lost.values())
-                shown = ", ".join(lost)
-                yield Finding.of(
-                    "rows-missing",
-                    f"'{name}' has no number in {most} of {len(track)} rows of '{recording.name}' ({shown}).",
-                )
+    """Yield a finding for every robot that misses rows, or numbers in some rows, of recordings."""
+    for name in log.names:
+        said = [
+            f"{words} of '{recording.name}'{channels}"
+            for recording in log.recordings
+            for words, channels in _missing(recording.tracks.get(name))
+        ]
+        if said:
+            yield Finding.of("rows-missing", f"'{name}' lacks {'; '.join(said)}.")
+
+
+def _missing(track: Track | None) -> Iterator[tuple[str, str]]:
+    """Yield how many numbers, and what share of the rows, a track lacks, and of which channels."""
+    if track is None:
+        return
+    lost = {channel: int((~good).sum()) for channel, good in track.valid.items() if not good.all()}
+    if lost:
+        yield f"numbers in {max(lost.values())} of {len(track)} rows", f" ({', '.join(lost)})"
+    step = np.diff(track.time)
+    # Not the median: stamps that come in pairs lack nothing.
+    absent = 1 - np.quantile(step, 0.6) / np.mean(step) if len(step) else 0.0
+    if absent > ABSENT:
+        yield f"about {100 * absent:.0f} % of the rows", ""
 
 
 def _missing_wrenches(log: TeamLog, method: Method) -> Iterator[Finding]:
