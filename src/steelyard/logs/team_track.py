@@ -135,9 +135,13 @@ class Track:
 
     def shifted(self, seconds: float) -> Track:
         """Return the track with `seconds` added to its stamps."""
-        # Stamps still rise, and the channels were judged when the track was made.
+        return self.stamped(self.time + seconds)
+
+    def stamped(self, time: Array) -> Track:
+        """Return the track with other stamps (T,) [s], which rise as its own do."""
+        # The channels were judged when the track was made.
         moved = copy(self)
-        object.__setattr__(moved, "time", check.finite("time", self.time + seconds))
+        object.__setattr__(moved, "time", check.finite("time", time))
         return moved
 
     def without(self, *names: str) -> Track:

@@ -6,17 +6,17 @@ the shift at which their robots turn alike. A fit starts anew from there, and is
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.logs.team_log import TeamLog
-from steelyard.logs.team_track import Track
-from steelyard.team.stacked import punctual
+from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.team.clock_errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.turning_speed import turning_speed
+from steelyard.team.unsteady_clocks import Steady
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps of STEP_S.
 FARTHEST_S, SHARE, STEP_S = 2.0, 0.25, 0.05
@@ -28,7 +28,7 @@ ALIKE, MORE = 0.7, 0.1
 BETTER = 10.0
 
 
-class Fitted(Protocol):
+class Fitted(Steady, Protocol):
     """A joint fit of poses or of twists."""
 
     @property
@@ -43,53 +43,64 @@ class Fitted(Protocol):
 F = TypeVar("F", bound=Fitted)
 
 
-def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog, F, dict[str, float]]:
-    """Return log, fit, and how late clocks are beside what it finds [s]: as they are, or begun from other clocks."""
+def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog, F, ClockErrors]:
+    """Return log, fit, and how late clocks are beside what it finds: as they are, or begun from other clocks."""
     lags = far_lags(log)
-    if max(map(abs, lags.values()), default=0.0) < NEAR_S:
-        return log, team, {}
+    if max((abs(e.late) for errors in lags.recordings for e in errors.values()), default=0.0) < NEAR_S:
+        return log, team, NOTHING
     try:
-        moved = begun_from(log, lags)
+        moved = lags.corrected(log)
         again = of(moved)
     except (BadValue, CannotAnswer, np.linalg.LinAlgError):
-        return log, team, {}
+        return log, team, NOTHING
     if float(np.log(team.fit.noise / again.fit.noise).sum()) < np.log(BETTER):
-        return log, team, {}
+        return log, team, NOTHING
     return moved, again, lags
 
 
-def begun_from(log: TeamLog, lags: Mapping[str, float]) -> TeamLog:
-    """Return the log with every robot's stamps moved by the seconds that they are late; others are punctual."""
-    return log.with_recordings(*(punctual(recording, lags) for recording in log.recordings))
+def far_lags(log: TeamLog) -> ClockErrors:
+    """Return how late robots' stamps are against the reference, where they then turn far more alike.
 
-
-def far_lags(log: TeamLog) -> dict[str, float]:
-    """Return by how many seconds robots' stamps are late against the reference, where they then turn far more alike."""
-    out = {}
+    All recordings are asked together; one in which the robots turn far more alike at a shift of its own has that.
+    """
+    found: list[dict[str, ClockError]] = [{} for _ in log.recordings]
     for name in log.others:
-        sums: dict[int, Array] = {}
-        for recording in log.recordings:
-            if recording.kind != "still" and {name, log.reference} <= recording.tracks.keys():
-                _add_products(sums, recording.tracks[log.reference], recording.tracks[name])
-        alike = {shift: _correlation(total) for shift, total in sums.items()}
-        best = max(alike, key=lambda shift: alike[shift], default=0)
-        if best and alike[best] > max(ALIKE, alike[0] + MORE):
-            out[name] = best * STEP_S
-    return out
+        alone = [_products(recording, log.reference, name) for recording in log.recordings]
+        every: dict[int, Array] = {}
+        for sums in alone:
+            for shift, total in sums.items():
+                every[shift] = every.get(shift, np.zeros(6)) + total
+        common = _best(every, 0)
+        for errors, sums in zip(found, alone, strict=True):
+            shift = _best(sums, common) if sums else common
+            if shift:
+                errors[name] = ClockError(shift * STEP_S)
+    return ClockErrors(tuple(found)) if any(found) else NOTHING
 
 
-def _add_products(sums: dict[int, Array], first: Track, second: Track) -> None:
-    """Add, for every shift in steps, the sums of 1, x, y, x^2, y^2, x y over how fast both turn."""
+def _best(sums: dict[int, Array], usual: int) -> int:
+    """Return the shift at which robots turn far more alike than at the usual one, or that."""
+    alike = {shift: _correlation(total) for shift, total in sums.items()}
+    best = max(alike, key=lambda shift: alike[shift], default=usual)
+    return best if alike.get(best, 0.0) > max(ALIKE, alike.get(usual, 0.0) + MORE) else usual
+
+
+def _products(recording: TeamRecording, reference: str, name: str) -> dict[int, Array]:
+    """Return, for every shift in steps, the sums of 1, x, y, x^2, y^2, x y over how fast two robots turn."""
+    if recording.kind == "still" or not {name, reference} <= recording.tracks.keys():
+        return {}
+    first, second = recording.tracks[reference], recording.tracks[name]
     begin, end = min(first.time[0], second.time[0]), max(first.time[-1], second.time[-1])
     time = np.arange(float(begin), float(end), STEP_S)
     x, y = (turning_speed(track, time, STEP_S) for track in (first, second))
     most = int(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S)
+    sums = {}
     for shift in range(-most, most + 1):
         a, b = x[max(0, -shift) : len(x) - max(0, shift)], y[max(0, shift) : len(y) - max(0, -shift)]
         good = np.isfinite(a) & np.isfinite(b)
         a, b = a[good], b[good]
-        total = np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
-        sums[shift] = sums.get(shift, np.zeros(6)) + total
+        sums[shift] = np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b])
+    return sums
 
 
 def _correlation(total: Array) -> float:

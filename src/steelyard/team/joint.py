@@ -20,6 +20,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, require_runs, summing
+from steelyard.team.clock_errors import NOTHING, ClockErrors, Errors
 from steelyard.team.clock_search import F, searched
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.exchanged import require_own_files
@@ -51,6 +52,7 @@ from steelyard.team.team_findings import (
 )
 from steelyard.team.twist_team import TwistTeam
 from steelyard.team.unexplained import unexplained
+from steelyard.team.unsteady_clocks import steadied
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
 LEAST_CHI2 = -0.1
@@ -117,19 +119,21 @@ class JointTeam:
         _require_one_clock(payload.chi2)
         if not any(one.code == "payload-not-rigid" for one in found):
             _require_mass(payload.lost)
-        team = _without_wrists(assembled(log, grasps, spread, payload, D, _added(late, begun)), self.wrists)
+        team = _without_wrists(assembled(log, grasps, spread, payload, D, late), self.wrists)
+        team = _clocked(team, begun.first(log))
         found += [
             *read,
             *(() if any(one.code in TOLD for one in (*found, *read)) else unexplained(payload, D, log.names)),
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
+            *begun.findings(log),
             *bad_robots(log.names, noise),
             *(gains(payload.gain, payload.gainless) if known else ()),
             *open_parameters(team.identified, team.evidence.rank),
         ]
         return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
 
-    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, dict[str, float]]:
+    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors]:
         """Return log, fit of poses and clocks like `_fitted`; raises BadValue where one robot's poses are misread."""
         try:
             return self._fitted(log, PoseTeam.of)
@@ -137,15 +141,18 @@ class JointTeam:
             require_well_read(log)
             raise
 
-    def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, dict[str, float]]:
+    def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, ClockErrors]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""
-        team = of(log, self.clocks)
-        if not (self.clocks and team.rough):
-            return log, team, {}
-        return searched(log, team, lambda moved: of(moved, True))
+        team, begun = of(log, self.clocks), NOTHING
+        if self.clocks and team.rough:
+            log, team, begun = searched(log, team, lambda moved: of(moved, True))
+        if team.rough:
+            return log, team, begun
+        log, team, errors = steadied(log, team, lambda moved: of(moved, True))
+        return log, team, begun + errors
 
     def _jointed(
-        self, log: TeamLog, split: Split, standing: Sequence[Finding], begun: Mapping[str, float]
+        self, log: TeamLog, split: Split, standing: Sequence[Finding], begun: ClockErrors
     ) -> TeamEstimate | None:
         """Return the estimate of two bodies with a hinge, None where there is no hinge or too little is shown of it.
 
@@ -158,12 +165,13 @@ class JointTeam:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
         except (CannotAnswer, BadValue, np.linalg.LinAlgError):
             return None
-        team = replace(team, clock_offsets_s=_added(team.clock_offsets_s, begun))
+        team = _clocked(team, begun.first(log))
         found = [
             *hinge_findings(team),
             *team.findings,
             *(finding for finding in standing if finding.code in ("robot-left", "robot-joined")),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
+            *begun.findings(log),
             *gains(payload.gain, payload.gainless),
             *open_parameters(team.identified, team.evidence.rank, COUNT),
         ]
@@ -232,9 +240,14 @@ def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:
     return {name: seconds - late[reference] for name, seconds in late.items()}
 
 
-def _added(late: Mapping[str, float], begun: Mapping[str, float]) -> dict[str, float]:
-    """Return how late every clock is with what it was begun from."""
-    return {name: seconds + begun.get(name, 0.0) for name, seconds in late.items()}
+def _clocked(team: TeamEstimate, first: Errors) -> TeamEstimate:
+    """Return the estimate with how late every clock is with what it was off by in the first recording."""
+    late = {n: seconds + first[n].late if n in first else seconds for n, seconds in team.clock_offsets_s.items()}
+    std = {
+        n: float(np.hypot(doubt, first[n].late_std)) if n in first else doubt
+        for n, doubt in team.clock_offset_std_s.items()
+    }
+    return replace(team, clock_offsets_s=late, clock_offset_std_s=std)
 
 
 def needs_twists(log: TeamLog) -> bool:

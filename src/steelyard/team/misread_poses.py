@@ -17,7 +17,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.clock_search import begun_from, far_lags
+from steelyard.team.clock_search import far_lags
 from steelyard.team.pose_fit import GUESS, ROUGHLY, Rows, fit_poses
 from steelyard.team.pose_start import first_team
 from steelyard.team.poses import TeamMotion, in_words
@@ -101,7 +101,7 @@ def require_well_read(log: TeamLog) -> None:
     """
     names, reference = log.names, log.names.index(log.reference)
     try:
-        parts = tuple(part.thinned(ROWS) for part in stretches(begun_from(log, far_lags(log)), {}))
+        parts = tuple(part.thinned(ROWS) for part in stretches(far_lags(log).corrected(log), {}))
     except BadValue:
         return
     judge = _Judge(names, reference)

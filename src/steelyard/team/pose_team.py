@@ -17,6 +17,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team import pose_rows
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_poses
+from steelyard.team.clock_errors import NOTHING, ClockErrors
 from steelyard.team.pose_fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_start import ENOUGH, first_team
 from steelyard.team.poses import Team, TeamMotion
@@ -24,6 +25,7 @@ from steelyard.team.presence import as_long, idle, let_go, presence_findings
 from steelyard.team.slips import SlipAt, alone, edited, find_slip, noise_alone
 from steelyard.team.stacked import Stretch, all_poses, stretches
 from steelyard.team.turns import turns_between, twists_between
+from steelyard.team.unsteady_clocks import Left, clock_errors
 
 # Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
 PUNCTUAL = 2e-4
@@ -57,12 +59,16 @@ def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, 
 
 @dataclass(frozen=True, eq=False)
 class PoseTeam:
-    """Recordings with their clocks right, the joint fit of poses, and how late each clock is [s]: zero on average."""
+    """Recordings with their clocks right, the joint fit of poses, and how late each clock is [s]: zero on average.
+
+    clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
+    """
 
     parts: tuple[Stretch, ...]
     fit: PoseFit
     late: Mapping[str, float]
     findings: tuple[Finding, ...] = ()
+    clocks_left: ClockErrors = NOTHING
 
     @classmethod
     def of(cls, log: TeamLog, clocks: bool) -> PoseTeam:
@@ -114,8 +120,12 @@ class PoseTeam:
         return cls(parts, fit, _later(late, fit))
 
     def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
-        """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were."""
+        """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were.
+
+        Clocks are judged before: one that is set anew passes for slips.
+        """
         team, slips = self, list[SlipAt]()
+        left = self._clock_errors(log) if clocks else NOTHING
         for _ in range(MOST_SLIPS):
             found = team._slip()
             if found is None:
@@ -124,9 +134,18 @@ class PoseTeam:
             team = self._fitted(log, clocks, raw, edited(edit, [*slips, found]))
             slips.append(team._measured(log, found))
         if not slips:
-            return self
+            return replace(self, clocks_left=left)
         team = self._fitted(log, clocks, raw, edited(edit, slips))
-        return replace(team, findings=tuple(slip.finding(log) for slip in slips))
+        return replace(team, findings=tuple(slip.finding(log) for slip in slips), clocks_left=left)
+
+    def _clock_errors(self, log: TeamLog) -> ClockErrors:
+        """Return what clocks seem to be off by in single recordings."""
+        left, start = [], 0
+        for part in self.parts:
+            rows = slice(start, start + len(part))
+            start += len(part)
+            left.append(Left(part.time, part.seen, self.fit.rows.residual[rows], self.fit.rows.data.twists[rows]))
+        return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
 
     def _slip(self) -> SlipAt | None:
         best, start = None, 0

@@ -66,12 +66,12 @@ def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     Rows are told by the reference's clock as it is, whatever `late` says of it. Raises BadValue where the corrected
     clocks no longer overlap.
     """
-    made = tuple(_stretch(log, punctual(recording, late)) for recording in log.recordings)
+    made = tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
     own = late.get(log.reference, 0.0)
     return tuple(replace(part, time=part.time + own) for part in made) if own else made
 
 
-def punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
+def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
     """Return the recording with every robot's stamps moved by the seconds that they are late."""
     if not any(late.get(name) for name in recording.tracks):
         return recording

@@ -43,7 +43,7 @@ class TwistScatter:
         windows = min(WINDOWS, max(FEWEST, NUMBERS / width**2))
         for part in moving:
             pieces = max(1, round(windows * len(part.rows) / total))
-            change = _rate_of_change(part)
+            change = rates_of_change(part)
             for rows in np.array_split(np.arange(len(part.rows)), pieces):
                 here = slice(int(rows[0]), int(rows[-1]) + 1)
                 patterns, which = np.unique(part.seen[here], axis=0, return_inverse=True)
@@ -91,7 +91,7 @@ class TwistScatter:
         return out
 
 
-def _rate_of_change(part: TwistStretch) -> Array:
+def rates_of_change(part: TwistStretch) -> Array:
     """Return the slopes (T, N, 6) of all twists, zero in rows around which one that speaks there is not seen.
 
     A difference of next rows would be mostly noise: clocks that it is compared with seem too near.

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,9 +14,11 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.clock_errors import NOTHING, ClockErrors
 from steelyard.team.twist_fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twist_rows import TwistStretch, twist_stretches
-from steelyard.team.twist_statistic import TwistScatter
+from steelyard.team.twist_statistic import TwistScatter, rates_of_change
+from steelyard.team.unsteady_clocks import Left, clock_errors
 
 # Clocks are moved where they are off by more than this [s] and so many standard deviations, and then until the last
 # step is below the shares of both.
@@ -30,11 +32,15 @@ LOUD = 0.1
 
 @dataclass(frozen=True, eq=False)
 class TwistTeam:
-    """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s]."""
+    """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s].
+
+    clocks_left  what clocks seem to be off by in single recordings
+    """
 
     parts: tuple[TwistStretch, ...]
     fit: TwistFit
     late: Mapping[str, float]
+    clocks_left: ClockErrors = NOTHING
 
     @classmethod
     def of(cls, log: TeamLog, clocks: bool) -> TwistTeam:
@@ -50,7 +56,17 @@ class TwistTeam:
             if not (clocks and left) or settled:
                 break
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
-        return cls(parts, fit, late)
+        team = cls(parts, fit, late)
+        return replace(team, clocks_left=team._clock_errors(log)) if clocks else team
+
+    def _clock_errors(self, log: TeamLog) -> ClockErrors:
+        """Return what clocks seem to be off by in single recordings."""
+        J, W, left = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), []
+        for part in self.parts:
+            slope = -rates_of_change(part)
+            apart = self._left(part)[0] - slope * self.fit.delays[:, None]
+            left.append(Left(part.rows.time, part.seen, apart, slope))
+        return clock_errors(log, tuple(left), J, W)
 
     @property
     def rough(self) -> bool:
@@ -87,18 +103,23 @@ class TwistTeam:
         known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
         return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
 
+    def _left(self, part: TwistStretch) -> tuple[Array, Array, Array]:
+        """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6)."""
+        fused, covariance = fused_twist(part.twist, part.seen, self.fit.grasps, self.fit.noise)
+        moved = np.einsum("nij,tj->tni", adjoint_inverse(self.fit.grasps), fused)
+        return (part.twist - moved) * part.seen[..., None], fused, covariance
+
     def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
 
         The covariance (6, 6) is that of the fused twist, in the balance frame's axes.
         """
-        grasps, noise = self.fit.grasps, self.fit.noise
+        grasps = self.fit.grasps
         frame = balance_frame(grasps)
         into = adjoint_inverse(frame)
         out = []
         for part in self.parts:
-            fused, covariance = fused_twist(part.twist, part.seen, grasps, noise)
-            left = (part.twist - np.einsum("nij,tj->tni", adjoint_inverse(grasps), fused)) * part.seen[..., None]
+            left, fused, covariance = self._left(part)
             down, level = _down(part, frame.inverse() @ grasps)
             known = level & (part.seen.any(1) | (part.rows.kind == "still"))
             out.append((from_twists(part.rows, fused @ into.T, -down, known, highest_hz), left))

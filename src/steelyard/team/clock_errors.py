@@ -1,0 +1,121 @@
+"""How late each robot's stamps are in each recording, beside one offset per robot: said, put right, put in words."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.team_log import TeamLog, TeamRecording
+
+# A difference is worth a word from so many standard deviations and so much [s].
+BEYOND, LEAST_S = 6.0, 1e-4
+
+
+@dataclass(frozen=True)
+class ClockError:
+    """Stamps of one robot in one recording that are late by `late` [s] at `middle` [s], and more so by `rate` [s/s].
+
+    late_std, rate_std  standard deviations, zero where they are not known
+    """
+
+    late: float = 0.0
+    rate: float = 0.0
+    middle: float = 0.0
+    late_std: float = 0.0
+    rate_std: float = 0.0
+
+    def __add__(self, more: ClockError) -> ClockError:
+        """Return the error of stamps that have `more` beside what was put right before."""
+        last = more if more.late_std else self
+        return replace(last, late=self.late + more.late, rate=self.rate + more.rate)
+
+    def right(self, time: Array) -> Array:
+        """Return stamps (T,) [s] put right."""
+        return np.asarray(time - (self.late + self.rate * (time - self.middle)))
+
+
+# By robot; others are punctual.
+Errors = Mapping[str, ClockError]
+
+
+@dataclass(frozen=True)
+class ClockErrors:
+    """What clocks are off by in every recording; nothing where all are punctual."""
+
+    recordings: tuple[Errors, ...] = ()
+
+    def __bool__(self) -> bool:
+        return any(self.recordings)
+
+    def __add__(self, more: ClockErrors) -> ClockErrors:
+        if not (self and more):
+            return more if more else self
+        both = zip(self.recordings, more.recordings, strict=True)
+        return ClockErrors(tuple(
+            {n: a.get(n, ClockError()) + b.get(n, ClockError()) for n in sorted({*a, *b})} for a, b in both
+        ))  # fmt: skip
+
+    def corrected(self, log: TeamLog) -> TeamLog:
+        """Return the log with all stamps put right."""
+        if not self:
+            return log
+        pairs = zip(log.recordings, self.recordings, strict=True)
+        return log.with_recordings(*(punctual(recording, errors) for recording, errors in pairs))
+
+    def first(self, log: TeamLog) -> Errors:
+        """Return what clocks are off by in the first recording in motion, for which an answer tells its offsets."""
+        moving = _moving(log)
+        return self.recordings[moving[0]] if self and moving else {}
+
+    def findings(self, log: TeamLog) -> Iterator[Finding]:
+        """Yield clock-unsteady for every robot whose clock is set anew between recordings, or runs fast or slow."""
+        if not self:
+            return
+        for name in log.names:
+            moving = [(log.recordings[k].name, self.recordings[k].get(name, ClockError())) for k in _moving(log)]
+            words = [*_set_anew(moving), *_runs(moving)]
+            if words:
+                said = f"The stamps of '{name}' {' and '.join(words)}, beside the reference's; they were put right."
+                yield Finding.of("clock-unsteady", said)
+
+
+NOTHING = ClockErrors()
+
+
+def punctual(recording: TeamRecording, errors: Errors) -> TeamRecording:
+    """Return the recording with stamps put right."""
+    if not any(name in recording.tracks for name in errors):
+        return recording
+    tracks = {n: t.stamped(errors[n].right(t.time)) if n in errors else t for n, t in recording.tracks.items()}
+    return replace(recording, tracks=tracks)
+
+
+def _moving(log: TeamLog) -> list[int]:
+    """Return which recordings tell how late clocks are."""
+    return [k for k, recording in enumerate(log.recordings) if recording.kind != "still"]
+
+
+def _set_anew(moving: Sequence[tuple[str, ClockError]]) -> Iterator[str]:
+    """Yield in which recordings stamps are later or earlier than in the first."""
+    (first, start), *others = moving
+    for name, error in others:
+        more, std = error.late - start.late, float(np.hypot(error.late_std, start.late_std))
+        if abs(more) > max(LEAST_S, BEYOND * std):
+            way = "later" if more > 0 else "earlier"
+            yield f"are {1e3 * abs(more):.1f}{_give(1e3 * std)} ms {way} in '{name}' than in '{first}'"
+
+
+def _runs(moving: Sequence[tuple[str, ClockError]]) -> Iterator[str]:
+    """Yield in which recordings a clock runs fast or slow."""
+    for name, error in moving:
+        if abs(error.rate) > BEYOND * error.rate_std:
+            way = "fast" if error.rate > 0 else "slow"
+            yield f"run {1e6 * abs(error.rate):.0f}{_give(1e6 * error.rate_std)} ppm {way} in '{name}'"
+
+
+def _give(std: float) -> str:
+    return f" ± {std:.2g}" if std else ""

@@ -1,0 +1,134 @@
+"""Clocks that are set anew between recordings, or run fast: told, put right, and never where clocks are steady."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+import pytest
+
+from steelyard.check import Array
+from steelyard.logs.team_log import TeamLog
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import CASES, Slip, TeamNoise, TeamScene
+from steelyard.team.clock_errors import NOTHING, ClockError, ClockErrors
+from steelyard.team.estimate import TeamEstimate
+from steelyard.team.joint import JointTeam
+
+NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
+LATE = 0.005
+
+
+def trial(sensing: str, seed: int = 100, **changes: Any) -> TeamTrial:
+    moving = sensing == "twists"
+    noise = CASES["B"] if sensing == "joints" else NOISY
+    return simulate_team(TeamScene(noise, sensing=sensing, bases_move=moving, motion_samples=2500, **changes), seed)  # type: ignore[arg-type]
+
+
+def restamped(log: TeamLog, kind: str, of: Callable[[Array], Array], *names: str) -> TeamLog:
+    """Return the log with the stamps of robots in recordings of one kind made anew."""
+    return log.with_recordings(
+        *(
+            replace(r, tracks={n: t.stamped(of(t.time)) if n in names else t for n, t in r.tracks.items()})
+            if r.kind == kind
+            else r
+            for r in log.recordings
+        )
+    )
+
+
+def bars_off(found: TeamEstimate, made: TeamTrial) -> float:
+    """Return by how many of their bars the grasps are off (rms)."""
+    off = [
+        (found.grasps[name].pose.position - made.truth.grasps.position[i]) / found.grasps[name].std_m
+        for i, name in enumerate(made.log.names)
+        if i
+    ]
+    return float(np.sqrt(np.mean(np.square(off))))
+
+
+@pytest.mark.parametrize("sensing", ["joints", "poses", "twists"])
+def test_a_clock_that_is_set_anew_is_named_and_put_right(sensing: str) -> None:
+    off, plain = [], []
+    for seed in (100, 101, 102):
+        made = trial(sensing, seed)
+        log = restamped(made.log, "motion", lambda t: t + LATE, "robot1")
+        found = JointTeam().identify(log)
+        plain.append(bars_off(JointTeam().identify(made.log), made))
+        off.append(bars_off(found, made))
+        (said,) = (f for f in found.findings if f.code == "clock-unsteady")
+        assert "'robot1' are " in said.message
+        assert "later in 'motion-5' than in 'grasp-0'" in said.message
+        # The offset that is told is that of the first recording in motion.
+        assert abs(found.clock_offsets_s["robot1"]) < 4 * found.clock_offset_std_s["robot1"]
+        assert "grasp-slipped" not in found.codes()
+    assert max(off) < 1.5 * max(plain)
+
+
+@pytest.mark.parametrize("sensing", ["joints", "twists"])
+def test_a_clock_that_runs_fast_is_named_and_put_right(sensing: str) -> None:
+    made = trial(sensing)
+    log = restamped(made.log, "motion", lambda t: t + 2e-4 * (t - t[0]), "robot2")
+    found = JointTeam().identify(log)
+    (said,) = (f for f in found.findings if f.code == "clock-unsteady")
+    assert "'robot2'" in said.message
+    assert "ppm fast in 'motion-5'" in said.message
+    assert bars_off(found, made) < 1.5 * bars_off(JointTeam().identify(made.log), made)
+
+
+def test_a_reference_that_is_set_anew_shows_in_all_others() -> None:
+    made = trial("joints")
+    found = JointTeam().identify(restamped(made.log, "motion", lambda t: t + LATE, "robot0"))
+    said = [f.message for f in found.findings if f.code == "clock-unsteady"]
+    assert [("'robot1'" in one, "'robot2'" in one) for one in said] == [(True, False), (False, True)]
+    assert all("earlier in 'motion-5'" in one for one in said)
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+def test_a_clock_that_is_set_anew_by_most_of_a_second(sensing: str) -> None:
+    made = trial(sensing)
+    found = JointTeam().identify(restamped(made.log, "motion", lambda t: t - 0.7, "robot1"))
+    (said,) = (f for f in found.findings if f.code == "clock-unsteady")
+    assert "'robot1' are 700" in said.message
+    assert "earlier in 'motion-5'" in said.message
+    assert bars_off(found, made) < 1.5 * bars_off(JointTeam().identify(made.log), made)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_steady_clocks_are_left_alone(case: str) -> None:
+    for seed in (7, 8):
+        scene = TeamScene(CASES[case], motion_samples=1500, late_s={1: 0.013})
+        assert "clock-unsteady" not in JointTeam().identify(simulate_team(scene, seed).log).codes()
+
+
+def test_a_slip_is_no_clock() -> None:
+    for seed in (100, 101):
+        slip = Slip(1, np.array([0.0, 0.004, 0.003]), 8.0)
+        found = JointTeam().identify(trial("joints", seed, slip=slip).log)
+        assert "grasp-slipped" in found.codes()
+        assert "clock-unsteady" not in found.codes()
+
+
+def test_clocks_that_are_taken_as_they_are() -> None:
+    log = restamped(trial("poses").log, "motion", lambda t: t + LATE, "robot1")
+    found = JointTeam(clocks=False).identify(log)
+    assert "clock-unsteady" not in found.codes()
+    assert not found.clock_offset_std_s
+
+
+def test_errors_add_up_and_are_taken_out() -> None:
+    log = trial("poses").log
+    one = ClockErrors(tuple({"robot1": ClockError(0.01, 1e-5, float(r.span[0]))} for r in log.recordings))
+    late = ClockErrors(tuple({"robot1": ClockError(-0.01, -1e-5, float(r.span[0]))} for r in log.recordings)).corrected(
+        log
+    )
+    for before, after in zip(log.recordings, one.corrected(late).recordings, strict=True):
+        assert after.tracks["robot1"].time == pytest.approx(before.tracks["robot1"].time, abs=2e-7)
+        assert after.tracks["robot0"] is before.tracks["robot0"]
+    assert not NOTHING
+    assert NOTHING.corrected(log) is log
+    assert (NOTHING + one) is one
+    assert (one + NOTHING) is one
+    assert (one + one).first(log)["robot1"].late == pytest.approx(0.02)
