@@ -23,6 +23,7 @@ from steelyard.team.pose_start import ENOUGH, first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
 from steelyard.team.slips import SlipAt, alone, edited, find_slip, noise_alone
+from steelyard.team.slips_between import slip_between, step_between
 from steelyard.team.stacked import Stretch, all_poses, stretches
 from steelyard.team.turns import turns_between, twists_between
 from steelyard.team.unsteady_clocks import Left, clock_errors
@@ -156,11 +157,14 @@ class PoseTeam:
             slip = find_slip(apart[rows], part.seen, part.rate, noise)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.time[slip.row]), slip)
-        return best
+        return best if best is not None else slip_between(self.parts, apart)
 
     def _measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""
-        raw = stretches(log, self.late)[found.recording]
+        parts = stretches(log, self.late)
+        if not np.isfinite(found.time):
+            return step_between(found, parts, self._off(parts))
+        raw = parts[found.recording]
         start = sum(len(part) for part in self.parts[: found.recording])
         apart = self.residuals(raw, start)[:, found.slip.robot]
         noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
@@ -200,12 +204,14 @@ class PoseTeam:
 
     def off(self, log: TeamLog) -> list[Array]:
         """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
-        out, start = [], 0
-        for raw, part in zip(stretches(log, self.late), self.parts, strict=True):
-            left = self.residuals(raw, start) / np.repeat(self.fit.noise, 3, axis=1)
-            out.append(np.sqrt((left**2).mean(-1)))
-            start += len(part)
-        return out
+        left = self._off(stretches(log, self.late)) / np.repeat(self.fit.noise, 3, axis=1)
+        each = np.sqrt((left**2).mean(-1))
+        return np.split(each, np.cumsum([len(part) for part in self.parts])[:-1])
+
+    def _off(self, parts: tuple[Stretch, ...]) -> Array:
+        """Return the residuals (T, N, 6) of recordings one after the other."""
+        starts = np.cumsum([0, *(len(part) for part in self.parts)])
+        return np.concatenate([self.residuals(raw, int(start)) for raw, start in zip(parts, starts, strict=False)])
 
     def rows(self, log: TeamLog, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their poses, and a row's covariance.

@@ -46,7 +46,7 @@ class Slip:
 class SlipAt:
     """A slip in one recording at `time` [s]; `step` (6,) rotation and position of the grasp after it, in its own axes.
 
-    Without a step the rows after it are left out of everything.
+    Without a step the rows after it are left out of everything. A time of -inf is before the recording.
     """
 
     recording: int
@@ -91,10 +91,14 @@ class SlipAt:
         """Return the finding with robot, time and size."""
         name, record = log.names[self.slip.robot], log.recordings[self.recording].name
         size = f"{1e3 * self.slip.distance:.1f} mm and {np.rad2deg(self.slip.angle):.2f} deg"
+        if np.isfinite(self.time):
+            what = f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'"
+        else:
+            before = log.recordings[self.recording - 1].name
+            what = f"The grasp of '{name}' slipped by {size}, or its base was moved, between '{before}' and '{record}'"
         return Finding.of(
             "grasp-slipped",
-            f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'; from there on its poses are "
-            "left out and its forces act from where it then was.",
+            f"{what}; from there on its poses are left out and its forces act from where it then was.",
         )
 
 
