@@ -99,7 +99,7 @@ class Rows:
         W, inverse, pattern = _weights(self.data, self.team, noise)
         return pose_rows.pulled(
             self.apart, self.data.valid, G.rotation.matrix, G.position, Z.rotation.matrix, Z.position,
-            X.rotation.matrix, X.position, self.data.twists, W, inverse, pattern, rows,
+            X.rotation.matrix, X.position, self.data.twists, W, inverse, pattern, self.data.shares, rows,
         )  # fmt: skip
 
 

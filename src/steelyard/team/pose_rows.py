@@ -60,14 +60,14 @@ def settled(
 @_passes
 def pulled(
     residual: Array, valid: Mask, RG: Array, pG: Array, RZ: Array, pZ: Array, RX: Array, pX: Array, twist: Array,
-    W: Array, inverse: Array, pattern: Integers, rows: int,
+    W: Array, inverse: Array, pattern: Integers, share: Array, rows: int,
 ) -> Array:  # fmt: skip
     """Return the gradient of half chi^2 by grasps, homes and delays, sign turned, in sums over so many `rows`.
 
-    Arguments as in `settled`, residuals from there; the last of the sums (T / rows, 13 N) may be of fewer rows.
-    What any motion takes up of a
-    row is left out. With weights alike along the axes, W e is the exact gradient in each grasp's own axes, so that the
-    optimum is that of the likelihood, whatever the reference and the homes.
+    Arguments as in `settled`, residuals from there; share (T,) how much each row counts; the last of the sums
+    (T / rows, 13 N) may be of fewer rows. What any motion takes up of a row is left out. With weights alike along the
+    axes, W e is the exact gradient in each grasp's own axes, so that the optimum is that of the likelihood, whatever
+    the reference and the homes.
     """
     T, N = valid.shape
     out = np.zeros((-(-T // rows), N, OWN))
@@ -81,7 +81,7 @@ def pulled(
         for i in range(N):
             if not valid[t, i]:
                 continue
-            u, v = W[i, 0], W[i, 1]
+            u, v = W[i, 0] * share[t], W[i, 1] * share[t]
             e = _less(_six(residual, t, i), _moved(x, _three(pG, i)))
             push = (u * e[0], u * e[1], u * e[2], v * e[3], v * e[4], v * e[5])
             pull = _home_pull(X, place, _three(pG, i), _three(pZ, i), push)

@@ -64,18 +64,21 @@ def _entries() -> Integers:
 ENTRIES = _entries()
 
 
-def scatter(R: Array, p: Array, twist: Array, valid: Mask) -> Array:
-    """Return the scatter (25 N, 25 N) of the features of all these rows; arguments as in `features`."""
+def scatter(R: Array, p: Array, twist: Array, valid: Mask, share: Array | None = None) -> Array:
+    """Return the scatter (25 N, 25 N) of the features of all these rows; arguments as in `features`.
+
+    share  (T,) how much each row counts; None where all count as one
+    """
     size = FEATURES * p.shape[1]
     seen = size if len(twist) else POSED * p.shape[1]
     if seen == size and len(p) <= AT_ONCE:
         F = features(R, p, twist, valid)
-        return np.asarray(F.T @ F)
+        return np.asarray(F.T @ F if share is None else F.T @ (share[:, None] * F))
     out = np.zeros((size, size))
     for start in range(0, len(p), AT_ONCE):
         rows = slice(start, start + AT_ONCE)
         F = features(R[rows], p[rows], twist[rows], valid[rows])
-        out[:seen, :seen] += F.T @ F
+        out[:seen, :seen] += F.T @ (F if share is None else share[rows, None] * F)
     return out
 
 

@@ -22,6 +22,7 @@ from steelyard.team.pose_fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.pose_start import ENOUGH, first_team
 from steelyard.team.poses import Team, TeamMotion
 from steelyard.team.presence import as_long, idle, let_go, presence_findings
+from steelyard.team.rest import shares_at_rest
 from steelyard.team.slips import SlipAt, alone, edited, find_slip, noise_alone
 from steelyard.team.slips_between import slip_between, step_between
 from steelyard.team.stacked import Stretch, all_poses, stretches
@@ -104,7 +105,11 @@ class PoseTeam:
         few = slice(None, None, max(1, len(data.valid) // enough))
         fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
         if not clocks:
-            return cls(parts, fit_poses(data, _followed(data, fit), reference, fit.noise), late)
+            fit = fit_poses(data, _followed(data, fit), reference, fit.noise)
+            share = shares_at_rest(parts, fit)
+            if share is not None:
+                fit = fit_poses(replace(data, share=share), fit.team, reference, fit.noise)
+            return cls(parts, fit, late)
         known = None
         for left in reversed(range(CLOCK_ROUNDS)):
             team = _followed(data, fit)
@@ -117,7 +122,11 @@ class PoseTeam:
             late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
-        fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
+        share = shares_at_rest(parts, fit)
+        if share is None:
+            fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
+        else:
+            fit = fit_poses(replace(timed, share=share), fit.team, reference, fit.noise)
         return cls(parts, fit, _later(late, fit))
 
     def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
@@ -157,7 +166,8 @@ class PoseTeam:
             slip = find_slip(apart[rows], part.seen, part.rate, noise)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.time[slip.row]), slip)
-        return best if best is not None else slip_between(self.parts, apart)
+        # Where nothing fits, recordings differ for other reasons.
+        return best if best is not None or self.rough else slip_between(self.parts, apart)
 
     def _measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""

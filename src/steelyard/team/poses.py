@@ -22,11 +22,13 @@ class TeamMotion:
     poses  X_HG (T, N); where not `valid` they hold anything finite
     valid  (T, N) whether the robot has a pose at that time
     twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; None where not asked for
+    share  (T,) how much each row counts; None where all count as one
     """
 
     poses: Pose
     valid: Mask
     twist: Array | None = None
+    share: Array | None = None
 
     def __post_init__(self) -> None:
         # One layout, one compiled form of what passes over the rows.
@@ -36,12 +38,18 @@ class TeamMotion:
 
     def rows(self, chosen: Any) -> TeamMotion:
         """Return some of the rows."""
-        return TeamMotion(self.poses[chosen], self.valid[chosen], None if self.twist is None else self.twist[chosen])
+        twist, share = (None if x is None else x[chosen] for x in (self.twist, self.share))
+        return TeamMotion(self.poses[chosen], self.valid[chosen], twist, share)
 
     @property
     def twists(self) -> Array:
         """The twists, or (0, N, 6) where they were not asked for."""
         return np.zeros((0, self.count, 6)) if self.twist is None else self.twist
+
+    @property
+    def shares(self) -> Array:
+        """How much each row (T,) counts."""
+        return np.ones(len(self.valid)) if self.share is None else self.share
 
     @property
     def count(self) -> int:
@@ -73,7 +81,7 @@ class TeamMotion:
         """Scatter (25 N, 25 N) of the features of every row per pattern; see pose_statistic."""
         found, place = self.patterns
         every = [self] if len(found) == 1 else [self.rows(place == k) for k in range(len(found))]
-        return [scatter(r.poses.rotation.matrix, r.poses.position, r.twists, r.valid) for r in every]
+        return [scatter(r.poses.rotation.matrix, r.poses.position, r.twists, r.valid, r.share) for r in every]
 
 
 def in_words(noise: Array) -> str:
