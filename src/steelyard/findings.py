@@ -55,6 +55,7 @@ REMEDIES: dict[str, str] = {
     "grasp-direction-lost": "Turn the payload about a second axis as well, or move it along the missing direction.",
     "clock-offset": "Nothing to do: the offsets were taken out. Synchronise the robots' clocks to be rid of them.",
     "clock-unsteady": "Nothing to do: clocks were put right in every recording. Keep one clock through the session.",
+    "grasp-yields": "Nothing to do: poses were put right. Stiffer grippers or lighter loads tell more.",
     "grasp-slipped": "Clamp this grasp tighter; record again if you need its pose after the slip.",
     "robot-left": "Nothing to do if the robot was meant to let go; its rows after that were left out.",
     "robot-joined": "Nothing to do if the robot was meant to join; its rows before that were left out.",

@@ -136,6 +136,8 @@ class TeamScene:
     still_turns   rotation vector [rad] of each still pose
     bias_per      whether bias and gain are drawn anew per recording, or once per session
     squeeze_N     amplitude of internal forces
+    stiffness     of every grasp, along all axes [N/m] and about them [N m/rad]: grippers stand off from where they hold
+                  by what they push; None = rigid
     """
 
     noise: TeamNoise = EXACT
@@ -157,6 +159,7 @@ class TeamScene:
     still_turns: tuple[tuple[float, float, float], ...] = STILL_TURNS
     bias_per: Literal["recording", "session"] = "recording"
     squeeze_N: float = 5.0
+    stiffness: tuple[float, float] | None = None
     slip: Slip | None = None
     presence: tuple[Presence, ...] = ()
     hinge: Hinge | None = None

@@ -55,6 +55,18 @@ class Carried:
     wrench: Array
     gravity: Array
 
+    def yielded(self, robot: int, stiffness: tuple[float, float]) -> tuple[Pose, Array]:
+        """Return the poses (T,) and wrenches (T, 6) of one robot's gripper, where its grasp yields to what it pushes.
+
+        stiffness  [N/m] and [N m/rad], the same along all axes of the grasp
+        """
+        wrench = self.wrench[robot]
+        off = Pose(Rotation.exp(wrench[:, :3] / stiffness[1]), wrench[:, 3:] / stiffness[0])
+        into = off.rotation.inverse()
+        moment = into.apply(wrench[:, :3] - cross(off.position, wrench[:, 3:]))
+        pose = Pose(Rotation(self.rotation[robot]), self.position[robot]) @ off
+        return pose, np.concatenate([moment, into.apply(wrench[:, 3:])], axis=1)
+
 
 @dataclass(frozen=True, eq=False)
 class Squeeze:

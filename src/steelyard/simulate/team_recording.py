@@ -111,8 +111,12 @@ def record(
     scene, plan = view.scene, view.plan
     time, stamps = _own_time(scene, plan, robot), start + plan.time
     seen, pushed = view.at(time), view.at(plan.time - scene.late_s.get(robot, 0.0))
-    wrench = read_wrench(rng, pushed.wrench[robot], scene.noise, *calibration, robot in scene.six_axis)
-    pose = home.inverse() @ Pose(Rotation(seen.rotation[robot]), seen.position[robot])
+    if scene.stiffness is None:
+        held, push = Pose(Rotation(seen.rotation[robot]), seen.position[robot]), pushed.wrench[robot]
+    else:
+        held, push = seen.yielded(robot, scene.stiffness)[0], pushed.yielded(robot, scene.stiffness)[1]
+    wrench = read_wrench(rng, push, scene.noise, *calibration, robot in scene.six_axis)
+    pose = home.inverse() @ held
     channels: dict[str, Array | None] = {"force": wrench[:, 3:]}
     if robot in scene.six_axis:
         channels["torque"] = wrench[:, :3]

@@ -53,6 +53,7 @@ from steelyard.team.team_findings import (
 from steelyard.team.twist_team import TwistTeam
 from steelyard.team.unexplained import unexplained
 from steelyard.team.unsteady_clocks import steadied
+from steelyard.team.yielding import Yields, stiffened
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
 LEAST_CHI2 = -0.1
@@ -94,9 +95,10 @@ class JointTeam:
             made, path = moving.rows(self.highest_hz)
             found, down, order = [], moving.down(), 1
         else:
-            log, standing, begun = self._standing(log)
+            log, standing, begun, yields = self._standing(log)
             grasps, noise = standing.fit.team.grasps, standing.fit.noise
-            spread = replace(grasp_covariance(standing.fit), level=standing.level(log))
+            spread = yields.widened(grasp_covariance(standing.fit), grasps, log.names.index(log.reference))
+            spread = replace(spread, level=standing.level(log))
             late, order, left = _against(standing.late, log.reference), 2, standing.fit.left
             split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
             jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
@@ -105,7 +107,7 @@ class JointTeam:
             if standing.rough:
                 require_well_read(log)
                 require_own_files(log)
-            found = [*standing.findings, *rigidity_findings(split, log.names)]
+            found = [*standing.findings, *yields.findings(log), *rigidity_findings(split, log.names)]
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
         placed = balance_frame(grasps).inverse() @ grasps
@@ -133,13 +135,18 @@ class JointTeam:
         ]
         return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
 
-    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors]:
-        """Return log, fit of poses and clocks like `_fitted`; raises BadValue where one robot's poses are misread."""
+    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors, Yields]:
+        """Return log, fit of poses and clocks like `_fitted`, and how far grasps yield.
+
+        Raises BadValue where one robot's poses are misread.
+        """
         try:
-            return self._fitted(log, PoseTeam.of)
+            log, team, begun = self._fitted(log, PoseTeam.of)
         except (CannotAnswer, BadValue, np.linalg.LinAlgError):
             require_well_read(log)
             raise
+        log, team, yields = stiffened(log, team, lambda stiff: PoseTeam.of(stiff, self.clocks))
+        return log, team, begun, yields
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, ClockErrors]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""

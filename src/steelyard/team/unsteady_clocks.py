@@ -18,6 +18,7 @@ from steelyard.check import Array
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.clock_errors import ClockError, ClockErrors
+from steelyard.team.scores import Scores
 
 # Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
 STRETCHES, ROWS = 20, 100
@@ -113,60 +114,22 @@ def _told(part: Left, J: Array, W: Array, names: tuple[str, ...], reference: int
     if len(robots) < 2 or len(rows) < ROWS:
         return {}
     middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
-    tau = (part.time[rows] - middle) / half
-    scores = _Scores.of(part.apart[rows][:, robots], part.slope[rows][:, robots], tau, J[robots], W[robots])
-    base = int(np.argmax(robots == reference))
-    found = scores.solved(base)
-    if found is None:
+    slope, some = part.slope[rows][:, robots], len(robots)
+    columns = np.concatenate([slope, slope * ((part.time[rows] - middle) / half)[:, None, None]], axis=1)
+    whose = np.tile(np.arange(some), 2)
+    scores = Scores.of(part.apart[rows][:, robots], columns, whose, J[robots], W[robots], STRETCHES)
+    # What all clocks have in common moves the motion along itself.
+    common = np.kron(np.eye(2), np.ones((some, some))) * np.trace(scores.information.sum(0)) / (2 * some)
+    if not common.any():
         return {}
-    size, std = found / np.array([1.0, half])[:, None]
+    size, covariances = scores.solved(common)
+    base = int(np.argmax(robots == reference))
+    against = np.kron(np.diag([1.0, 1 / half]), np.eye(some) - np.eye(some)[base])
+    late, rate = (against @ size).reshape(2, some)
+    noise = [np.einsum("ij,jk,ik->i", against, V, against) for V in covariances]
+    late_std, rate_std = np.sqrt(np.maximum(*noise)).reshape(2, some)
     return {
-        names[i]: ClockError(float(size[0, k]), float(size[1, k]), middle, float(std[0, k]), float(std[1, k]))
+        names[i]: ClockError(float(late[k]), float(rate[k]), middle, float(late_std[k]), float(rate_std[k]))
         for k, i in enumerate(robots)
         if k != base
     }
-
-
-@dataclass(frozen=True, eq=False)
-class _Scores:
-    """Scores (B, 2 n) of offsets and rates of n robots and what they are known by (B, 2 n, 2 n), by stretches."""
-
-    pull: Array
-    information: Array
-
-    @classmethod
-    def of(cls, apart: Array, slope: Array, tau: Array, J: Array, W: Array) -> _Scores:
-        """Return the sums over rows of residuals (T, n, 6) and slopes (T, n, 6) with the payload's motion taken out."""
-        # Sums over robots of J^T W J are what a row tells of the motion: M = L L^T of its inverse.
-        root = np.linalg.cholesky(np.linalg.inv(np.einsum("nka,nk,nkb->ab", J, W, J)))
-        pushed = slope * W
-        seen = np.einsum("tnk,nka->tna", pushed, J @ root)
-        powers = tau[:, None] ** np.arange(2)
-        pull, square = (np.einsum("tnk,tnk->tn", pushed, x) for x in (apart, slope))
-        pulls, informations = [], []
-        for rows in np.array_split(np.arange(len(tau)), STRETCHES):
-            p = powers[rows]
-            count = pull.shape[1]
-            both = (p[:, :, None, None] * seen[rows][:, None]).reshape(len(rows), 2 * count, 6)
-            both = both.swapaxes(0, 1).reshape(2 * count, -1)
-            own = np.einsum("tp,tq,tn->pqn", p, p, square[rows])
-            full = np.einsum("pqn,nm->pnqm", own, np.eye(count)).reshape(2 * count, 2 * count)
-            pulls.append((p.T @ pull[rows]).ravel())
-            informations.append(full - both @ both.T)
-        return cls(np.array(pulls), np.array(informations))
-
-    def solved(self, reference: int) -> Array | None:
-        """Return offsets and rates against one robot's, and standard deviations (2, 2, n); None where nothing moves."""
-        H, count = self.information.sum(0), self.pull.shape[1] // 2
-        # What all clocks have in common moves the motion along itself.
-        common = np.kron(np.eye(2), np.ones((count, count))) * np.trace(H) / (2 * count)
-        if not common.any():
-            return None
-        inverse = np.linalg.pinv(H + common, hermitian=True)
-        size = inverse @ self.pull.sum(0)
-        left = self.pull - self.information @ size
-        spread = left.T @ left * (len(left) / (len(left) - 2))
-        against = np.kron(np.eye(2), np.eye(count) - np.eye(count)[reference])
-        noise = [np.einsum("ij,jk,ik->i", against, inverse @ V @ inverse, against) for V in (spread, H)]
-        std = np.sqrt(np.maximum(*noise))
-        return np.stack([against @ size, std]).reshape(2, 2, count)

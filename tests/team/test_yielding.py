@@ -1,0 +1,85 @@
+"""Grasps that yield to what they push: told with their stiffness, poses put right; stiff grasps are left alone."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+import pytest
+
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.team.estimate import TeamEstimate
+from steelyard.team.joint import JointTeam
+
+NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, torque_white_Nm=0.1)
+ALL = frozenset({0, 1, 2})
+
+
+def trial(stiffness: tuple[float, float] | None, seed: int = 700, **changes: Any) -> TeamTrial:
+    scene: dict[str, Any] = {"noise": NOISY, "sensing": "poses", "six_axis": ALL, "motion_samples": 2500}
+    return simulate_team(TeamScene(stiffness=stiffness, **(scene | changes)), seed)
+
+
+def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float, float]:
+    """Return how far off grasps are (rms) [m], and in bars, and the centre of mass in bars."""
+    error = np.array(
+        [found.grasps[n].pose.position - made.truth.grasps.position[i] for i, n in enumerate(made.log.names) if i]
+    )
+    bars = np.array([found.grasps[n].std_m for n in made.log.names[1:]])
+    com = (found.com - made.truth.body.com) / found.std[1:4]
+    return float(np.sqrt((error**2).mean())), float(np.sqrt(((error / bars) ** 2).mean())), float(np.abs(com).max())
+
+
+@pytest.mark.parametrize("stiffness", [(3e5, 1e4), (1e5, 3e3), (3e4, 1e3)])
+def test_a_grasp_that_yields_is_named_with_its_stiffness_and_put_right(stiffness: tuple[float, float]) -> None:
+    made = trial(stiffness)
+    found, rigid = JointTeam().identify(made.log), trial(None)
+    said = [f for f in found.findings if f.code == "grasp-yields"]
+    assert [f.message.split("'")[1] for f in said] == list(made.log.names)
+    for finding in said:
+        turn = float(finding.message.split(" N m/rad")[0].split(" by about ")[1].split(" and ")[-1].replace(" ", ""))
+        assert turn == pytest.approx(stiffness[1], rel=0.1)
+    right = off(JointTeam().identify(rigid.log), rigid)
+    now = off(found, made)
+    assert now[0] < 3 * right[0]
+    assert now[1] < 2.5
+    assert now[2] < 4
+
+
+def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) -> None:
+    """So that the test above cannot pass for want of an effect."""
+    made = trial((1e5, 3e3))
+    now = off(JointTeam().identify(made.log), made)
+    monkeypatch.setattr("steelyard.team.yielding.SUSPECT", np.inf)
+    before = off(JointTeam().identify(made.log), made)
+    assert before[0] > 10 * now[0]
+    assert before[1] > 3
+
+
+def test_passive_gimbals_yield_along_their_axes_only() -> None:
+    made = trial((3e4, 1e3), noise=CASES["B"], sensing="joints", six_axis=frozenset())
+    found = JointTeam().identify(made.log)
+    said = [f.message for f in found.findings if f.code == "grasp-yields"]
+    assert len(said) == 3
+    assert not any("rad" in one for one in said)
+    assert off(found, made)[1] < 2.5
+    assert all(made.log.force_only(name) for name in made.log.names)
+
+
+@pytest.mark.parametrize("case", CASES)
+def test_stiff_grasps_are_left_alone(case: str) -> None:
+    for seed in (11, 12):
+        log = simulate_team(TeamScene(CASES[case], motion_samples=1500), seed).log
+        assert "grasp-yields" not in JointTeam().identify(log).codes()
+
+
+def test_recordings_without_wrenches_do_not_bend_the_others() -> None:
+    made = trial((3e4, 1e3))
+    log = made.log
+    first = log.recordings[0]
+    assert first.kind == "grasp"
+    bare = {n: t.without("force", "torque") for n, t in first.tracks.items()}
+    found = JointTeam().identify(log.with_recordings(type(first)(first.kind, bare, first.name), *log.recordings[1:]))
+    assert "grasp-slipped" not in found.codes()
+    assert off(found, made)[1] < 2.5
