@@ -34,6 +34,7 @@ from steelyard.team.misread_poses import require_well_read
 from steelyard.team.misread_torques import with_torque_sign
 from steelyard.team.misread_twists import require_one_velocity_unit
 from steelyard.team.motion_noise import motion_noise
+from steelyard.team.odd_recording import without_odd
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
 from steelyard.team.pose_covariance import grasp_covariance
@@ -117,7 +118,9 @@ class JointTeam:
         known = spread.turn(size) < COMPARABLE
         groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
         six_axis = np.array([not log.force_only(name) for name in log.names])
-        payload = fit_payload(groups, D, unit_bias(D, six_axis, size), size, self.gains)
+        C = unit_bias(D, six_axis, size)
+        payload = fit_payload(groups, D, C, size, self.gains)
+        payload, odd = without_odd(payload, groups, D, C, size, self.gains)
         _require_one_clock(payload.chi2)
         if not any(one.code == "payload-not-rigid" for one in found):
             _require_mass(payload.lost)
@@ -125,6 +128,7 @@ class JointTeam:
         team = _clocked(team, begun.first(log))
         found += [
             *read,
+            *odd,
             *(() if any(one.code in TOLD for one in (*found, *read)) else unexplained(payload, D, log.names)),
             *lost_directions(team.grasps, down),
             *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),

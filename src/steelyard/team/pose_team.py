@@ -9,7 +9,7 @@ from functools import cached_property
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
@@ -44,8 +44,9 @@ FOLLOWED = 2
 MOST_SLIPS = 3
 # Bases that are said to be level are so to within this [rad].
 LEVEL = 0.02
-# Noise above this share of the motion asks whether the payload is rigid.
-LOUD = 0.05
+# Noise above this share of the motion asks whether the payload is rigid; it must then fall by this factor on average
+# where a slip between recordings is to explain it.
+LOUD, BETTER = 0.05, 3.0
 
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
@@ -141,7 +142,18 @@ class PoseTeam:
             if found is None:
                 break
             # Once more without what follows the slip, which has bent the first fit.
-            team = self._fitted(log, clocks, raw, edited(edit, [*slips, found]))
+            before, again = team, edited(edit, [*slips, found])
+            try:
+                team = self._fitted(log, clocks, raw, again)
+            except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+                break
+            # Recordings that differ for another reason than a slip still do.
+            if (
+                before.rough
+                and found.between
+                and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER)
+            ):
+                break
             slips.append(team._measured(log, found))
         if not slips:
             return replace(self, clocks_left=left)
@@ -166,13 +178,12 @@ class PoseTeam:
             slip = find_slip(apart[rows], part.seen, part.rate, noise)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.time[slip.row]), slip)
-        # Where nothing fits, recordings differ for other reasons.
-        return best if best is not None or self.rough else slip_between(self.parts, apart)
+        return best if best is not None else slip_between(self.parts, apart)
 
     def _measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""
         parts = stretches(log, self.late)
-        if not np.isfinite(found.time):
+        if found.between:
             return step_between(found, parts, self._off(parts))
         raw = parts[found.recording]
         start = sum(len(part) for part in self.parts[: found.recording])

@@ -54,6 +54,11 @@ class SlipAt:
     slip: Slip
     step: Array | None = None
 
+    @property
+    def between(self) -> bool:
+        """Whether the grasp slipped before the recording began."""
+        return not np.isfinite(self.time)
+
     def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array) -> SlipAt:
         """Return the slip from the residuals (T, 6) of its robot against the others' motion; noise (6, 6) of a row."""
         score = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)), noise)[0]
@@ -91,11 +96,11 @@ class SlipAt:
         """Return the finding with robot, time and size."""
         name, record = log.names[self.slip.robot], log.recordings[self.recording].name
         size = f"{1e3 * self.slip.distance:.1f} mm and {np.rad2deg(self.slip.angle):.2f} deg"
-        if np.isfinite(self.time):
-            what = f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'"
-        else:
+        if self.between:
             before = log.recordings[self.recording - 1].name
             what = f"The grasp of '{name}' slipped by {size}, or its base was moved, between '{before}' and '{record}'"
+        else:
+            what = f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'"
         return Finding.of(
             "grasp-slipped",
             f"{what}; from there on its poses are left out and its forces act from where it then was.",

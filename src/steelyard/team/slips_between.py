@@ -20,6 +20,8 @@ from steelyard.team.stacked import Stretch
 
 # How likely noise alone may be taken for a slip, in one log, and the size [m, rad] from which a step counts.
 CHANCE, LEAST_M, LEAST_RAD = 1e-4, 2e-3, 4e-3
+# What moves farther does not slip: another robot's file, or a base that was carried away.
+MOST_M, MOST_RAD = 0.15, 0.6
 # Windows that are needed to tell their scatter.
 WINDOWS = 16
 
@@ -78,5 +80,5 @@ def _step(means: Array, recording: Array, first: int, robot: int, chance: float)
         score = float(step @ np.linalg.solve(spread, step)) * (freedom - 5) / (6 * freedom)
     except np.linalg.LinAlgError:
         return None
-    large = distance > LEAST_M or angle > LEAST_RAD
+    large = (distance > LEAST_M or angle > LEAST_RAD) and distance < MOST_M and angle < MOST_RAD
     return Slip(robot, 0, distance, angle, score) if large and score > fdtri(6, freedom - 5, 1 - chance) else None
