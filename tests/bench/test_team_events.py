@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.bench import team_events
-from steelyard.bench.team_table import _events
+from steelyard.bench import team_events, team_troubles
+from steelyard.bench.team_table import _events, _troubles
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import Presence, TeamNoise, TeamScene
 
@@ -20,6 +20,18 @@ def test_one_of_each_event_and_its_lines() -> None:
     lines = "\n".join(_events(found))
     assert "1 of 1 found within 0.3 s, 0 false alarms" in lines
     assert "one of 4 leaves at half: named in 1 of 1" in lines
+
+
+def test_one_of_each_trouble_and_its_line() -> None:
+    found = team_troubles.run(1, 1)
+    for name in team_troubles.TROUBLES:
+        told = found[name]
+        assert (told["named"], told["false"]) == (1, 0), name
+        assert told["position_mm"]["spoilt"] < 3 * told["position_mm"]["sound"], name
+        assert told["mass_pct"]["spoilt"] < 0.1, name
+    lines = _troubles(found)
+    assert len(lines) == len(team_troubles.TROUBLES)
+    assert lines[0].startswith("clock set anew: named in 1 of 1, falsely in 0; with it (without): position_mm ")
 
 
 def test_the_told_log_has_no_poses_of_the_robot_that_left() -> None:

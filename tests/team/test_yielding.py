@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from steelyard.errors import BadValue
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.team.estimate import TeamEstimate
@@ -72,6 +73,11 @@ def test_stiff_grasps_are_left_alone(case: str) -> None:
     for seed in (11, 12):
         log = simulate_team(TeamScene(CASES[case], motion_samples=1500), seed).log
         assert "grasp-yields" not in JointTeam().identify(log).codes()
+
+
+def test_twists_of_soft_grasps_are_not_simulated() -> None:
+    with pytest.raises(BadValue, match="with poses or joints"):
+        trial((1e5, 3e3), sensing="twists")
 
 
 def test_recordings_without_wrenches_do_not_bend_the_others() -> None:

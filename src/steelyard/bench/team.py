@@ -115,13 +115,14 @@ def run(
 
 
 def _of_joint(trials: int, coverage: int, slips: int, workers: int) -> dict[str, Any]:
-    """Return what is asked of the joint estimator alone: bound, times, events, and its intervals."""
-    from steelyard.bench import team_bound, team_coverage, team_events
+    """Return what is asked of the joint estimator alone: bound, times, events, troubles, and its intervals."""
+    from steelyard.bench import team_bound, team_coverage, team_events, team_troubles
 
     out: dict[str, Any] = {
         "bound": team_bound.run(trials),
         "times": [times(robots, rows) for robots, rows in TIMED],
         "events": team_events.run(trials, slips, workers),
+        "troubles": team_troubles.run(trials, workers),
     }
     return out | {"coverage": team_coverage.coverage(coverage, workers=workers)} if coverage else out
 

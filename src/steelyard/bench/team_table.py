@@ -43,6 +43,7 @@ def team_table(result: dict[str, Any]) -> str:
     for row in result.get("times", ()):
         lines += [f"joint, {row['n']} robots, {row['rows']} rows, whole identification: {row['time_s']:.3f} s CPU"]
     lines += _events(result.get("events", {}))
+    lines += _troubles(result.get("troubles", {}))
     for noise, kinds in result.get("coverage", {}).items():
         if isinstance(kinds, dict):
             said = ", ".join(f"{kind} {v['coverage_pct']:.1f} %" for kind, v in kinds.items())
@@ -72,6 +73,23 @@ def _events(events: dict[str, Any]) -> list[str]:
         f"case {left['case']}, one of {left['robots']} leaves at half: named in {left['named']} of {left['trials']}; "
         f"rms error over that when told: {shares}",
     ]
+
+
+def _troubles(troubles: dict[str, Any]) -> list[str]:
+    """Return a line for everything that was wrong and put right."""
+    lines = []
+    for name, told in troubles.items():
+        if isinstance(told, dict):
+            errors = ", ".join(
+                f"{kind} {error['spoilt']:.3g} ({error['sound']:.3g})"
+                for kind, error in told.items()
+                if isinstance(error, dict)
+            )
+            lines.append(
+                f"{name.replace('_', ' ')}: named in {told['named']} of {troubles['trials']}, falsely in "
+                f"{told['false']}; with it (without): {errors}"
+            )
+    return lines
 
 
 def _with_moments(values: dict[str, Any]) -> dict[str, Any]:

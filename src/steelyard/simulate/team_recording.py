@@ -111,6 +111,8 @@ def record(
     scene, plan = view.scene, view.plan
     time, stamps = _own_time(scene, plan, robot), start + plan.time
     seen, pushed = view.at(time), view.at(plan.time - scene.late_s.get(robot, 0.0))
+    if scene.stiffness is not None and (scene.sensing == "twists" or scene.imus):
+        raise BadValue("grasps that yield are simulated with poses or joints, without IMUs; leave out the stiffness.")
     if scene.stiffness is None:
         held, push = Pose(Rotation(seen.rotation[robot]), seen.position[robot]), pushed.wrench[robot]
     else:

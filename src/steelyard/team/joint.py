@@ -35,6 +35,7 @@ from steelyard.team.misread_torques import with_torque_sign
 from steelyard.team.misread_twists import require_one_velocity_unit
 from steelyard.team.motion_noise import motion_noise
 from steelyard.team.odd_recording import without_odd
+from steelyard.team.payload_doubt import weight_by_gains
 from steelyard.team.payload_fit import fit_payload
 from steelyard.team.payload_model import Group, unit_bias
 from steelyard.team.pose_covariance import grasp_covariance
@@ -48,6 +49,7 @@ from steelyard.team.team_findings import (
     late_clocks,
     lost_directions,
     open_parameters,
+    unseen_gains,
     unsettled,
     vertical,
 )
@@ -137,7 +139,8 @@ class JointTeam:
             *(gains(payload.gain, payload.gainless) if known else ()),
             *open_parameters(team.identified, team.evidence.rank),
         ]
-        return replace(team, findings=tuple(found), notes=(*team.notes, *unsettled(left)))
+        said = (*unsettled(left), *unseen_gains(team, weight_by_gains(groups, D)))
+        return replace(team, findings=tuple(found), notes=(*team.notes, *said))
 
     def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors, Yields]:
         """Return log, fit of poses and clocks like `_fitted`, and how far grasps yield.

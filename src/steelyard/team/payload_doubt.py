@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from steelyard.check import Array
@@ -9,7 +11,7 @@ from steelyard.identify.regressor import basis
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.body_rows import summing
 from steelyard.team.payload_fit import PayloadFit
-from steelyard.team.payload_model import gain_columns
+from steelyard.team.payload_model import Group, gain_columns
 
 # The features of the motion and the one of a bias among all that `Spectra` scatters.
 SEEN = np.array([*range(12), -1])
@@ -77,6 +79,18 @@ def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
             moved = back @ _levers(blind).reshape(10, -1) @ each.reshape(-1, len(force))
             out += fit.gain**2 * moved @ moved.T
     return out
+
+
+def weight_by_gains(groups: Sequence[Group], D: Array) -> float:
+    """Return the share of the weight that gains which err by one, each for itself, on every force axis would make.
+
+    Gains that last make forces larger or smaller alike in every attitude, as another mass does: no motion tells.
+    """
+    force, unit = gain_columns(D)
+    total = sum((part.scatter.sum(0)[:, -1] for group in groups for part in group.parts), np.zeros(1))
+    pushed = unit[3:] * total[12 + force]
+    whole = pushed.sum(1)
+    return float(np.linalg.norm(whole @ pushed) / max(float(whole @ whole), 1e-300))
 
 
 def _levers(blind: Array) -> Array:

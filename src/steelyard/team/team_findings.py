@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.spatial import Pose, unit_vectors
-from steelyard.team.estimate import GraspEstimate
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 # A clock is called late from so much [s] and so many standard deviations.
 LATE_S, LATE_STD = 1e-3, 3.0
@@ -20,6 +20,8 @@ BAD = 20.0
 GAIN = 3e-3
 # And only where so little of the evidence is left for gains without error: a chance draw is no sign of one.
 GAINLESS = 0.1
+# What force sensors are good to.
+USUAL_GAIN = 0.01
 # A direction is called by an axis where it is within this cosine of it.
 ALONG = 0.9
 # Steps [standard deviations] that a fit may leave untaken without a word.
@@ -141,6 +143,19 @@ def vertical(gravity: Array | None, poses: Pose | None) -> Array | None:
         return None
     mean = poses.rotation.inverse().apply(gravity).mean(0)
     return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
+
+
+def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:
+    """Return a note where gains of 1 % on every axis, which no motion tells, would move the mass beyond its bar.
+
+    share  of the mass per gain error, as from `weight_by_gains`
+    """
+    moved = USUAL_GAIN * share * float(team.mass)
+    if not team.identified[0] or moved < 2 * float(team.std[0]):
+        return ()
+    return (
+        f"Error bars hold no gain error that lasts: 1 % on every force axis would move the mass by {moved:.2g} kg.",
+    )
 
 
 def unsettled(left: float) -> tuple[str, ...]:
