@@ -8,14 +8,18 @@ import numpy as np
 import pytest
 
 import steelyard as sy
+from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate, PartMass
+from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
+from steelyard.pipelines.held_object import identify_rows
 from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.sanity import impossible_density
 from steelyard.shape.cloud import Cloud
 from steelyard.simulate import hammer
+from steelyard.simulate.handling import exact_log
 from steelyard.workshop.sampling import surface_cloud
 
 VOLUME = 1e-4  # of 0.62 kg: 6200 kg/m^3
@@ -89,6 +93,54 @@ def test_a_shape_so_far_off_that_its_parts_weigh_nothing_is_refused(made: hammer
     away = tenth.in_frame(sy.Pose(sy.Rotation.identity(), np.array([0.5, 0, 0])))
     with pytest.raises(CannotAnswer, match=r"No masses of these parts explain the wrench, that of 0\.62"):
         sy.identify(made.recording, parts=away)
+
+
+SIDES = np.array([0.12, 0.08, 0.06])
+
+
+def box_cloud() -> Cloud:
+    """Return the outside of a box, about its middle."""
+    rng = np.random.default_rng(0)
+    face = rng.choice(3, 3000, p=(1 / SIDES) / (1 / SIDES).sum())
+    xyz = rng.uniform(-0.5, 0.5, (3000, 3))
+    xyz[np.arange(3000), face] = rng.choice([-0.5, 0.5], 3000)
+    return Cloud(xyz * SIDES, np.full((3000, 3), 128, np.uint8))
+
+
+def box(wall: float | None) -> InertialParameters:
+    """Return a box of plastic (1000 kg/m^3) about its middle, hollow but for its walls [m], or solid of 1.5 kg."""
+    if wall is None:
+        return InertialParameters.from_com(1.5, np.zeros(3), _inertia(1.5, SIDES))
+    inner = SIDES - 2 * wall
+    masses = 1000 * np.prod(SIDES), 1000 * np.prod(inner)
+    return InertialParameters.from_com(
+        masses[0] - masses[1], np.zeros(3), _inertia(masses[0], SIDES) - _inertia(masses[1], inner)
+    )
+
+
+def _inertia(mass: float, sides: Array) -> Array:
+    square = sides**2
+    return np.diag(mass / 12 * (square.sum() - square))
+
+
+def weighed(body: InertialParameters) -> Estimate:
+    time = np.arange(4200) / 100
+    rng = np.random.default_rng(1)
+    log = exact_log(hammer.motion().at(time), body)
+    noisy = replace(log, wrench=log.wrench + rng.standard_normal((4200, 6)) * np.repeat([2e-3, 0.05], 3))
+    return identify_rows(noisy, parts=shape_of(box_cloud()), pose=sy.Pose.identity())
+
+
+def test_a_light_scan_is_trusted_less_about_inertia() -> None:
+    """A box with walls of 4 mm: a third of the mass of a solid one, and 1.4 times the moments for it."""
+    hollow, solid = box(0.004), box(None)
+    found, sure = weighed(hollow), weighed(solid)
+    assert any("is light for a solid" in note for note in found.notes)
+    assert not any("is light for a solid" in note for note in sure.notes)
+    for made, body in ((found, hollow), (sure, solid)):
+        off = (made.parameters.inertia_com - body.inertia_com)[[0, 1, 2], [0, 1, 2]] / made.std[[4, 7, 9]]
+        assert np.abs(off).max() < 3
+    assert (sure.std[4:] < 0.2 * found.std[4:] * float(solid.mass / hollow.mass)).all()
 
 
 def test_a_shape_alone_weighs_nothing(made: hammer.Example) -> None:

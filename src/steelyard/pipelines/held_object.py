@@ -43,6 +43,7 @@ from steelyard.sanity import (
     fitted_gravity,
     impossible_density,
     levelled,
+    maybe_hollow,
     untouched,
 )
 from steelyard.spatial import Pose
@@ -207,7 +208,12 @@ class _Load:
                 "The data fix nothing of the body, not even its mass: the wrench does not follow the orientations. "
                 "Check their unit, form and clock; the shape alone weighs nothing."
             )
-        return replace(estimate, notes=(*notes, *estimate.notes))
+        estimate = replace(estimate, notes=(*notes, *estimate.notes))
+        if self.shape is None:
+            return estimate
+        parts, prior, error = self.shape
+        light = maybe_hollow(error, estimate.mass, float(parts[0].volume.sum()))
+        return replace(self, shape=(parts, prior, light[0])).estimate().noted(light[1]) if light else estimate
 
     def without_tool(self, estimate: Estimate) -> Estimate:
         """Return the object alone."""

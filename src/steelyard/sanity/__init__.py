@@ -3,7 +3,7 @@
 from steelyard.sanity.after import after, drift_of
 from steelyard.sanity.before import examine
 from steelyard.sanity.contact import untouched
-from steelyard.sanity.density import impossible_density
+from steelyard.sanity.density import impossible_density, maybe_hollow
 from steelyard.sanity.gravity import fitted_gravity, levelled
 from steelyard.sanity.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.rows import dead_channels
@@ -24,5 +24,6 @@ __all__ = [
     "fitted_gravity",
     "impossible_density",
     "levelled",
+    "maybe_hollow",
     "untouched",
 ]

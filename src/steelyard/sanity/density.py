@@ -13,10 +13,14 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate, PartMass
+from steelyard.identify.shape_error import ShapeError
 from steelyard.sanity.plausible import DENSEST
 
 # Half of what the lightest foams weigh [kg/m^3]: an inflated ball that counts as solid has more.
 LIGHTEST = 5.0
+# Lighter than plastics and most woods [kg/m^3]: what a scan takes for solid is probably hollow, and then has up to half
+# as much again of each second moment about its centre (a shell, for one that is three quarters empty).
+LIGHT, HOLLOW = 600.0, 0.35
 # Standard deviations by which mass and volume together must miss what materials have.
 SURE = 3.0
 # No shape gives its volume better than this, as a share of it.
@@ -37,6 +41,20 @@ _REMEDY = (
     "Check the scale of the shape, which must be in metres, the units of force and torque, and that the mass is "
     "the object's alone: take a gripper away with --tool."
 )
+
+
+def maybe_hollow(error: ShapeError, mass: float, volume: float) -> tuple[ShapeError, str] | None:
+    """Return how wrong the scan of this volume [m^3] may be about inertia, being light, and why; None where it is not.
+
+    A mesh that is given is taken to be solid: its user knows.
+    """
+    density = mass / volume
+    if not 0 < error.stretch < HOLLOW or not LIGHTEST < density < LIGHT:
+        return None
+    return error.at_least(0.0, HOLLOW), (
+        f"{density:.3g} kg/m^3 is light for a solid: foam, wood, or hollow, which no scan shows and which makes "
+        f"moments of inertia larger; the shape is trusted to {100 * HOLLOW:.0f} % in them"
+    )
 
 
 def impossible_density(
