@@ -10,6 +10,7 @@ import pytest
 import steelyard as sy
 from steelyard.errors import BadValue
 from steelyard.parts.parts import Parts
+from steelyard.pipelines.held_object import Options
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
 from steelyard.shape.cloud import Cloud
 from steelyard.simulate import hammer
@@ -85,3 +86,42 @@ def test_a_mesh_in_millimetres_is_named(made: hammer.Example) -> None:
     huge = Parts(made.tool.parts.label, made.tool.parts.moments * scale)
     with pytest.raises(BadValue, match=r"in millimetres: scale it by 0\.001"):
         sy.identify(made.recording, parts=huge)
+
+
+def two_blocks() -> Cloud:
+    """Return the cloud of a bar of two colours, end to end."""
+    rng = np.random.default_rng(0)
+    sides = np.array([0.12, 0.03, 0.03])
+    face = rng.choice(3, 3000, p=(1 / sides) / (1 / sides).sum())
+    xyz = rng.uniform(-0.5, 0.5, (3000, 3))
+    xyz[np.arange(3000), face] = rng.choice([-0.5, 0.5], 3000)
+    red = (xyz[:, :1] > 0) * np.array([[200, 20, 20]]) + (xyz[:, :1] <= 0) * np.array([[20, 20, 200]])
+    return Cloud(xyz * sides, red.astype(np.uint8))
+
+
+def test_parts_that_were_asked_for_or_joined_by_hand_are_all_that_a_log_is_offered() -> None:
+    free = shape_of(two_blocks())
+    assert len(free.segmentation) == 2
+    assert len(free.cuts().numbers) > 1
+    assert shape_of(two_blocks(), parts=1).cuts().numbers == (1,)
+    joined = replace(free, segmentation=free.segmentation.merged([[0, 1]]))
+    assert joined.cuts().numbers == (1,)
+    # What the solid does not know of itself goes with its parts.
+    assert joined.parts.stretch == free.error.stretch > 0
+    assert joined.parts.com_std == free.error.com_m
+    with pytest.raises(BadValue, match="none empty"):
+        free.segmentation.merged([[0], []])
+
+
+def test_normals_of_another_length_and_none() -> None:
+    made = two_blocks()
+    out = made.xyz / np.linalg.norm(made.xyz, axis=1, keepdims=True)
+    assert np.linalg.norm(replace(made, normals=0.01 * out).normals, axis=1) == pytest.approx(1.0)
+    out[7] = np.nan
+    assert replace(made, normals=out).normals is None
+
+
+@pytest.mark.parametrize("wrong", [{"gravity": "maybe"}, {"drift": "no"}, {"bias": "some"}])
+def test_options_that_are_none(wrong: dict[str, str]) -> None:
+    with pytest.raises(BadValue, match=f"{next(iter(wrong))} must be one of"):
+        Options(**wrong)  # type: ignore[arg-type]

@@ -46,6 +46,11 @@ class TeamRows:
         for name in ("time", "twist", "twist_rate", "gravity", "wrench"):
             object.__setattr__(self, name, frozen(getattr(self, name)))
 
+    @property
+    def carried_wrench(self) -> Array:
+        """The wrenches (N, T, 6), zero where a robot is known to hold nothing: what it reads is no push."""
+        return self.wrench * self.carries[..., None]
+
     def complete_wrench(self) -> Mask:
         """Return the rows (T,) in which somebody carries and every robot that does has a wrench: a sum is not short."""
         return np.asarray((self.has_wrench | ~self.carries).all(0) & self.carries.any(0))

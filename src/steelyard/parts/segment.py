@@ -85,10 +85,16 @@ class Segmentation:
 
     def cut_at(self, nodes: Sequence[int]) -> Segmentation:
         """Return the solid in the parts that are these nodes of the hierarchy."""
-        return self.with_labels(self.hierarchy.cut_at(nodes))
+        return self._labelled(self.hierarchy.cut_at(nodes))
 
     def with_labels(self, labels: Integers) -> Segmentation:
-        """Return the solid in the parts of `labels` (T,), any whole numbers; they are numbered by falling volume."""
+        """Return the solid in the parts of `labels` (T,), any whole numbers; they are numbered by falling volume.
+
+        They are given, not chosen: `cuts` is None then, and a log is offered no others.
+        """
+        return replace(self._labelled(labels), cuts=None)
+
+    def _labelled(self, labels: Integers) -> Segmentation:
         ordered = by_volume(labels, self.mesh)
         point_part = ordered[self.nearest]
         count = int(ordered.max()) + 1
@@ -99,8 +105,10 @@ class Segmentation:
     def merged(self, groups: Sequence[Sequence[int]]) -> Segmentation:
         """Return parts joined: each group lists the parts that are one; it takes the name of its first part."""
         named = [k for group in groups for k in group]
-        if len(set(named)) < len(named) or not set(named) <= set(range(len(self))):
-            raise BadValue(f"groups must name parts 0..{len(self) - 1}, none twice; got {[list(g) for g in groups]}.")
+        if not all(groups) or len(set(named)) < len(named) or not set(named) <= set(range(len(self))):
+            raise BadValue(
+                f"groups must name parts 0..{len(self) - 1}, none twice, none empty; got {[list(g) for g in groups]}."
+            )
         goal = np.arange(len(self))
         for group in groups:
             goal[list(group)] = group[0]

@@ -84,8 +84,10 @@ class Options:
     object_size: float | None = None
 
     def __post_init__(self) -> None:
-        if self.method not in METHODS:
-            raise BadValue(f"method must be one of {', '.join(METHODS)}; got {self.method!r}.")
+        choices = {"method": METHODS, "bias": ("free", "none"), "drift": (False, True), "gravity": ("given", "unknown")}
+        for name, known in choices.items():
+            if getattr(self, name) not in known:
+                raise BadValue(f"{name} must be one of {', '.join(map(str, known))}; got {getattr(self, name)!r}.")
         if self.object_size is not None and not 0.005 <= self.object_size <= 5:
             raise BadValue(f"object_size must be 0.005 to 5 m; got {self.object_size}.")
 

@@ -38,16 +38,18 @@ class Shape:
     solid         the closed volume
     segmentation  its parts as shape and colour alone say
     scan          the fusion of the views that it came from, None where a cloud was given
+    asked         whether the number of parts was asked for, so that a log is offered no other
     """
 
     solid: Solid
     segmentation: Segmentation
     scan: Scan | None = None
+    asked: bool = False
 
     @property
     def parts(self) -> Parts:
-        """The parts as shape and colour alone say."""
-        return self.segmentation.parts
+        """The parts as shape and colour alone say, with how wrong the solid may be."""
+        return replace(self.segmentation.parts, com_std=self.error.com_m, stretch=self.error.stretch)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -66,7 +68,7 @@ class Shape:
         Which seams are between materials is what the forces know better.
         """
         made = self.segmentation
-        if made.cuts is None:
+        if self.asked or made.cuts is None:
             return Cuts((len(made),), (made.parts,), np.zeros(1))
         chosen, most = len(made), min(MOST_PARTS, len(made.cuts.length))
         wanted = {max(1, chosen // 2), chosen - 1, chosen, chosen + 1}
@@ -103,4 +105,5 @@ def shape_of(
     # Normals that were found and not measured blur at edges: they would split one colour by its shading.
     measured = (seen.cloud if isinstance(seen, Scan) else seen).normals is not None
     cloud = solid.cloud if measured else replace(solid.cloud, normals=None)
-    return Shape(solid, segment(cloud, solid, parts=parts), seen if isinstance(seen, Scan) else None)
+    made = segment(cloud, solid, parts=parts)
+    return Shape(solid, made, seen if isinstance(seen, Scan) else None, parts is not None)

@@ -18,6 +18,7 @@ import numpy as np
 
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
+from steelyard.identify.fit import within_numbers
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
@@ -40,6 +41,7 @@ ESTIMATORS: Mapping[Method, JointTeam | PublishedTeam] = MappingProxyType(
 )
 
 
+@within_numbers()
 def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     """Return every grasp, mass, centre of mass and inertia, in the grasp frame of the reference robot.
 

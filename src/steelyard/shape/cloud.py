@@ -18,6 +18,10 @@ from steelyard.spatial import Pose
 _BRIGHT = 2.0  # floats up to here are 0..1, some of them overexposed: read as 0..255 they would all be black
 
 
+# Normals this near to unit vectors are left as they are.
+_ONE = 1e-3
+
+
 @dataclass(frozen=True, eq=False)
 class Cloud:
     """N points of the visible surface in one frame.
@@ -46,7 +50,7 @@ class Cloud:
         if self.label is not None:
             object.__setattr__(self, "label", _column("labels", self.label, xyz.shape[:1], np.int64))
         if self.normals is not None:
-            object.__setattr__(self, "normals", _column("normals", self.normals, xyz.shape, np.float64))
+            object.__setattr__(self, "normals", _unit(_column("normals", self.normals, xyz.shape, np.float64)))
         if self.seen is not None:
             object.__setattr__(self, "seen", _column("marks of what was seen", self.seen, xyz.shape[:1], np.bool_))
 
@@ -98,6 +102,16 @@ def _column(name: str, values: Any, shape: tuple[int, ...], dtype: type) -> Any:
         raise BadValue(f"a cloud of {shape[0]} points needs {name} of shape {shape}; got {array.shape}.")
     array.flags.writeable = False
     return array
+
+
+def _unit(normals: Array) -> Array | None:
+    """Return normals (N, 3) of length one; None, as if there were none, where any is zero or not a number."""
+    length = np.linalg.norm(normals, axis=1)
+    if not (np.isfinite(length).all() and (length > 0).all()):
+        return None
+    if np.abs(length - 1).max() < _ONE:
+        return normals
+    return check.frozen(normals / length[:, None])
 
 
 def _colours(values: Any, shape: tuple[int, ...]) -> Colours:

@@ -30,6 +30,8 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
 
     Raises CannotAnswer where fewer than a fifth of the points lie on one plane.
     """
+    if len(points) < 3:
+        raise CannotAnswer("no table was found: the depth images hold next to no measurements.")
     near = NEAR * distance
     plane = start or largest_plane(points, cameras, near)
     height = plane.height(points)
@@ -38,12 +40,16 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
             f"no table was found: {100 * share:.0f} % of the measured points lie on one plane below the cameras, "
             f"expected {100 * _LEAST:.0f} % or more."
         )
+    on = np.abs(height) < near
     for _ in range(_ROUNDS):
-        on = np.abs(height) < near
         plane = _fitted(points[on], plane)
         height = plane.height(points)
         # A trimmed normal distribution: its middle half spans 1.35 standard deviations.
         near = max(min(near, 3 * float(np.subtract(*np.percentile(height[on], (75, 25)))) / 1.35), 1e-4)
+        before, on = on, np.abs(height) < near
+        if on.sum() < before.sum() / 2:
+            # A low, flat object seen with little noise lifts the mean off the table, and not the median.
+            on = np.abs(height - np.median(height[before])) < near
     return plane
 
 

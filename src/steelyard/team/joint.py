@@ -22,6 +22,7 @@ from steelyard.team.balance import require_balance
 from steelyard.team.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.clock_errors import NOTHING, ClockErrors, Errors
 from steelyard.team.clock_search import F, searched
+from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.exchanged import require_own_files
 from steelyard.team.hinge import Split, find_split, rigidity_findings
@@ -49,6 +50,7 @@ from steelyard.team.team_findings import (
     late_clocks,
     lost_directions,
     open_parameters,
+    tilted_bases,
     unseen_gains,
     unsettled,
     vertical,
@@ -111,6 +113,8 @@ class JointTeam:
                 require_well_read(log)
                 require_own_files(log)
             found = [*standing.findings, *yields.findings(log), *rigidity_findings(split, log.names)]
+            if not spread.blind.size:
+                found += tilted_bases(log, standing.fit.team.homes)
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
         placed = balance_frame(grasps).inverse() @ grasps
@@ -126,7 +130,7 @@ class JointTeam:
         _require_one_clock(payload.chi2)
         if not any(one.code == "payload-not-rigid" for one in found):
             _require_mass(payload.lost)
-        team = _without_wrists(assembled(log, grasps, spread, payload, D, late), self.wrists)
+        team = _without_wrists(assembled(log, grasps, spread, payload, D, late), self.wrists, size)
         team = _clocked(team, begun.first(log))
         found += [
             *read,
@@ -220,15 +224,20 @@ def _with_forces_read(
     return groups, D, found
 
 
-def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float]) -> TeamEstimate:
-    """Return the estimate less a point mass at every grasp named; raises CannotAnswer where nothing is left."""
+def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float], size: float) -> TeamEstimate:
+    """Return the estimate less a point mass at every grasp named; raises CannotAnswer where nothing is left.
+
+    size  of the team [m]
+    """
     if not wrists:
         return team
     places = np.array([team.grasps[name].pose.position for name in wrists])
     points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
     left = team.parameters - points
     require_lift(float(left.mass), WITHOUT_WRISTS)
-    return replace(team, parameters=left)
+    # What is left of a body less points need be none: masses that are too large take more than there is.
+    units = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)]) * float(left.mass)
+    return replace(team, parameters=InertialParameters(consistent(left.vector, team.covariance, units)))
 
 
 def _require_one_clock(chi2: float) -> None:

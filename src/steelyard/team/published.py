@@ -71,6 +71,8 @@ class PublishedTeam:
     def grasps(self, log: TeamLog) -> tuple[Grasps, dict[str, Pair]]:
         """Return the grasps in the reference grasp, and the star of pairs that they started from (eq. 1-8)."""
         moving = all_conditioned(log, log.of_kind("grasp"), self.cutoff_hz)
+        if not moving:
+            raise CannotAnswer("grasps need a recording in motion, of kind grasp or motion; there is none.")
         twists = np.concatenate([rows.twist for rows in moving], axis=1)
         measured = np.concatenate([rows.has_twist for rows in moving], axis=1)
         pairs = grasp_kinematics.star(log.names, twists, measured, log.reference)
@@ -94,7 +96,7 @@ class PublishedTeam:
         gravity = np.concatenate(
             [_gravity(log, grasps, rows)[keep] for rows, keep in zip(resting, chosen, strict=True)]
         )
-        wrench = [grasps.total_wrench(rows.wrench)[keep] for rows, keep in zip(resting, chosen, strict=True)]
+        wrench = [grasps.total_wrench(rows.carried_wrench)[keep] for rows, keep in zip(resting, chosen, strict=True)]
         if not len(gravity):
             raise CannotAnswer(
                 "mass and centre of mass need rows at rest in which every carrying robot has a wrench; there are none. "
@@ -115,7 +117,9 @@ class PublishedTeam:
             keep = rows.has_rate[hub] & rows.complete_wrench()
             omega.append(rows.twist[hub, keep, :3])
             alpha.append(rows.twist_rate[hub, keep, :3])
-            moment.append(moment_about(grasps.total_wrench(rows.wrench)[keep], com))
+            moment.append(moment_about(grasps.total_wrench(rows.carried_wrench)[keep], com))
+        if not omega:
+            raise CannotAnswer("the inertia needs a recording in motion; there is none.")
         return inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
 
 

@@ -58,7 +58,7 @@ def _windows(parts: Sequence[Stretch], apart: Array, robot: int) -> tuple[Array,
     for number, part in enumerate(parts):
         rows = apart[start : start + len(part)][part.seen[:, robot]]
         start += len(part)
-        pieces = round(len(rows) / (WINDOW_S * part.rate))
+        pieces = min(round(len(rows) / (WINDOW_S * part.rate)), len(rows))
         for piece in np.array_split(rows, max(1, pieces)) if len(rows) else ():
             means.append(piece.mean(0))
             recording.append(number)

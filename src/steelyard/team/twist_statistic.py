@@ -55,6 +55,9 @@ class TwistScatter:
                     y = np.concatenate([x.reshape(len(x), -1) for x in both], axis=1)
                     found.append((y.T @ y, len(y), spoke, number))
                 number += 1
+        if not found:
+            robots = moving[0].twist.shape[1]
+            return cls(np.zeros((0, width, width)), np.zeros(0), np.zeros((0, robots), np.bool_), np.zeros(0, np.int64))
         scatter, count, spoke, window = zip(*found, strict=True)
         return cls(np.stack(scatter), np.array(count, float), np.stack(spoke), np.array(window))
 

@@ -148,6 +148,8 @@ class _Pushed:
         """Return whether a grasp seems to yield, all axes alike, beside grasps and homes as they are."""
         wrench = self.wrench - self.wrench.mean(0)
         robot, kind = np.nonzero(np.ptp(wrench, axis=0).reshape(-1, 2, 3).any(-1))
+        if not len(robot):
+            return False
         columns = wrench[:, robot] * (np.arange(6) // 3 == kind[:, None])
         size, std = self.explained(columns, robot)
         return bool((size > SUSPECT * std).any())
