@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
@@ -48,7 +48,7 @@ def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
         text = f"The points span {1e3 * span:.3g} mm: an object so small cannot be held, but they were read as metres."
         remedy = "Give the points in metres: they seem to have been scaled down once too often."
         return cloud, [Finding("cloud-in-mm", text, remedy)]
-    if span <= _TOO_LONG_M:
+    if span <= _TOO_LONG_M or _middle_span(cloud) <= _TOO_LONG_M:
         return cloud, []
     text = (
         f"The points span {span:.4g} m, more than an arm can hold; they were read as millimetres: "
@@ -57,6 +57,11 @@ def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     if 1e-3 * span < _DOUBTFUL_M:
         text += f" If it is not, they are perhaps centimetres ({10 * span:.3g} mm) or inches ({25.4 * span:.3g} mm)."
     return replace(cloud, xyz=cloud.xyz * 1e-3), [Finding.of("cloud-in-mm", text)]
+
+
+def _middle_span(cloud: Cloud) -> float:
+    """Return the diagonal of the box around nearly all points [m]: a stray point far away is no object's length."""
+    return float(np.linalg.norm(np.subtract(*np.percentile(cloud.xyz, (99, 1), axis=0))))
 
 
 def _without_repeats(cloud: Cloud) -> Cloud:
@@ -74,10 +79,29 @@ def _thinned(cloud: Cloud, most: int) -> tuple[Cloud, list[Finding]]:
     drawn = np.random.default_rng(0).permutation(len(cloud))[: _DRAWN * most]
     chosen = cloud.chosen(np.sort(drawn))
     sides = np.tile([0.0, 0.0, 1.0], (len(chosen), 1)) if chosen.normals is None else chosen.normals
-    least = 0.1 * chosen.diagonal / np.sqrt(most)
+    least = 0.1 * _middle_span(chosen) / np.sqrt(most)
     kept, apart = spread_to(chosen.xyz, sides, np.arange(len(chosen)), most, least)
+    # Thinning spares strays, which would be many of the points that are left.
+    alone = _alone(chosen.xyz, _APART * apart)
+    findings = []
+    if 0 < alone.sum() < _STRAY * len(chosen):
+        findings = [_strays(int(alone.sum()), len(chosen))]
+        chosen, sides = chosen.chosen(~alone), sides[~alone]
+        kept, apart = spread_to(chosen.xyz, sides, np.arange(len(chosen)), most, least)
     text = f"Of {len(cloud)} points {len(kept)} were used, {apart * 1e3:.2g} mm apart."
-    return chosen.chosen(np.sort(kept)), [Finding.of("cloud-thinned", text)]
+    return chosen.chosen(np.sort(kept)), [Finding.of("cloud-thinned", text), *findings]
+
+
+def _alone(xyz: Array, reach: float) -> Mask:
+    """Return which points (N,) have fewer than three others within reach [m]."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(xyz).query(xyz, k=4)[0][:, -1] > reach)
+
+
+def _strays(some: int, of: int) -> Finding:
+    text = f"{some} of {of} points lie far from all others; they were left out."
+    return Finding("outliers", text, "Nothing to do if the scan has stray points.")
 
 
 def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
@@ -88,9 +112,8 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     sizes = np.bincount(piece)
     stray = (sizes < LEAST)[piece]
     if 0 < stray.sum() < _STRAY * len(cloud):
-        text = f"{stray.sum()} of {len(cloud)} points lie far from all others; they were left out."
         rest, found = _one_object(cloud.chosen(~stray))
-        return rest, [Finding("outliers", text, "Nothing to do if the scan has stray points."), *found]
+        return rest, [_strays(int(stray.sum()), len(cloud)), *found]
     large = np.flatnonzero(sizes >= max(_PIECE * len(cloud), LEAST))
     if len(sizes) == 1 or not len(large):
         return cloud, []

@@ -11,16 +11,18 @@ from steelyard.logs.team_track import Track
 
 # Positions this many times as far from home, and as far spread, are millimetres beside metres.
 MANY = 100.0
-# How far positions are from home, over their spread, where both are noise.
+# A rest is away from home where it is farther out than so many times its spread.
 NOISE = 3.0
 
 
 def require_one_length_unit(log: TeamLog) -> None:
     """Raise BadValue where the positions of a robot are hundreds of times larger in one recording than in another."""
     for name in log.names:
-        sizes = {r.name: _size(r.tracks[name]) for r in log.recordings if name in r.tracks}
-        # A rest where home is says nothing of the unit: its size is the noise of its spread.
-        sizes = {where: size for where, size in sizes.items() if size[1] > 0 and size[0] > NOISE * size[1]}
+        told = {r: _size(r.tracks[name]) for r in log.recordings if name in r.tracks}
+        # A rest where home is says nothing of the unit: it is as far out as its noise spreads.
+        sizes = {
+            r.name: size for r, size in told.items() if size[1] > 0 and (r.kind != "still" or size[0] > NOISE * size[1])
+        }
         if len(sizes) < 2:
             continue
         small, large = (choose(sizes, key=lambda where: sizes[where][0]) for choose in (min, max))
