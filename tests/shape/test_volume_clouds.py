@@ -294,3 +294,23 @@ def test_stray_points_are_left_out_and_told() -> None:
     (found,) = (f for f in strewn.findings if f.code == "outliers")
     assert f"{len(stray)} of {2500 + len(stray)} points" in found.message
     assert "outliers" not in codes(clean)
+
+
+def ball(points: int, noise: float = 0.0) -> np.ndarray:
+    """Return points on a ball of 40 mm (268 cm^3)."""
+    rng = np.random.default_rng(0)
+    out = rng.standard_normal((points, 3))
+    return 0.04 * out / np.linalg.norm(out, axis=1, keepdims=True) + noise * rng.standard_normal((points, 3))
+
+
+def test_strays_of_a_dense_cloud_go_before_it_is_thinned() -> None:
+    stray = np.random.default_rng(1).uniform(-0.15, 0.15, (600, 3))
+    solid = enclose(Cloud(np.concatenate([ball(60_000, 1e-4), stray])))
+    assert solid.mesh.volume == pytest.approx(268e-6, rel=0.03)
+    assert {"cloud-thinned", "outliers"} <= {f.code for f in solid.findings}
+
+
+def test_one_point_far_away_makes_no_millimetres() -> None:
+    solid = enclose(Cloud(np.concatenate([ball(4000), [[0.0, 0.0, 6.0]]])))
+    assert solid.mesh.volume == pytest.approx(268e-6, rel=0.03)
+    assert {f.code for f in solid.findings} == {"outliers"}
