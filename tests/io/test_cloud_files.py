@@ -13,7 +13,9 @@ from steelyard.io.cloud_files import read_cloud, write_cloud
 from steelyard.shape.cloud import Cloud
 
 RNG = np.random.default_rng(0)
-NORMALS = RNG.normal(size=(50, 3)).astype(np.float32)
+NORMALS = RNG.normal(size=(50, 3))
+# Files hold single precision.
+NORMALS = (NORMALS / np.linalg.norm(NORMALS, axis=1, keepdims=True)).astype(np.float32)
 CLOUD = Cloud(
     RNG.normal(size=(50, 3)), RNG.integers(0, 256, (50, 3)), RNG.integers(0, 4, 50), NORMALS, RNG.integers(0, 2, 50)
 )

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import identify_team
 from steelyard.simulate.team import TeamTrial, simulate_team
@@ -89,6 +89,12 @@ def test_forces_that_are_all_zero_are_an_answer_in_words() -> None:
     )
     with pytest.raises(CannotAnswer):
         identify_team(dead)
+
+
+@pytest.mark.parametrize("hz", [0.0, -1.0, np.nan])
+def test_a_frequency_that_is_none(hz: float) -> None:
+    with pytest.raises(BadValue, match="highest_hz"):
+        JointTeam(highest_hz=hz)
 
 
 def test_what_wrists_leave_is_a_body() -> None:

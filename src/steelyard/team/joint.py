@@ -87,6 +87,9 @@ class JointTeam:
     wrists: Mapping[str, float] = field(default_factory=dict)
     highest_hz: float = 4.0
 
+    def __post_init__(self) -> None:
+        check.positive("highest_hz", self.highest_hz)
+
     def identify(self, log: TeamLog) -> TeamEstimate:
         """Return the team's answer in the reference grasp. Raises CannotAnswer where the data leave it open."""
         require_wrenches(log)
