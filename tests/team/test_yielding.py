@@ -7,11 +7,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
+from steelyard.team.pose_team import PoseTeam
+from steelyard.team.yielding import stiffened
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, torque_white_Nm=0.1)
 ALL = frozenset({0, 1, 2})
@@ -73,6 +76,19 @@ def test_stiff_grasps_are_left_alone(case: str) -> None:
     for seed in (11, 12):
         log = simulate_team(TeamScene(CASES[case], motion_samples=1500), seed).log
         assert "grasp-yields" not in JointTeam().identify(log).codes()
+
+
+def test_a_fit_that_fails_once_it_is_put_right_stays_what_it_was() -> None:
+    made = trial((1e5, 3e3))
+    team = PoseTeam.of(made.log, True)
+
+    def fails(_: TeamLog) -> PoseTeam:
+        raise CannotAnswer
+
+    log, kept, yields = stiffened(made.log, team, fails)
+    assert log is made.log
+    assert kept is team
+    assert not yields.size.any()
 
 
 def test_twists_of_soft_grasps_are_not_simulated() -> None:

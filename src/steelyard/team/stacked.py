@@ -14,6 +14,7 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.clock_errors import ClockError, punctual
 from steelyard.team.turns import turned_by, turns_between
 
 # Rows, and seconds, that a gap may last and still be filled: far below what the payload can do in that time. A curve
@@ -66,16 +67,10 @@ def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     Rows are told by the reference's clock as it is, whatever `late` says of it. Raises BadValue where the corrected
     clocks no longer overlap.
     """
-    made = tuple(_stretch(log, _punctual(recording, late)) for recording in log.recordings)
+    errors = {name: ClockError(seconds) for name, seconds in late.items() if seconds}
+    made = tuple(_stretch(log, punctual(recording, errors)) for recording in log.recordings)
     own = late.get(log.reference, 0.0)
     return tuple(replace(part, time=part.time + own) for part in made) if own else made
-
-
-def _punctual(recording: TeamRecording, late: Mapping[str, float]) -> TeamRecording:
-    """Return the recording with every robot's stamps moved by the seconds that they are late."""
-    if not any(late.get(name) for name in recording.tracks):
-        return recording
-    return replace(recording, tracks={n: t.shifted(-late.get(n, 0.0)) for n, t in recording.tracks.items()})
 
 
 def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:

@@ -15,6 +15,7 @@ from typing import Protocol, TypeVar
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.clock_errors import ClockError, ClockErrors
@@ -62,9 +63,12 @@ def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
         wrong = called.of(team.clocks_left)
         if not any(_unsettled(error) for each in wrong.recordings for error in each.values()):
             break
-        errors += wrong
-        log = wrong.corrected(log)
-        team = of(log)
+        try:
+            moved = wrong.corrected(log)
+            team = of(moved)
+        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+            break
+        log, errors = moved, errors + wrong
     return log, team, errors
 
 

@@ -16,6 +16,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.log import Integers
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -102,8 +103,11 @@ def stiffened(log: TeamLog, team: PoseTeam, of: Callable[[TeamLog], PoseTeam]) -
         found = _yields(fit, known)
         if (np.abs(found.size - known.size) <= SETTLED * found.std).all():
             break
-        known, stiff = found, found.corrected(log)
-        fit = of(stiff)
+        corrected = found.corrected(log)
+        try:
+            known, stiff, fit = found, corrected, of(corrected)
+        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+            break
     # A payload that is not rigid, or poses that are misread, may go with what robots push, too.
     if team.rough and float(np.log(team.fit.noise / fit.fit.noise).mean()) < np.log(BETTER):
         return log, team, nothing
