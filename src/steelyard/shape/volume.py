@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -22,6 +23,9 @@ from steelyard.shape.ties import Ties
 from steelyard.shape.tree import Tree
 from steelyard.shape.winding import Sight
 
+if TYPE_CHECKING:
+    from steelyard.shape.working_cloud import WorkingCloud
+
 POINTS = 4000
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
 # Doubt (see `_doubt` and `_contradictions`) above which walls could not be told from gaps. Found on made sheets: nearly
@@ -36,7 +40,13 @@ _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below 
 # missing (0.12 and more without an underside). Patterns of points that are unlike on two sides leave up to 0.10, or
 # 0.135 where one is five times as dense.
 _OPEN = 0.11
+_WITHIN_NOISE = 4.0  # standard deviations of noise that two layers of points must be apart to be told as two
+_NOISY = 0.3  # of the points: so many that are nearer to the other side make the solid doubtful
+_FACING = -0.5  # cosine between normals of two sides
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
+# Doubt above which normals that come with a cloud may be wrong: thin walls reach 0.44, a tenth of them turned 0.67.
+_BY_CHANCE = 0.6
+_CLEARER = 0.5  # of that doubt: no more is left without such normals
 # Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
 _STD, _UNSURE, _THIN, _HOLE = 0.025, 0.1, 0.5, 1.0
 
@@ -93,29 +103,79 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     """
     from steelyard.shape.working_cloud import working_cloud
 
-    used, findings = working_cloud(cloud, points)
-    X_CB, order = canonical(used.xyz)
-    made, around = _enclosed(used.reordered(order).in_frame(X_CB), findings)
-    normals = np.empty_like(used.xyz)
+    used = working_cloud(cloud, points)
+    made, doubt = _made(used)
+    if doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _is_open(made)):
+        return made
+    # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
+    other = working_cloud(cloud, points, settle=not used.noise)
+    if not (used.noise or other.noise):
+        return made
+    noise = max(used.noise, other.noise)
+    changed, left = _made(other._replace(noise=noise))
+    if left > doubt or _is_open(changed) > _is_open(made):
+        return made
+    return changed if used.noise else _as_doubtful(changed, made)
+
+
+def _as_doubtful(made: Solid, as_given: Solid) -> Solid:
+    """Return a solid of few points that were settled, with the doubt that there was about them as they were given."""
+    known = {finding.code for finding in made.findings}
+    findings = (finding for finding in as_given.findings if finding.code == "thin-thickened" not in known)
+    std = max(made.volume_std, as_given.volume_std)
+    return replace(
+        made,
+        findings=(*made.findings, *findings),
+        volume_std=std,
+        surface_m=made.surface_m * std / made.volume_std,
+    )
+
+
+def _made(used: WorkingCloud) -> tuple[Solid, float]:
+    """Return the closed volume of points that need no more work, and the doubt about it."""
+    xyz = used.cloud.xyz
+    X_CB, order = canonical(xyz)
+    made, around, doubt = _enclosed(used._replace(cloud=used.cloud.reordered(order).in_frame(X_CB)))
+    normals = np.empty_like(xyz)
     normals[order] = X_CB.inverse().rotation.apply(np.asarray(made.cloud.normals))
     mesh, around = (
-        TetMesh.known(used.xyz, order[cells.tets], cells.volumes, cells.neighbours) for cells in (made.mesh, around)
+        TetMesh.known(xyz, order[cells.tets], cells.volumes, cells.neighbours) for cells in (made.mesh, around)
     )
-    return replace(made, mesh=mesh, around=around, cloud=replace(used, normals=normals))
+    return replace(made, mesh=mesh, around=around, cloud=replace(used.cloud, normals=normals)), doubt
 
 
-def _enclosed(used: Cloud, findings: tuple[Finding, ...]) -> tuple[Solid, TetMesh]:
-    """Return the closed volume of points that need no more work, in their canonical frame and order, and all cells."""
-    surface, turned = _oriented(used)
-    found = _filled(used, surface)
-    against = 0.0 if used.normals is None else _against(surface, found.solid)
+def _is_open(made: Solid) -> bool:
+    return any(finding.code == "surface-open" for finding in made.findings)
+
+
+def _enclosed(used: WorkingCloud) -> tuple[Solid, TetMesh, float]:
+    """Return the closed volume of points in their canonical frame and order, all cells, and the doubt about it.
+
+    No doubt is left that averaging could take where one thickness of all walls was found.
+    """
+    cloud = used.cloud
+    surface, turned = _oriented(cloud)
+    found = _filled(cloud, surface)
+    against = 0.0 if cloud.normals is None else _against(surface, found.solid)
     if against > _TURNED:
-        text = f"The normals of {100 * against:.0f} % of the points contradict the rest; they were found anew."
-        return _enclosed(replace(used, normals=None), (*findings, Finding.of("normals-flipped", text)))
-    if used.normals is None and found.doubt > _UNCLEAR:
-        surface, found = _by_walls(used, surface, found)
-    made = _solid(used, surface, found.solid, found.score[found.inside], found.doubt, (*findings, *turned))
-    return replace(made, inside=np.flatnonzero(found.inside)), found.mesh
+        return _without_normals(used, f"The normals of {100 * against:.0f} % of the points contradict the rest")
+    if cloud.normals is not None and found.doubt > _BY_CHANCE:
+        anew = _without_normals(used, "The normals contradict one another, and the points alone give a clearer solid")
+        if anew[2] < _CLEARER * found.doubt:
+            return anew
+    doubt = found.doubt
+    if cloud.normals is None and doubt > _UNCLEAR:
+        as_found = surface
+        surface, found = _by_walls(cloud, surface, found)
+        doubt = doubt if surface is as_found else 0.0
+    made = _solid(used, surface, found, turned)
+    return replace(made, inside=np.flatnonzero(found.inside)), found.mesh, doubt
+
+
+def _without_normals(used: WorkingCloud, why: str) -> tuple[Solid, TetMesh, float]:
+    """Return the closed volume of points whose normals are not to be trusted, with what says so."""
+    findings = (*used.findings, Finding.of("normals-flipped", f"{why}; they were found anew."))
+    return _enclosed(used._replace(cloud=replace(used.cloud, normals=None), findings=findings))
 
 
 def _filled(used: Cloud, surface: Oriented) -> _Filled:
@@ -212,18 +272,23 @@ def _against(surface: Oriented, solid: TetMesh) -> float:
     return float(((out * surface.normals).sum(1) < _AGAINST * np.linalg.norm(out, axis=1)).mean())
 
 
-def _solid(
-    cloud: Cloud, surface: Oriented, solid: TetMesh, score: Array, doubt: float, findings: tuple[Finding, ...]
-) -> Solid:
-    sure = np.minimum(2 * score, 1.0)
+def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[Finding, ...]) -> Solid:
+    solid, diagonal, doubt = found.solid, used.cloud.diagonal, found.doubt
+    sure = np.minimum(2 * found.score[found.inside], 1.0)
     total = float(surface.area.sum())
     gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
-    thin, hole = doubt > _BLURRED, gap > _OPEN
+    noisy = _share_within(surface, _WITHIN_NOISE * used.noise / diagonal)
+    blurred, hole = doubt > _BLURRED, gap > _OPEN
+    thin = blurred or noisy > _NOISY
+    findings = used.findings + turned
     if thin:
-        apart = surface.spacing * cloud.diagonal * 1e3
+        apart = surface.spacing * diagonal * 1e3
         text = (
             f"Walls are too thin for points {apart:.2g} mm apart to tell them from gaps: "
             f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
+            if blurred
+            else f"Walls or gaps at {100 * noisy:.0f} % of the points are thinner than {_WITHIN_NOISE:.0f} times their "
+            f"noise of {used.noise * 1e3:.2g} mm."
         )
         findings += (Finding.of("thin-thickened", text),)
     if hole:
@@ -233,5 +298,11 @@ def _solid(
         findings += (Finding.of("surface-open", text),)
     unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
     std = float(np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * thin) ** 2 + (_HOLE * gap * hole) ** 2))
-    kept = replace(cloud, normals=surface.normals)
-    return Solid(solid, kept, sure, std, std * solid.volume / (total * cloud.diagonal**2), findings)
+    kept = replace(used.cloud, normals=surface.normals)
+    return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
+
+
+def _share_within(surface: Oriented, reach: float) -> float:
+    """Return the share of points with the other side of a wall or gap nearer than `reach`."""
+    facing = np.einsum("nd,nkd->nk", surface.normals, surface.normals[surface.near.index]) < _FACING
+    return float((facing & (surface.near.distance < reach)).any(1).mean())

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import NamedTuple
 
 import numpy as np
 
@@ -11,7 +12,9 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
+from steelyard.shape.noisy_points import settled
 from steelyard.shape.spacing import Neighbours
+from steelyard.shape.thinning import spread_to
 
 LEAST = 20  # points that can show a solid
 _TOO_LONG_M, _TOO_SHORT_M = 5.0, 0.005  # no object that an arm holds is longer, or shorter
@@ -19,27 +22,34 @@ _DOUBTFUL_M = 0.1  # shorter than this once read as millimetres: they may have b
 _SAME = 1e-7  # of the diagonal: points nearer than this are one
 _FLAT = 1e-4  # of the longest extent: less depth than this is a plane
 _DRAWN = 12  # points drawn for each that is kept
+_SETTLED = 2  # points brought to the surface for each that is kept
 _APART = 6.0  # spacings between the points of two objects, at least
 _PIECE = 0.02  # of the points: fewer are no object
 _STRAY = 0.1  # of the points: more than this that lie by themselves are no strays
 _LINKS = 12  # neighbours by which pieces hang together
 
 
-def working_cloud(cloud: Cloud, most: int) -> tuple[Cloud, tuple[Finding, ...]]:
-    """Return the points to make a solid from, at most about `most`, and what was done to them.
+class WorkingCloud(NamedTuple):
+    """The points to make a solid from, the noise that was averaged out of them [m], and what was done to them."""
+
+    cloud: Cloud
+    noise: float
+    findings: tuple[Finding, ...]
+
+
+def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> WorkingCloud:
+    """Return the points to make a solid from, at most about `most`.
+
+    settle  whether noise is averaged out; None where points enough for it must go
 
     Millimetres become metres, repeated points one, strays go, and of several objects the largest stays. Raises
     BadValue where fewer than twenty points remain or all lie in a plane.
     """
-    findings = []
     cloud, found = _in_metres(cloud)
-    findings += found
-    cloud = _without_repeats(cloud)
-    cloud, found = _thinned(cloud, most)
-    findings += found
-    cloud, found = _one_object(cloud)
+    thin = _thinned(_without_repeats(cloud), most, settle)
+    cloud, last = _one_object(thin.cloud)
     _require_solid(cloud.xyz)
-    return cloud, (*findings, *found)
+    return WorkingCloud(cloud, thin.noise, (*found, *thin.findings, *last))
 
 
 def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
@@ -70,26 +80,47 @@ def _without_repeats(cloud: Cloud) -> Cloud:
     return cloud if len(first) == len(cloud) else cloud.chosen(np.sort(first))
 
 
-def _thinned(cloud: Cloud, most: int) -> tuple[Cloud, list[Finding]]:
+def _thinned(cloud: Cloud, most: int, settle: bool | None) -> WorkingCloud:
     """Return at most about `most` well-spread points, of a fair draw where there are many more."""
     if len(cloud) <= 1.04 * most:
-        return cloud, []
-    from steelyard.shape.thinning import spread_to
-
+        whole = WorkingCloud(cloud, 0.0, ())
+        return _settled(whole, float(np.median(cloud.near.spacing)), len(cloud)) if settle else whole
     drawn = np.random.default_rng(0).permutation(len(cloud))[: _DRAWN * most]
     chosen = cloud.chosen(np.sort(drawn))
-    sides = np.tile([0.0, 0.0, 1.0], (len(chosen), 1)) if chosen.normals is None else chosen.normals
-    least = 0.1 * _middle_span(chosen) / np.sqrt(most)
-    kept, apart = spread_to(chosen.xyz, sides, np.arange(len(chosen)), most, least)
+    kept, apart = _spread(chosen, most)
     # Thinning spares strays, which would be many of the points that are left.
     alone = _alone(chosen.xyz, _APART * apart)
     findings = []
     if 0 < alone.sum() < _STRAY * len(chosen):
         findings = [_strays(int(alone.sum()), len(chosen))]
-        chosen, sides = chosen.chosen(~alone), sides[~alone]
-        kept, apart = spread_to(chosen.xyz, sides, np.arange(len(chosen)), most, least)
+        chosen = chosen.chosen(~alone)
+        kept, apart = _spread(chosen, most)
+    drawn_from = WorkingCloud(chosen, 0.0, ())
+    if settle is not False:
+        drawn_from = _settled(drawn_from, apart, _SETTLED * most)
+        if drawn_from.noise:
+            kept, apart = _spread(drawn_from.cloud, most)
     text = f"Of {len(cloud)} points {len(kept)} were used, {apart * 1e3:.2g} mm apart."
-    return chosen.chosen(np.sort(kept)), [Finding.of("cloud-thinned", text), *findings]
+    findings = [Finding.of("cloud-thinned", text), *drawn_from.findings, *findings]
+    return WorkingCloud(drawn_from.cloud.chosen(np.sort(kept)), drawn_from.noise, tuple(findings))
+
+
+def _settled(used: WorkingCloud, apart: float, most: int) -> WorkingCloud:
+    """Return at most `most` of the points, brought to the surface they share; as they are if they are not noisy."""
+    cloud = used.cloud
+    rows = np.linspace(0, len(cloud) - 1, min(most, len(cloud))).astype(np.int64)
+    found = settled(cloud.xyz, cloud.normals, rows, apart)
+    if found is None:
+        return used
+    text = f"The points have noise of about {found.noise * 1e3:.2g} mm; each was moved to where its neighbours lie."
+    return WorkingCloud(replace(cloud.chosen(rows), xyz=found.xyz), found.noise, (Finding.of("cloud-noisy", text),))
+
+
+def _spread(cloud: Cloud, most: int) -> tuple[Integers, float]:
+    """Return about `most` well-spread points, and the distance they keep [m]."""
+    sides = np.tile([0.0, 0.0, 1.0], (len(cloud), 1)) if cloud.normals is None else cloud.normals
+    least = 0.1 * _middle_span(cloud) / np.sqrt(most)
+    return spread_to(cloud.xyz, sides, np.arange(len(cloud)), most, least)
 
 
 def _alone(xyz: Array, reach: float) -> Mask:
