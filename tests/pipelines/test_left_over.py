@@ -35,7 +35,7 @@ def rms(left: np.ndarray) -> tuple[float, float]:
     return float(np.sqrt((left[:, 3:] ** 2).mean())), float(np.sqrt((left[:, :3] ** 2).mean()))
 
 
-@pytest.mark.parametrize("mistake", ["none", "sign", "gravity", "drift", "small drift"])
+@pytest.mark.parametrize("mistake", ["none", "sign", "gravity", "drift", "small drift", "drift that was asked for"])
 def test_residuals_are_those_of_the_answer(made: Recording, mistake: str) -> None:
     recording, options = made, sy.Options()
     if mistake == "sign":
@@ -47,6 +47,8 @@ def test_residuals_are_those_of_the_answer(made: Recording, mistake: str) -> Non
         recording = changed(made, "force", np.array([2.0, -1.5, 1.0]))
     if mistake == "small drift":
         recording = changed(made, "force", np.array([0.1, -0.08, 0.05]))
+    if mistake == "drift that was asked for":
+        recording, options = changed(made, "force", np.array([0.1, -0.08, 0.05])), sy.Options(drift=True)
     estimate = sy.identify(recording, options)
     assert any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) == ("drift" in mistake)
     assert ("bias-drift" in estimate.codes()) == (mistake == "drift")

@@ -58,8 +58,8 @@ Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
 LARGEST = 2.0
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
-# How the notes begin that say which direction of gravity was used, and that a drift was found.
-GRAVITY_FOUND, DRIFT_ALLOWED = "gravity was estimated", "the fit was repeated with a bias that drifts"
+# How the notes begin that say which direction of gravity was used, and that the bias may drift.
+GRAVITY_FOUND, DRIFT_ALLOWED = "gravity was estimated", "the bias may drift in a line"
 # Findings after which motion or wrench are no body's.
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Where an acceleration comes from that does not see the arm's structure bend.
@@ -125,14 +125,14 @@ def identify(
     late = after(log, estimate, aligned, recording, drift)
     if load.bias.free and not load.bias.drift and drift and drift.sure and "base-tilted" not in {f.code for f in late}:
         load = replace(load, bias=replace(load.bias, drift=True))
-        estimate = load.estimate().noted(f"{DRIFT_ALLOWED} (most surely {drift.surest_words})")
+        estimate = load.estimate().noted(f"{DRIFT_ALLOWED}, as the log shows (most surely {drift.surest_words})")
         late = after(log, estimate, aligned, recording, drift)
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     if parts is None:
         late = examine_wrench_unit(log, estimate, lambda rows: replace(load, log=rows).estimate(), before, late)
     if any(f.code == "force-unit" for f in (*before, *late)):
         touched = ()  # it only seems so in a wrong unit
-    estimate = load.without_tool(estimate).noted(*level, *unmeasured)
+    estimate = load.without_tool(estimate).noted(*level, *unmeasured, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if parts is None:
         of_sensor = (*of_sensor, *examine_body(estimate, (*before, *late, *of_sensor)))

@@ -3,7 +3,7 @@
 Noise of a quarter of the spacing leaves no surface that a solid could be told from; a dense cloud has neighbours
 enough to average it away before it is thinned. Their plain mean will not do: they may lie on both sheets of a wall, so
 of two layers only the point's own one counts; and the mean of a bent surface lies on its hollow side, so what a whole
-neighbourhood moves by is taken back (twicing: Tukey 1977, "Exploratory Data Analysis", section 16).
+neighbourhood moves by is taken back (twicing: Tukey 1977, "Exploratory Data Analysis").
 """
 
 from __future__ import annotations
@@ -45,15 +45,17 @@ def settled(xyz: Array, normals: Array | None, rows: Integers, spacing: float) -
     if noise < _NOISY * reach:
         return None
     sides = None if normals is None else normals[rows]
-    sheet = _Around.of(xyz[rows], sides, xyz[::step], None if normals is None else normals[::step], reach).sheet()
-    others = _Around.of(xyz[rows], sides, xyz[rows], sides, _WIDER * reach)
-    offset = sheet.offset - others.shared(sheet.offset, sheet.across)
+    others = None if normals is None else normals[::step]
+    sheet = _Around.of(xyz[rows], sides, xyz[::step], others, reach).sheet()
+    moved = _Around.of(xyz[rows], sides, xyz[rows], sides, _WIDER * reach)
+    offset = sheet.offset - moved.shared(sheet.offset, sheet.across)
     return Settled(xyz[rows] + offset[:, None] * sheet.across, noise)
 
 
 def _reach(xyz: Array, normals: Array | None, spacing: float) -> tuple[float, int, float]:
-    """Return the least reach at which neighbourhoods look like surfaces [m], every which point makes one of a fair
-    number, and the noise across them [m].
+    """Return the least reach at which neighbourhoods look like a surface [m], and the noise across it [m].
+
+    The number between tells that one point in so many is neighbour enough.
     """
     rows = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
     sides, step = None if normals is None else normals[rows], 1

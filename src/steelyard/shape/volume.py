@@ -111,8 +111,10 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     other = working_cloud(cloud, points, settle=not used.noise)
     if not (used.noise or other.noise):
         return made
-    noise = max(used.noise, other.noise)
-    changed, left = _made(other._replace(noise=noise))
+    try:
+        changed, left = _made(other._replace(noise=max(used.noise, other.noise)))
+    except BadValue:  # they enclose nothing
+        return made
     if left > doubt or _is_open(changed) > _is_open(made):
         return made
     return changed if used.noise else _as_doubtful(changed, made)
@@ -120,15 +122,12 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
 def _as_doubtful(made: Solid, as_given: Solid) -> Solid:
     """Return a solid of few points that were settled, with the doubt that there was about them as they were given."""
-    known = {finding.code for finding in made.findings}
-    findings = (finding for finding in as_given.findings if finding.code == "thin-thickened" not in known)
+    if any(finding.code == "thin-thickened" for finding in made.findings):
+        return made
+    doubts = (finding for finding in as_given.findings if finding.code == "thin-thickened")
     std = max(made.volume_std, as_given.volume_std)
-    return replace(
-        made,
-        findings=(*made.findings, *findings),
-        volume_std=std,
-        surface_m=made.surface_m * std / made.volume_std,
-    )
+    surface_m = made.surface_m * std / made.volume_std
+    return replace(made, findings=(*made.findings, *doubts), volume_std=std, surface_m=surface_m)
 
 
 def _made(used: WorkingCloud) -> tuple[Solid, float]:
@@ -160,9 +159,14 @@ def _enclosed(used: WorkingCloud) -> tuple[Solid, TetMesh, float]:
     if against > _TURNED:
         return _without_normals(used, f"The normals of {100 * against:.0f} % of the points contradict the rest")
     if cloud.normals is not None and found.doubt > _BY_CHANCE:
-        anew = _without_normals(used, "The normals contradict one another, and the points alone give a clearer solid")
-        if anew[2] < _CLEARER * found.doubt:
-            return anew
+        try:
+            anew = _without_normals(
+                used, "The normals contradict one another, and the points alone give a clearer solid"
+            )
+            if anew[2] < _CLEARER * found.doubt:
+                return anew
+        except BadValue:  # the points alone enclose nothing
+            pass
     doubt = found.doubt
     if cloud.normals is None and doubt > _UNCLEAR:
         as_found = surface
