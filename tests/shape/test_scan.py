@@ -150,6 +150,24 @@ def test_a_rod_too_thin_for_the_pixels_is_said_to_be_lost(camera: Intrinsics, lo
     assert ("surface-open" in {finding.code for finding in scan.findings}) == lost
 
 
+def cropped(views: Views, share: float) -> Views:
+    """Return views whose images lack a share of their width and height on each side."""
+    lens = views.intrinsics
+    x, y = int(share * lens.width), int(share * lens.height)
+    inner = (slice(None), slice(y, lens.height - y), slice(x, lens.width - x))
+    less = replace(lens, width=lens.width - 2 * x, height=lens.height - 2 * y, cx=lens.cx - x, cy=lens.cy - y)
+    assert views.rgb is not None
+    return replace(views, depth=views.depth[inner], rgb=views.rgb[inner], intrinsics=less)
+
+
+def test_an_object_that_images_cut_off_is_named() -> None:
+    bar = scanned(mesh_of(block((-0.15, 0.15), (-0.015, 0.015), (0, 0.03))))
+    for share, cut in ((0.0, False), (0.2, True), (0.3, True)):
+        scan = fuse(cropped(bar.views, share))
+        assert ("object-cut" in {finding.code for finding in scan.findings}) == cut
+        assert (scan.cloud.diagonal < 0.29) == cut
+
+
 def test_an_empty_table_is_said() -> None:
     buried = mesh_of(block((-0.05, 0.05), (-0.03, 0.03), (-0.02, -0.01)))
     with pytest.raises(CannotAnswer, match="no object was found on the table"):

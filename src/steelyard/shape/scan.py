@@ -16,6 +16,7 @@ from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.image_borders import cut_off
 from steelyard.shape.registration import agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, object_on_table, scene_of, surface_of, surfels
 from steelyard.shape.thinning import in_cubes, spread, spread_to
@@ -213,6 +214,8 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
     if shift is not None and shift > _FAR:
         text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed.{why}"
         found.append(Finding.of("views-disagree", text))
+    if cut := cut_off(scene, surface.xyz):
+        found.append(cut)
     if (lost := surface.lost) > _LOST:
         found.append(
             Finding.of(
