@@ -15,7 +15,7 @@ from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.spatial import Rotation
-from steelyard.team.angle_units import require_one_angle_unit
+from steelyard.team.misread.angle_units import require_one_angle_unit
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
 

@@ -10,10 +10,10 @@ import pytest
 
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
-from steelyard.team import bias_models
-from steelyard.team.bias_models import Models, ladder_of
 from steelyard.team.joint import JointTeam
-from steelyard.team.payload_model import Normal
+from steelyard.team.payload import bias_models
+from steelyard.team.payload.bias_models import Models, ladder_of
+from steelyard.team.payload.model import Normal
 
 QUIET = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.2, torque_white_Nm=0.02)
 P, B, R = 10, 6, 3

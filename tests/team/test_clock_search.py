@@ -11,10 +11,10 @@ import pytest
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, Hinge, TeamNoise, TeamScene
-from steelyard.team.clock_errors import NOTHING
-from steelyard.team.clock_search import far_lags, searched
+from steelyard.team.clocks.errors import NOTHING
+from steelyard.team.clocks.search import far_lags, searched
 from steelyard.team.joint import JointTeam
-from steelyard.team.pose_team import PoseTeam
+from steelyard.team.poses.team import PoseTeam
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
 

@@ -12,8 +12,8 @@ from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, Hinge, TeamNoise, TeamScene
-from steelyard.team.exchanged import require_own_files
 from steelyard.team.joint import JointTeam
+from steelyard.team.misread.exchanged import require_own_files
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 

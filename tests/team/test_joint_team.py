@@ -19,13 +19,13 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge import bodies, find_hinge, find_split, moving_twists, rigidity_findings
+from steelyard.team.hinge.axis import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import stretches
-from steelyard.team.twist_fit import fit_twists
-from steelyard.team.twist_rows import twist_stretches
-from steelyard.team.twist_statistic import TwistScatter
-from steelyard.team.twist_team import TwistTeam
+from steelyard.team.twists.fit import fit_twists
+from steelyard.team.twists.rows import twist_stretches
+from steelyard.team.twists.statistic import TwistScatter
+from steelyard.team.twists.team import TwistTeam
 
 QUIET = TeamNoise(
     pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.2, torque_white_Nm=0.02
@@ -320,7 +320,7 @@ def test_wrists_that_weigh_more_than_all_that_is_held_are_refused() -> None:
 
 @pytest.mark.parametrize("rounds", [1, 2])
 def test_clocks_that_are_not_done_are_told_as_they_were_used(rounds: int, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("steelyard.team.twist_team.CLOCK_ROUNDS", rounds)
+    monkeypatch.setattr("steelyard.team.twists.team.CLOCK_ROUNDS", rounds)
     made = trial(sensing="twists", bases_move=True, late_s={1: 0.1})
     team = TwistTeam.of(made.log, True)
     used = twist_stretches(made.log, team.late)
@@ -328,7 +328,7 @@ def test_clocks_that_are_not_done_are_told_as_they_were_used(rounds: int, monkey
         np.testing.assert_array_equal(part.twist, again.twist)
 
 
-@pytest.mark.parametrize(("sensing", "fit"), [("poses", "pose_fit"), ("twists", "twist_fit")])
+@pytest.mark.parametrize(("sensing", "fit"), [("poses", "poses.fit"), ("twists", "twists.fit")])
 def test_a_fit_that_ends_too_early_is_told(sensing: str, fit: str, monkeypatch: pytest.MonkeyPatch) -> None:
     made = trial(sensing=sensing, bases_move=sensing == "twists")
     early = "The fit of the grasps ended before it settled"
@@ -364,8 +364,8 @@ def test_what_gains_would_do_to_the_mass_is_said_where_bars_are_narrower() -> No
 def test_two_robots_weigh_until_the_noise_has_settled(monkeypatch: pytest.MonkeyPatch) -> None:
     made = simulate_team(TeamScene(CASES["A"], 2, six_axis=frozenset({0})), 100)
     found = JointTeam().identify(made.log)
-    monkeypatch.setattr("steelyard.team.payload_fit.SETTLED", 1e-5)
-    monkeypatch.setattr("steelyard.team.payload_fit.ROUNDS", 60)
+    monkeypatch.setattr("steelyard.team.payload.fit.SETTLED", 1e-5)
+    monkeypatch.setattr("steelyard.team.payload.fit.ROUNDS", 60)
     last = JointTeam().identify(made.log)
     assert np.abs((found.mass - last.mass) / last.std[0]) < 0.05
     np.testing.assert_allclose(found.std, last.std, rtol=0.05)

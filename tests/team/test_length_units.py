@@ -11,7 +11,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
-from steelyard.team.length_units import require_one_length_unit
+from steelyard.team.misread.length_units import require_one_length_unit
 
 
 def made(case: str, seed: int) -> TeamLog:

@@ -18,9 +18,9 @@ from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, Hinge, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
-from steelyard.team import misread_poses
 from steelyard.team.joint import JointTeam
-from steelyard.team.misread_poses import require_well_read
+from steelyard.team.misread import poses as misread_poses
+from steelyard.team.misread.poses import require_well_read
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 Spoil = Callable[[Array, Array], tuple[Array, Array]]

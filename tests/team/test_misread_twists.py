@@ -12,8 +12,8 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.team.joint import JointTeam
-from steelyard.team.misread_twists import UNITS, require_one_velocity_unit
-from steelyard.team.twist_team import TwistTeam
+from steelyard.team.misread.twists import UNITS, require_one_velocity_unit
+from steelyard.team.twists.team import TwistTeam
 
 NOISE = TeamNoise(rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.1, torque_white_Nm=0.01)
 

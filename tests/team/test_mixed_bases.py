@@ -14,7 +14,7 @@ from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.joint import JointTeam
-from steelyard.team.twist_rows import derived
+from steelyard.team.twists.rows import derived
 
 NOISE = TeamNoise(
     pose_rad=3e-4, pose_m=1e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.1, torque_white_Nm=0.01

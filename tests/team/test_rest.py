@@ -11,8 +11,8 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.team.joint import JointTeam
-from steelyard.team.pose_team import PoseTeam
-from steelyard.team.rest import shares_at_rest
+from steelyard.team.poses.rest import shares_at_rest
+from steelyard.team.poses.team import PoseTeam
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 
@@ -55,7 +55,7 @@ def test_encoders_in_steps_cost_less_than_they_did(monkeypatch: pytest.MonkeyPat
     """Case A: 14 bits and hardly any noise, so that a rest is one reading."""
     made = [simulate_team(TeamScene(CASES["A"], motion_samples=2000), seed) for seed in range(100, 106)]
     now = np.array([off(one, one.log) for one in made])
-    monkeypatch.setattr("steelyard.team.pose_team.shares_at_rest", lambda *_: None)
+    monkeypatch.setattr("steelyard.team.poses.team.shares_at_rest", lambda *_: None)
     before = np.array([off(one, one.log) for one in made])
     assert now[:, 0].mean() < 0.7 * before[:, 0].mean()
     assert np.sqrt((now[:, 1] ** 2).mean()) < 1.5

@@ -8,7 +8,7 @@ from steelyard.check import Array
 from steelyard.simulate.team_sensing import autoregressive
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.slips import Slip, SlipAt, alone, find_slip, noise_alone
+from steelyard.team.changes.slips import Slip, SlipAt, alone, find_slip, noise_alone
 from steelyard.team.stacked import Stretch
 
 ROWS, RATE = 1500, 100.0

@@ -13,13 +13,13 @@ from steelyard.errors import BadValue
 from steelyard.logs.cubic import cubic
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
-from steelyard.team import pose_statistic
 from steelyard.team.adjoint import adjoint_inverse, exp
+from steelyard.team.changes.slips import alone, find_slip
 from steelyard.team.definite import definite, inverses, logarithms
-from steelyard.team.pose_noise import _scores
-from steelyard.team.pose_rows import held
-from steelyard.team.pose_solver import SHOWN, Solver, unit
-from steelyard.team.slips import alone, find_slip
+from steelyard.team.poses import statistic as pose_statistic
+from steelyard.team.poses.noise import _scores
+from steelyard.team.poses.rows import held
+from steelyard.team.poses.solver import SHOWN, Solver, unit
 from steelyard.team.turns import moved, turned_by, turns_between, twists_between
 
 

@@ -13,7 +13,7 @@ from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, Slip, TeamNoise, TeamScene
-from steelyard.team.clock_errors import NOTHING, ClockError, ClockErrors
+from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 

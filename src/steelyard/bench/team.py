@@ -21,9 +21,9 @@ from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene, case
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam, needs_twists
-from steelyard.team.pose_team import PoseTeam
+from steelyard.team.poses.team import PoseTeam
 from steelyard.team.published import PublishedTeam
-from steelyard.team.twist_team import TwistTeam
+from steelyard.team.twists.team import TwistTeam
 
 FIRST_SEED = 100
 SIZES = (2, 4, 8, 16, 32, 64)

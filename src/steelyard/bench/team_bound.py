@@ -22,13 +22,13 @@ from steelyard.inertia.parameters import frame_change
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.body_rows import balance_frame, summing
 from steelyard.team.joint import JointTeam
-from steelyard.team.pose_fit import information
-from steelyard.team.pose_solver import Solver
-from steelyard.team.pose_statistic import OWN
-from steelyard.team.pose_team import PoseTeam
-from steelyard.team.poses import TeamMotion
+from steelyard.team.payload.body_rows import balance_frame, summing
+from steelyard.team.poses.fit import information
+from steelyard.team.poses.measured import TeamMotion
+from steelyard.team.poses.solver import Solver
+from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.team import PoseTeam
 from steelyard.team.stacked import all_poses
 
 FIRST_SEED = 9000

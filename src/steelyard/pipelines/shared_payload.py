@@ -22,12 +22,12 @@ from steelyard.identify.fit import within_numbers
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
-from steelyard.team.angle_units import require_one_angle_unit
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
-from steelyard.team.length_units import require_one_length_unit
+from steelyard.team.misread.angle_units import require_one_angle_unit
+from steelyard.team.misread.length_units import require_one_length_unit
+from steelyard.team.misread.same_numbers import require_own_numbers, stuck_forces
 from steelyard.team.published import PublishedTeam
-from steelyard.team.same_numbers import require_own_numbers, stuck_forces
 
 Method = Literal["joint", "paper"]
 METHODS: tuple[Method, ...] = get_args(Method)

@@ -14,13 +14,13 @@ from steelyard.inertia.parameters import frame_change
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
-from steelyard.team.bias_models import SHOWN
-from steelyard.team.body_rows import balance_frame, reach
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
-from steelyard.team.payload_doubt import lost_turns, moved_by_gains, moved_by_grasps
-from steelyard.team.payload_fit import PayloadFit
-from steelyard.team.pose_covariance import Spread
+from steelyard.team.payload.bias_models import SHOWN
+from steelyard.team.payload.body_rows import balance_frame, reach
+from steelyard.team.payload.doubt import lost_turns, moved_by_gains, moved_by_grasps
+from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.poses.covariance import Spread
 
 # [m] What is taken for the size of a team where the motion does not show where its grasps are.
 UNKNOWN_SIZE = 1.0

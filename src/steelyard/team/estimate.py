@@ -52,7 +52,7 @@ class BodyEstimate:
                        with the hinge at zero; with standard deviations (3,), NaN where not shown
     lever_std          standard deviation of its length [kg m]
     mass_range         (2,) [kg] least and most that a body with these moments can weigh; NaN where not shown
-    Mass alone, and the place of the centre of mass along the hinge, no motion tells: see `hinged_rows`.
+    Mass alone, and the place of the centre of mass along the hinge, no motion tells: see `hinge.rows`.
     """
 
     robots: tuple[str, ...]

@@ -18,32 +18,34 @@ from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, team_size
-from steelyard.team.balance import require_balance
-from steelyard.team.body_rows import BodyRows, balance_frame, require_runs, summing
-from steelyard.team.clock_errors import NOTHING, ClockErrors, Errors
-from steelyard.team.clock_search import F, searched
+from steelyard.team.changes.odd_recording import without_odd
+from steelyard.team.changes.yielding import Yields, stiffened
+from steelyard.team.clocks.errors import NOTHING, ClockErrors, Errors
+from steelyard.team.clocks.search import F, searched
+from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.exchanged import require_own_files
-from steelyard.team.hinge import Split, find_split, rigidity_findings
-from steelyard.team.hinged_bodies import hinge_findings
-from steelyard.team.hinged_rows import COUNT
-from steelyard.team.hinged_team import identify_two_bodies
+from steelyard.team.hinge.axis import Split, find_split, rigidity_findings
+from steelyard.team.hinge.bodies import hinge_findings
+from steelyard.team.hinge.rows import COUNT
+from steelyard.team.hinge.team import identify_two_bodies
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
-from steelyard.team.misread_forces import with_one_reading
-from steelyard.team.misread_poses import require_well_read
-from steelyard.team.misread_torques import with_torque_sign
-from steelyard.team.misread_twists import require_one_velocity_unit
-from steelyard.team.motion_noise import motion_noise
-from steelyard.team.odd_recording import without_odd
-from steelyard.team.payload_doubt import weight_by_gains
-from steelyard.team.payload_fit import fit_payload
-from steelyard.team.payload_model import Group, unit_bias
-from steelyard.team.pose_covariance import grasp_covariance
-from steelyard.team.pose_team import PoseTeam
+from steelyard.team.misread.exchanged import require_own_files
+from steelyard.team.misread.forces import with_one_reading
+from steelyard.team.misread.poses import require_well_read
+from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign
+from steelyard.team.misread.torques import with_torque_sign
+from steelyard.team.misread.twists import require_one_velocity_unit
+from steelyard.team.payload.balance import require_balance
+from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
+from steelyard.team.payload.doubt import weight_by_gains
+from steelyard.team.payload.fit import fit_payload
+from steelyard.team.payload.model import Group, unit_bias
+from steelyard.team.payload.motion_noise import motion_noise
+from steelyard.team.payload.spectra import band_edges, gathered
+from steelyard.team.poses.covariance import grasp_covariance
+from steelyard.team.poses.team import PoseTeam
 from steelyard.team.published import require_wrenches
-from steelyard.team.signs import sign_finding, torque_sign_finding, with_one_sign
-from steelyard.team.spectra import band_edges, gathered
 from steelyard.team.team_findings import (
     bad_robots,
     gains,
@@ -55,10 +57,8 @@ from steelyard.team.team_findings import (
     unsettled,
     vertical,
 )
-from steelyard.team.twist_team import TwistTeam
+from steelyard.team.twists.team import TwistTeam
 from steelyard.team.unexplained import unexplained
-from steelyard.team.unsteady_clocks import steadied
-from steelyard.team.yielding import Yields, stiffened
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
 LEAST_CHI2 = -0.1
@@ -284,7 +284,7 @@ def needs_twists(log: TeamLog) -> bool:
 
 
 def _groups(made: list[tuple[BodyRows, Array]], noise: Array, highest_hz: float, order: int) -> tuple[Group, ...]:
-    """Return the recordings with complete wrenches in two groups, at rest and in motion; `order` as in motion_noise."""
+    """Return the recordings with complete wrenches in two groups, at rest and in motion; `order` of models."""
     out = []
     for still in (True, False):
         some = [(body, left) for body, left in made if body.runs and body.still == still]

@@ -14,7 +14,7 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.clock_errors import ClockError, punctual
+from steelyard.team.clocks.errors import ClockError, punctual
 from steelyard.team.turns import turned_by, turns_between
 
 # Rows, and seconds, that a gap may last and still be filled: far below what the payload can do in that time. A curve

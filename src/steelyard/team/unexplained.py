@@ -13,10 +13,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.team.misread_forces import likely_factor
-from steelyard.team.misread_torques import torque_factor
-from steelyard.team.payload_fit import PayloadFit
-from steelyard.team.payload_model import Group
+from steelyard.team.misread.forces import likely_factor
+from steelyard.team.misread.torques import torque_factor
+from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.payload.model import Group
 
 # What is left counts from this share of the payload's weight, and from so many times the noise of the highest band;
 # noise below 2 Hz has less than three times it. Less is enough where one robot explains it.

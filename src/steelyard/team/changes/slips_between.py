@@ -1,0 +1,84 @@
+"""A grasp that slips while nobody records: its place against all others changes from one recording to the next.
+
+Means over a second are compared, those of recordings before with those after. They scatter about the mean of their side
+by noise and by whatever else differs between attitudes (soft grasps, levers, encoders), so that this scatter judges the
+step; seconds of one recording are counted as one, since much of it may last.
+Source: own; Hotelling's T^2.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from scipy.special import fdtri
+
+from steelyard.check import Array
+from steelyard.team.changes.slips import WINDOW_S, Slip, SlipAt
+from steelyard.team.stacked import Stretch
+
+# How likely noise alone may be taken for a slip, in one log, and the size [m, rad] from which a step counts.
+CHANCE, LEAST_M, LEAST_RAD = 1e-4, 2e-3, 4e-3
+# What moves farther does not slip: another robot's file, or a base that was carried away.
+MOST_M, MOST_RAD = 0.15, 0.6
+# Windows that are needed to tell their scatter.
+WINDOWS = 16
+
+
+def slip_between(parts: Sequence[Stretch], apart: Array) -> SlipAt | None:
+    """Return the clearest slip between two recordings, None where there is none.
+
+    apart  (T, N, 6) rotation vector and position of each grasp against what the others say, recording after recording
+    """
+    best: SlipAt | None = None
+    count = apart.shape[1]
+    for robot in range(count):
+        means, recording = _windows(parts, apart[:, robot], robot)
+        for first in np.unique(recording)[1:]:
+            chance = CHANCE / (count * (len(parts) - 1))
+            slip = _step(means, recording, int(first), robot, chance)
+            if slip is not None and (best is None or slip.score > best.slip.score):
+                best = SlipAt(int(first), -np.inf, slip)
+    return best
+
+
+def step_between(found: SlipAt, parts: Sequence[Stretch], apart: Array) -> SlipAt:
+    """Return the slip with its step from the residuals (T, N, 6), all rows in one, of a fit to what was before it."""
+    means, recording = _windows(parts, apart[:, found.slip.robot], found.slip.robot)
+    after = recording >= found.recording
+    step = means[after].mean(0) - means[~after].mean(0)
+    angle, distance = float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:]))
+    return replace(found, slip=replace(found.slip, angle=angle, distance=distance), step=step)
+
+
+def _windows(parts: Sequence[Stretch], apart: Array, robot: int) -> tuple[Array, Array]:
+    """Return means (B, 6) of one robot's residuals (T, 6) over a second each, and the recording (B,) of each."""
+    means, recording, start = [], [], 0
+    for number, part in enumerate(parts):
+        rows = apart[start : start + len(part)][part.seen[:, robot]]
+        start += len(part)
+        pieces = min(round(len(rows) / (WINDOW_S * part.rate)), len(rows))
+        for piece in np.array_split(rows, max(1, pieces)) if len(rows) else ():
+            means.append(piece.mean(0))
+            recording.append(number)
+    return np.array(means).reshape(-1, 6), np.array(recording, np.int64)
+
+
+def _step(means: Array, recording: Array, first: int, robot: int, chance: float) -> Slip | None:
+    """Return the step at the beginning of a recording where it is large and beyond chance."""
+    after = recording >= first
+    freedom = len(means) - 2
+    if freedom < WINDOWS - 2:
+        return None
+    step = means[after].mean(0) - means[~after].mean(0)
+    angle, distance = float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:]))
+    left = means - np.where(after[:, None], means[after].mean(0), means[~after].mean(0))
+    sides = sum(1 / len(np.unique(recording[side])) for side in (after, ~after))
+    spread = left.T @ left / freedom * sides
+    try:
+        score = float(step @ np.linalg.solve(spread, step)) * (freedom - 5) / (6 * freedom)
+    except np.linalg.LinAlgError:
+        return None
+    large = (distance > LEAST_M or angle > LEAST_RAD) and distance < MOST_M and angle < MOST_RAD
+    return Slip(robot, 0, distance, angle, score) if large and score > fdtri(6, freedom - 5, 1 - chance) else None

@@ -1,0 +1,139 @@
+"""Clocks that are set anew between recordings, or run fast: told by what a fit with one offset per robot leaves.
+
+What is left of a grasp's poses or twists, along how they move, is how late its stamps are beside the offset that all
+recordings share: e_i = s_i (late_i + rate_i (t - middle)), with the payload's motion, which all robots see, taken out.
+Standard deviations come from the scores of stretches of each recording, so that slow noise does not pass for a clock.
+Source: own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Protocol, TypeVar
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog
+from steelyard.team.changes.scores import Scores
+from steelyard.team.clocks.errors import ClockError, ClockErrors
+
+# Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
+STRETCHES, ROWS = 20, 100
+# A clock is unsteady from so many standard deviations, and where it is late by so much [s] or fast by so much [s/s].
+# One that is called so is put right until less than SETTLED standard deviations are left, at most so many times.
+BEYOND, LEAST_S, LEAST_RATE = 8.0, 1e-4, 1e-6
+SETTLED, ROUNDS = 0.5, 6
+
+
+@dataclass(frozen=True, eq=False)
+class Left:
+    """What a fit leaves of one recording.
+
+    time   (T,) [s]                  seen  (T, N)
+    apart  (T, N, 6) residuals of each grasp in its own axes
+    slope  (T, N, 6) residuals per second that the robot's stamps are late
+    """
+
+    time: Array
+    seen: Mask
+    apart: Array
+    slope: Array
+
+
+class Steady(Protocol):
+    """A joint fit that says what its clocks are off by, recording by recording."""
+
+    @property
+    def clocks_left(self) -> ClockErrors:
+        """What clocks seem to be off by beside one offset per robot, noise and all."""
+
+
+F = TypeVar("F", bound=Steady)
+
+
+def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog, F, ClockErrors]:
+    """Return log and fit with clocks put right in every recording, and what they were off by."""
+    errors, called = ClockErrors(), _Called()
+    for _ in range(ROUNDS):
+        called = called.joined(team.clocks_left)
+        wrong = called.of(team.clocks_left)
+        if not any(_unsettled(error) for each in wrong.recordings for error in each.values()):
+            break
+        try:
+            moved = wrong.corrected(log)
+            team = of(moved)
+        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+            break
+        log, errors = moved, errors + wrong
+    return log, team, errors
+
+
+@dataclass(frozen=True)
+class _Called:
+    """Robots whose clocks are set anew, and pairs of recording and robot where one runs fast or slow."""
+
+    late: frozenset[str] = frozenset()
+    fast: frozenset[tuple[int, str]] = frozenset()
+
+    def joined(self, errors: ClockErrors) -> _Called:
+        """Return these and those that errors call."""
+        every = [(k, n, e) for k, each in enumerate(errors.recordings) for n, e in each.items()]
+        fast = {(k, n) for k, n, e in every if abs(e.rate) > max(LEAST_RATE, BEYOND * e.rate_std)}
+        late = {n for _, n, e in every if abs(e.late) > max(LEAST_S, BEYOND * e.late_std)} | {n for _, n in fast}
+        return _Called(self.late | late, self.fast | fast)
+
+    def of(self, errors: ClockErrors) -> ClockErrors:
+        """Return the errors of those that were called."""
+        return ClockErrors(tuple(
+            {n: e if (k, n) in self.fast else replace(e, rate=0.0) for n, e in each.items() if n in self.late}
+            for k, each in enumerate(errors.recordings)
+        ))  # fmt: skip
+
+
+def _unsettled(error: ClockError) -> bool:
+    return abs(error.late) > SETTLED * error.late_std or abs(error.rate) > SETTLED * error.rate_std
+
+
+def clock_errors(log: TeamLog, parts: tuple[Left, ...], J: Array, W: Array) -> ClockErrors:
+    """Return what clocks seem to be off by, recording by recording, against the reference's.
+
+    J  (N, 6, 6) residuals per motion of the payload      W  (N, 6) their weights
+    """
+    reference = log.names.index(log.reference)
+    return ClockErrors(tuple(
+        {} if recording.kind == "still" else _told(part, J, W, log.names, reference)
+        for recording, part in zip(log.recordings, parts, strict=True)
+    ))  # fmt: skip
+
+
+def _told(part: Left, J: Array, W: Array, names: tuple[str, ...], reference: int) -> dict[str, ClockError]:
+    """Return errors from the rows that most often see the same robots; none where there are too few."""
+    patterns, which, count = np.unique(part.seen, axis=0, return_inverse=True, return_counts=True)
+    most = int(np.argmax(count * (patterns.sum(1) > 1)))
+    robots, rows = np.flatnonzero(patterns[most]), np.flatnonzero(which.ravel() == most)
+    if len(robots) < 2 or len(rows) < ROWS:
+        return {}
+    middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
+    slope, some = part.slope[rows][:, robots], len(robots)
+    columns = np.concatenate([slope, slope * ((part.time[rows] - middle) / half)[:, None, None]], axis=1)
+    whose = np.tile(np.arange(some), 2)
+    scores = Scores.of(part.apart[rows][:, robots], columns, whose, J[robots], W[robots], STRETCHES)
+    # What all clocks have in common moves the motion along itself.
+    common = np.kron(np.eye(2), np.ones((some, some))) * np.trace(scores.information.sum(0)) / (2 * some)
+    if not common.any():
+        return {}
+    size, covariances = scores.solved(common)
+    base = int(np.argmax(robots == reference))
+    against = np.kron(np.diag([1.0, 1 / half]), np.eye(some) - np.eye(some)[base])
+    late, rate = (against @ size).reshape(2, some)
+    noise = [np.einsum("ij,jk,ik->i", against, V, against) for V in covariances]
+    late_std, rate_std = np.sqrt(np.maximum(*noise)).reshape(2, some)
+    return {
+        names[i]: ClockError(float(late[k]), float(rate[k]), middle, float(late_std[k]), float(rate_std[k]))
+        for k, i in enumerate(robots)
+        if k != base
+    }

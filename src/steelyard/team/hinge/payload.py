@@ -1,0 +1,184 @@
+"""Seventeen parameters of two bodies with a hinge from all recordings at once, bias and gain as in `payload.fit`.
+
+The noise of a band is that of the force axes, all alike, and what the motion's noise makes; bias of either body's
+robots and gain are integrated out, averaged over their sizes by evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.team.hinge.rows import BIAS, COUNT, Bands, Sums, noisy
+from steelyard.team.payload.bias_models import (
+    Models,
+    Recordings,
+    condition_of,
+    gain_spread,
+    ladder_of,
+    shown_of,
+    without_gain,
+)
+from steelyard.team.payload.model import Normal, least_noise
+
+ROUNDS = 12
+SETTLED = 0.01
+
+
+@dataclass(frozen=True, eq=False)
+class Kind:
+    """Recordings at rest, or in motion, with common bands: motion (K, 7, 7) noise of H's accelerations and the hinge's,
+    force (K,) variance of a force axis [N^2]."""
+
+    parts: tuple[Bands, ...]
+    motion: Array
+    force: Array
+
+
+@dataclass(frozen=True, eq=False)
+class HingedPayload:
+    """Parameters (17,) in H with covariance (17, 17), and how they came about.
+
+    lost      directions (17, L) in units of `scale` that the rows do not show
+    gainless  share of the evidence that gains do not err
+    kept      (17, 17) inverse information in the directions that they do
+    """
+
+    parameters: Array
+    covariance: Array
+    lost: Array
+    scale: Array
+    kept: Array
+    condition: float
+    gain: float
+    gainless: float
+    chi2: float
+    kinds: tuple[Kind, ...]
+    weights: tuple[Array, ...]
+    blind: tuple[tuple[Array, ...], ...]
+    sums: Sums
+
+    def moved(self, column: Callable[[Bands, int], Array]) -> Array:
+        """Return how the parameters (17, J) move when the rows' wrench does by column(recording, band) (n, 7, J)."""
+        right = 0.0
+        for kind, weights, blinds in zip(self.kinds, self.weights, self.blind, strict=True):
+            for part, blind in zip(kind.parts, blinds, strict=True):
+                for band, (z, W) in enumerate(zip(part.z, weights, strict=True)):
+                    seen = W @ (z[..., :COUNT] - z[..., COUNT:-1] @ blind.T)
+                    made = column(part, band)
+                    right = right + seen.reshape(-1, COUNT).T @ made.reshape(-1, made.shape[-1])
+        return np.asarray(self.kept @ right)
+
+    @property
+    def residual(self) -> Array:
+        """Rms (2,) of what is left per row of the summed moment and force, as far as force noise makes it."""
+        rows = np.concatenate([sum(p.rows for p in kind.parts) * np.ones(len(kind.force)) for kind in self.kinds])
+        force = float(np.concatenate([kind.force for kind in self.kinds]) @ rows / rows.sum())
+        unit = self.sums.seven[:6] ** 2 @ _forces(self.sums)
+        return np.asarray(np.sqrt(force * unit.reshape(2, 3).mean(1)))
+
+
+def _forces(sums: Sums) -> Array:
+    """Return which of the pushes (6 N,) are forces."""
+    return np.asarray(np.arange(sums.seven.shape[1]) % 6 >= 3, dtype=np.float64)
+
+
+def fit_hinged_payload(
+    kinds: tuple[Kind, ...], sums: Sums, axes: Array, size: float, with_gain: bool = True
+) -> HingedPayload:
+    """Return the fit.
+
+    axes  (6 N,) noise of every push in units of a force axis': 1, `size` for moments of six-axis wrists, else 0
+    size  of the team [m]
+    """
+    # Biases are those of every recording alone here: one that lasts for the session is asked of rigid payloads only.
+    ladder = ladder_of(1, with_gain)
+    unit = sums.seven * axes
+    V = unit @ unit.T
+    V[range(7), range(7)] += 1e-6 * np.diag(V)
+    both = np.concatenate([sums.first, sums.second]) * axes
+    C = both @ both.T
+    C[range(BIAS), range(BIAS)] += 1e-6 * np.where(np.arange(BIAS) % 6 < 3, size**2, 1.0)
+    scale, phi = _units(1.0, size), np.zeros(COUNT)
+    kinds = tuple(Kind(k.parts, k.motion, np.ones(len(k.force))) for k in kinds)
+    for number in range(ROUNDS):
+        weights = tuple(_weights(kind, V, phi, started=number > 0) for kind in kinds)
+        normals = [_normal(p, k, W, sums, number > 0) for k, W in zip(kinds, weights, strict=True) for p in k.parts]
+        models = Models.of(normals, C, ladder, scale)
+        weight = models.share
+        phi, best = models.mean(), int(np.argmax(weight))
+        if number == 0:
+            scale = _units(max(abs(float(phi[0])), 1e-3), size)
+        beside = models.recordings(best)
+        starts = np.cumsum([0, *(len(kind.parts) for kind in kinds)])
+        renewed = tuple(
+            _judged(kind, W, V, beside, int(s)) for kind, W, s in zip(kinds, weights, starts[:-1], strict=True)
+        )
+        change = max(float(np.abs(np.log(n.force / k.force)).max()) for n, k in zip(renewed, kinds, strict=True))
+        # Weights and kinds that are told belong together, however it ends.
+        if (number > 1 and change < SETTLED) or number == ROUNDS - 1:
+            break
+        kinds = renewed
+    covariance = models.covariance_about(phi)
+    noise = sum((n.noise for n in normals), np.zeros((COUNT, COUNT))) * np.outer(scale, scale)
+    values, vectors = np.linalg.eigh(models.information[best] * np.outer(scale, scale) - noise)
+    shown = shown_of(values, vectors, noise)
+    root = scale[:, None] * vectors[:, shown]
+    rows = 7 * sum(float(p.rows.sum()) for k in kinds for p in k.parts)
+    condition = condition_of(values, shown)
+    blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
+    return HingedPayload(
+        phi, covariance, vectors[:, ~shown], scale, (root / values[shown]) @ root.T,
+        condition, gain_spread(weight, ladder), without_gain(weight, ladder),
+        float(models.chi2[best]) / max(rows - COUNT, 1.0), kinds, weights, blind, sums,
+    )  # fmt: skip
+
+
+def _units(mass: float, size: float) -> Array:
+    whole = [mass, *[mass * size] * 3, *[mass * size**2] * 6]
+    return np.array([*whole, *[mass * size] * 2, *[mass * size**2] * 5])
+
+
+def _weights(kind: Kind, V: Array, phi: Array, started: bool) -> Array:
+    """Return the inverse (K, 7, 7) of the noise of a row."""
+    noise = kind.force[:, None, None] * V
+    if started:
+        M = np.einsum("ijp,p->ij", noisy(), phi)
+        noise = noise + M @ kind.motion @ M.T
+    return np.asarray(np.linalg.inv(noise))
+
+
+def _normal(part: Bands, kind: Kind, W: Array, sums: Sums, started: bool) -> Normal:
+    """Return the normal equations of one recording in [parameters (17), bias (12)]."""
+    wide = COUNT + BIAS
+    S, noise, N = np.zeros((wide + 1, wide + 1)), np.zeros((COUNT, COUNT)), noisy()
+    for z, weight, motion, rows in zip(part.z, W, kind.motion, part.rows, strict=True):
+        flat = (np.linalg.cholesky(weight).T @ z).reshape(-1, wide + 1)
+        S += flat.T @ flat
+        if started:
+            noise += rows * np.einsum("ijp,ik,jl,klq->pq", N, weight, motion, N, optimize=True)
+    each = np.concatenate([sums.first, sums.second]) * (_forces(sums) * part.mean)
+    return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each)
+
+
+def _judged(kind: Kind, W: Array, V: Array, beside: Recordings, start: int) -> Kind:
+    """Return the kind with the noise of force axes renewed: one step of expectation maximisation per band."""
+    seen, size = np.zeros(len(kind.force)), np.zeros(len(kind.force))
+    phi = beside.phi
+    for k, part in enumerate(kind.parts):
+        solution, doubt = beside.solution(start + k), beside.doubt(start + k)
+        values, vectors = np.linalg.eigh(doubt)
+        factor = vectors * np.sqrt(np.maximum(values, 0.0))
+        for band, z in enumerate(part.z):
+            # At rest the means are mostly bias.
+            z = z[1:] if part.still and band == 0 else z
+            left = np.concatenate([(z[..., -1] - z[..., :-1] @ solution)[..., None], z[..., :-1] @ factor], axis=-1)
+            pulled = W[band] @ left
+            seen[band] += float(np.einsum("nip,ij,njp->", pulled, V, pulled, optimize=True))
+            size[band] += len(z) * float(np.trace(W[band] @ V))
+    share = np.where(size > 0, seen / np.maximum(size, 1e-300), 1.0)
+    return Kind(kind.parts, kind.motion, np.maximum(kind.force * share, least_noise(phi)))

@@ -1,0 +1,67 @@
+"""Whether forces have the sign that they should where the payload is two bodies with a hinge: see `misread.signs`.
+
+What robots push against one another through the hinge cancels in the sum of forces too. Beside the first body's motion,
+that of the second, turned by the hinge's angle, is taken out of every force, and so is a bias that turns.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from scipy.fft import dct
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.team.hinge.poses import Hinged
+from steelyard.team.hinge.rows import Sums, about_z
+from steelyard.team.misread.signs import odd_one_out
+from steelyard.team.payload.body_rows import BodyRows
+from steelyard.team.payload.spectra import fade, frequencies
+
+# Columns before the robots' forces: motion of the first body, of the second, that turned, means and means turned.
+MOTION = 12
+INNER = 4 * MOTION + 3
+
+
+def robot_of_other_sign(
+    made: Sequence[tuple[Hinged, BodyRows, BodyRows]], sums: Sums, names: Sequence[str], highest_hz: float
+) -> tuple[int | None, tuple[Finding, ...]]:
+    """Return the robot whose sign must be turned, None where all are right, and the finding that says so.
+
+    made  of every recording, where everything is and the rows of either body
+    """
+    count = len(names)
+    each, lifted = np.zeros((count, count)), np.zeros(count)
+    for still in (True, False):
+        some = [_scatter(team, one, two, sums, highest_hz) for team, one, two in made if one.still == still]
+        if some:
+            S = np.sum(some, axis=0)
+            inner, pushes = S[:INNER, :INNER], S[INNER:, :INNER]
+            left = S[INNER:, INNER:] - pushes @ np.linalg.pinv(inner, 1e-9, hermitian=True) @ pushes.T
+            each += np.einsum("aiaj->ij", left.reshape(3, count, 3, count))
+            lifted += np.einsum("aia->i", pushes[:, 3:6].reshape(3, count, 3))
+    return odd_one_out(each, lifted, names)
+
+
+def _scatter(team: Hinged, one: BodyRows, two: BodyRows, sums: Sums, highest_hz: float) -> Array:
+    """Return the scatter of motion and forces of one recording, as far as frequencies are used."""
+    count = len(team.second)
+    out = np.zeros((INNER + 3 * count, INNER + 3 * count))
+    for run, other in zip(one.runs, two.runs, strict=True):
+        turn = about_z(team.angle[run.rows])[:, 3:, 3:]
+        force = np.stack([run.pushed.reshape(-1, count, 6)[:, i] @ _force(sums, i).T for i in range(count)], axis=2)
+        force[..., team.second] = turn @ force[..., team.second]
+        cos, sin = turn[:, :1, 0], turn[:, 1:2, 0]
+        seen = [run.motion, other.motion, cos * other.motion, sin * other.motion, np.ones_like(cos), cos, sin]
+        flat = np.concatenate([*seen, force.reshape(len(force), -1)], axis=1)
+        if not one.still:
+            flat *= fade(len(flat), run.rate)[:, None]
+        z = dct(flat, axis=0, norm="ortho", overwrite_x=True)[: len(frequencies(run, highest_hz))]
+        out += z.T @ z
+    return out
+
+
+def _force(sums: Sums, robot: int) -> Array:
+    """Return (3, 6): the force that a robot's push adds, with the hinge at zero."""
+    return (sums.first + sums.second)[3:, 6 * robot : 6 * robot + 6]

@@ -1,0 +1,265 @@
+"""One robot whose poses are read wrongly: positions in another unit, rotations or whole poses the other way round.
+
+No grasps and homes then fit the team. Every common misreading is undone for each robot in turn, in all recordings or in
+one: where one of them makes poses fit, it is named. A reading is judged by its first grasps in closed form; only the
+best few are fitted.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.logs.misread import MISREAD
+from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Pose, Rotation
+from steelyard.team.clocks.search import far_lags
+from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
+from steelyard.team.poses.measured import TeamMotion, in_words
+from steelyard.team.poses.start import first_team
+from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.turns import turns_between
+
+# Rows of a recording that are enough to tell; readings that are fitted at most.
+ROWS, MOST = 50, 4
+# So read, noise is below this share of what each robot turns and moves, and these shares fall by this factor (rms).
+FITS, CLOSES = 0.15, 4.0
+# Readings within this factor of the best are as good; those within the other are worth a fit.
+AS_GOOD, NEAR = 2.0, 20.0
+# Nor is a reading worth one whose start is not better than the fit of poses as given by this factor.
+BETTER = 2.0
+# Of a team of so many, only those are tried without whom the others fit better by that factor.
+MANY = 4
+# A payload that turns by less [rad] does not turn.
+STILL = 0.02
+
+Read = Callable[[Pose], Pose | None]
+
+
+@dataclass(frozen=True)
+class Reading:
+    """A way to read poses: what was wrong, what to do, what turns poses (T,) into those meant; None if impossible."""
+
+    words: str
+    remedy: str
+    meant: Read
+
+
+@dataclass(frozen=True, eq=False)
+class Try:
+    """A reading of one robot's poses, in one recording (its number) or in all (None), and the rows so read."""
+
+    robot: int
+    reading: Reading
+    recording: int | None
+    parts: tuple[Stretch, ...]
+
+
+def _scaled(meant: str, read: str, factor: float) -> Reading:
+    much = f"{factor:.5g} times too small" if factor > 1 else f"{1 / factor:.5g} times too large"
+    words = f"positions are {much}, as when {meant} are read as {read}"
+    remedy = 'Set the unit ("m" or "mm") that its "position" has, or convert the numbers to one.'
+    return Reading(words, remedy, lambda poses: Pose(poses.rotation, factor * poses.position))
+
+
+def _turned(right: Callable[[Array], Array | None]) -> Read:
+    def meant(poses: Pose) -> Pose | None:
+        turned = right(poses.rotation.matrix)
+        return None if turned is None else Pose(Rotation.nearest(turned), poses.position)
+
+    return meant
+
+
+METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
+SWAP = "Set the form that its quaternions have: quaternion-wxyz or quaternion-xyzw."
+TRANSPOSE = 'Give its "rotation" from its grasp into its home: name the columns of the matrix in transposed order.'
+SCALES = tuple(_scaled(a, b, METRES[a] / METRES[b]) for a in METRES for b in METRES if a != b)
+READINGS = (
+    *SCALES,
+    Reading(
+        "poses are those of its home in its grasp, not of its grasp in its home",
+        "Write the inverse of each pose.",
+        Pose.inverse,
+    ),
+    *(
+        Reading(
+            m.words, m.remedy or (SWAP if m.code == "quaternion-order" else TRANSPOSE), _turned(m.right)
+        )
+        for m in MISREAD
+    ),
+)  # fmt: skip
+
+
+def require_well_read(log: TeamLog) -> None:
+    """Raise BadValue where poses that do not fit do so once one robot's are read in another way.
+
+    Clocks are taken as they are, but for those far off: how fast a grasp turns is the same in all these readings.
+    """
+    names, reference = log.names, log.names.index(log.reference)
+    try:
+        parts = tuple(part.thinned(ROWS) for part in stretches(far_lags(log).corrected(log), {}))
+    except BadValue:
+        return
+    judge = _Judge(names, reference)
+    # A fit may end beside the optimum: then its start is the better of the two.
+    given = min((judge(parts, exact) for exact in (True, False)), key=lambda judged: judged.cost)
+    readings = READINGS if judge.turns(parts) else SCALES
+    suspects = _suspects(parts, judge, given)
+    for tried in (_everywhere(parts, suspects, readings), _in_one(parts, suspects, readings, judge, given)):
+        best = _best(tuple(tried), given, judge)
+        if best:
+            raise BadValue(_words(best, names, [part.name for part in parts], given))
+
+
+def _best(tried: Sequence[Try], given: _Judged, judge: _Judge) -> list[tuple[Try, _Judged]]:
+    """Return the readings that make poses fit, best first: several where one is as good as another."""
+    first = [judge(one.parts, False) for one in tried]
+    order = sorted(range(len(tried)), key=lambda k: first[k].cost)[:MOST]
+    bar = min((j.cost for j in first), default=0.0) + np.log(NEAR)
+    near = [tried[k] for k in order if first[k].cost < bar and first[k].beats(given, BETTER)]
+    fitted = [(one, judge(one.parts, True)) for one in near]
+    able = [(one, j) for one, j in fitted if j.worst < FITS and j.beats(given, CLOSES)]
+    able.sort(key=lambda pair: pair[1].cost)
+    return [pair for pair in able if pair[1].cost < able[0][1].cost + np.log(AS_GOOD)]
+
+
+def _suspects(parts: tuple[Stretch, ...], judge: _Judge, given: _Judged) -> list[int]:
+    """Return the robots that may be misread: those without whom the others' poses fit better, or not at all."""
+    count = len(judge.names)
+    if count < MANY:
+        return list(range(count))
+    without = [judge.without(i)(_left_out(parts, i), False) for i in range(count)]
+    return [i for i, w in enumerate(without) if not w.fits or w.beats(given, BETTER)]
+
+
+def _left_out(parts: tuple[Stretch, ...], robot: int) -> tuple[Stretch, ...]:
+    """Return the recordings with the poses of the other robots only."""
+    others = np.delete(np.arange(parts[0].seen.shape[1]), robot)
+    return tuple(replace(part, poses=part.poses[:, others], seen=part.seen[:, others]) for part in parts)
+
+
+def _everywhere(parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading]) -> Iterator[Try]:
+    for i in robots:
+        for reading in readings:
+            read = [_read(part, i, reading) for part in parts]
+            made = tuple(part for part in read if part is not None)
+            if len(made) == len(parts):
+                yield Try(i, reading, None, made)
+
+
+def _in_one(
+    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading], judge: _Judge, given: _Judged
+) -> Iterator[Try]:
+    """Yield readings of one robot in one recording, where poses fit better without them, or not at all."""
+    for k, part in enumerate(parts if len(parts) > 1 else ()):
+        for i in (robot for robot in robots if part.seen[:, robot].any()):
+            seen = part.seen.copy()
+            seen[:, i] = False
+            without = judge((*parts[:k], replace(part, seen=seen), *parts[k + 1 :]), False)
+            if without.fits and not without.beats(given, BETTER):
+                continue
+            for reading in readings:
+                made = _read(part, i, reading)
+                if made is not None:
+                    yield Try(i, reading, k, (*parts[:k], made, *parts[k + 1 :]))
+
+
+def _read(part: Stretch, i: int, reading: Reading) -> Stretch | None:
+    """Return the recording with one robot's poses read in another way."""
+    seen = part.seen[:, i]
+    if not seen.any():
+        return part
+    meant = reading.meant(part.poses[seen, i])
+    if meant is None:
+        return None
+    turns, places = part.poses.rotation.matrix.copy(), part.poses.position.copy()
+    turns[seen, i], places[seen, i] = meant.rotation.matrix, meant.position
+    return replace(part, poses=Pose._trusted(Rotation._trusted(turns), places))
+
+
+@dataclass(frozen=True, eq=False)
+class _Judged:
+    """Noise (N, 2) [rad, m] of poses, and which share of what each robot turns and moves it is; all if nothing fits."""
+
+    noise: Array
+    share: Array
+    fits: bool
+
+    @property
+    def cost(self) -> float:
+        """Logarithm of the shares (rms)."""
+        return float(np.log((self.share**2).mean()) / 2)
+
+    @property
+    def worst(self) -> float:
+        """The largest share."""
+        return float(self.share.max())
+
+    def beats(self, given: _Judged, factor: float) -> bool:
+        """Whether shares are smaller by a factor: all of them (rms), or the largest, as others are noisy either way."""
+        return self.cost < given.cost - np.log(factor) or self.worst < given.worst / factor
+
+
+@dataclass(frozen=True)
+class _Judge:
+    """How well poses fit, for a team of these names."""
+
+    names: tuple[str, ...]
+    reference: int
+
+    def __call__(self, parts: tuple[Stretch, ...], exact: bool) -> _Judged:
+        """Return the noise of a rough fit, or only of where it would start."""
+        data = TeamMotion(*all_poses(parts))
+        size = _size(data)
+        try:
+            noise = self._noise(data, exact)
+        except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+            noise = np.full_like(size, np.nan)
+        fits = bool(np.isfinite(noise).all())
+        return _Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)
+
+    def without(self, robot: int) -> _Judge:
+        """Return the same for the other robots, whose first is the reference where it was the one left out."""
+        reference = 0 if robot == self.reference else self.reference - (robot < self.reference)
+        return _Judge(self.names[:robot] + self.names[robot + 1 :], reference)
+
+    def turns(self, parts: tuple[Stretch, ...]) -> bool:
+        """Return whether the payload turns, so that misread rotations show."""
+        return bool(_size(TeamMotion(*all_poses(parts)))[:, 0].max() > STILL)
+
+    def _noise(self, data: TeamMotion, exact: bool) -> Array:
+        start = first_team(data, self.reference, self.names)
+        if exact:
+            return fit_poses(data, start, self.reference, close=ROUGHLY).noise
+        guess = np.full((data.count, 2), GUESS)
+        return Rows.settled(data, start, guess).noise(guess)
+
+
+def _size(data: TeamMotion) -> Array:
+    """Return how much each robot turns and moves (N, 2) [rad, m], as read."""
+    out = np.empty((data.count, 2))
+    for i in range(data.count):
+        path = data.poses[data.valid[:, i], i]
+        turns = turns_between(Rotation.nearest(path.rotation.matrix.mean(0)), path.rotation)
+        if not len(path.position):
+            out[i] = 0.0
+            continue
+        out[i] = np.sqrt((turns**2).mean()), np.sqrt(((path.position - path.position.mean(0)) ** 2).mean())
+    return np.maximum(out, [STILL, 1e-12])
+
+
+def _words(best: list[tuple[Try, _Judged]], names: tuple[str, ...], recordings: Sequence[str], given: _Judged) -> str:
+    """Return what is wrong, or may be, and what to do."""
+    said = []
+    for one, _ in best:
+        where = "" if one.recording is None else f" in '{recordings[one.recording]}'"
+        said.append(f"those of '{names[one.robot]}' are misread{where} ({one.reading.words})")
+    remedies = dict.fromkeys(one.reading.remedy for one, _ in best)
+    return (
+        f"the robots' poses do not fit one payload, and do so if {' or if '.join(said)}: what they say of it then "
+        f"differs by {in_words(best[0][1].noise)}, as given by {in_words(given.noise)}. {' '.join(remedies)}"
+    )

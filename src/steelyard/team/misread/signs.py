@@ -1,0 +1,86 @@
+"""Whether forces have the sign that they should: each robot's beside the others', and all of them under the weight.
+
+What robots push against one another cancels in the sum over the team. Where one of them says what it feels instead of
+what it applies, it adds up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.log import Mask
+from steelyard.team.mass_and_com import require_lift
+from steelyard.team.payload.model import Group
+
+# What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
+FALLS = 4.0
+
+
+def with_one_sign(
+    groups: Sequence[Group], D: Array, names: Sequence[str], doubtful: Mask
+) -> tuple[Array, tuple[Finding, ...]]:
+    """Return D (6, 6 N), the sum of pushes at B, with a robot's sign turned where its forces ask for it, and why.
+
+    doubtful  (N,) whose signs may be wrong: those of others are left as they are
+
+    Raises CannotAnswer where the forces of all then pull the payload down.
+    """
+    total = [part.scatter.sum(0) for group in groups for part in group.parts]
+    forces = D[3:].reshape(3, -1, 6)
+    lifted = np.sum([np.einsum("aix,ixa->i", forces, S[12:-1, 3:6].reshape(-1, 6, 3)) for S in total], axis=0)
+    each = np.sum([_beside_one_another(S, forces) for S in total], axis=0)
+    wrong, found = odd_one_out(each, lifted, names, doubtful)
+    if wrong is not None:
+        D, lifted = D.copy(), lifted.copy()
+        D[:, 6 * wrong : 6 * wrong + 6] *= -1
+        lifted[wrong] *= -1
+    require_lift(float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total)), "the forces")
+    return D, found
+
+
+def odd_one_out(
+    each: Array, lifted: Array, names: Sequence[str], doubtful: Mask | None = None
+) -> tuple[int | None, tuple[Finding, ...]]:
+    """Return the robot whose sign must be turned, and why; None where all are right.
+
+    each  (N, N) products of what the motion leaves of the robots' forces     lifted  (N,) how far each pushes up
+    doubtful  (N,) who is asked; all, if None
+    """
+    turned = each.sum() - 4 * (each.sum(1) - np.diag(each))
+    asks = turned < each.sum() / FALLS
+    asking = np.flatnonzero(asks if doubtful is None else asks & doubtful)
+    if not len(asking):
+        return None, ()
+    # Of two robots each asks for it: it is the one that pulls down.
+    wrong = int(asking[np.argmin(lifted[asking])])
+    return wrong, (sign_finding(names[wrong]),)
+
+
+def sign_finding(name: str) -> Finding:
+    """Return the finding of a robot whose forces had the other sign."""
+    text = f"What '{name}' and the others push against one another cancels only with its sign turned; it was."
+    return Finding.of("wrench-sign-flipped", text)
+
+
+def torque_sign_finding(name: str, turned: bool) -> Finding:
+    """Return the finding of a robot whose torques have another sign than its forces, which were `turned` or not."""
+    which, other = ("force", "torques") if turned else ("torque", "forces")
+    text = (
+        f"The torques of '{name}' fit one body only with the sign opposite to that of its forces: the sign of its "
+        f"{which}s was turned, that of its {other} was not."
+    )
+    return Finding("wrench-sign-flipped", text, f"Turn the signs of the {which} columns of '{name}', and of no others.")
+
+
+def _beside_one_another(S: Array, forces: Array) -> Array:
+    """Return products (N, N) of what any motion and bias leave of the robots' forces; `forces` (3, N, 6) of pushes."""
+    inner = np.r_[:12, len(S) - 1]
+    pushes = S[12:-1, inner]
+    left = S[12:-1, 12:-1] - pushes @ np.linalg.pinv(S[np.ix_(inner, inner)], 1e-9, hermitian=True) @ pushes.T
+    count = forces.shape[1]
+    one = np.einsum("aix,ixq->aiq", forces, left.reshape(count, 6, -1)).reshape(3, count, count, 6)
+    return np.asarray(np.einsum("aijy,ajy->ij", one, forces))

@@ -1,0 +1,238 @@
+"""The answers at every size of bias and gain on a ladder, biases integrated out, and how likely each size is.
+
+The bias of a recording is b_r = c + d_r: c ~ N(0, V) is common to all recordings, d_r ~ N(0, S_r) is drawn anew. Gains
+that last for a session pull by their share of the mean force: its mean over the recordings belongs to c, what is left
+to d_r. Given c, recordings are apart, and c costs one more elimination.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from functools import lru_cache
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.log import Integers, Mask
+from steelyard.team.definite import definite, inverses, logarithms
+from steelyard.team.payload.model import Normal
+
+# [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
+BIAS = np.geomspace(1e-3, 10.0, 13)
+# [N] the part that all recordings share. With one recording it cannot be told from that recording's own.
+COMMON = np.array([1e-6, *np.geomspace(1e-2, 10.0, 7)])
+# With several recordings every other size of their own is enough.
+OWN = BIAS[::2]
+# That gains have no error at all is beforehand as likely as so many other sizes together.
+NO_GAIN_ERROR = 3.0
+# A common bias and gains that last look like mass where the payload hardly tilts: beforehand none of either is so many
+# times as likely as any one size.
+NO_COMMON, NO_LASTING = 1000.0, 1000.0
+GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
+# What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
+SHOWN = 0.3
+# Sizes with less than this share of the likeliest's have none: what they would add to a variance is rounding.
+NOTHING = 1e-15
+# Information below this share of the largest is rounding.
+RANK = 1e-11
+
+
+def ladder_of(recordings: int, with_gain: bool) -> Array:
+    """Return the sizes (L, 4) that are tried: common bias, bias, gain drawn anew, gain that lasts; one gain at most."""
+    anew = [(gain, 0.0) for gain in (GAIN if with_gain else GAIN[:1])]
+    if recordings < 2:
+        return np.array([(0.0, bias, *gain) for bias in BIAS for gain in anew])
+    lasting = [(0.0, gain) for gain in GAIN[1:]] if with_gain else []
+    return np.array([(common, bias, *gain) for common in COMMON for bias in OWN for gain in (*anew, *lasting)])
+
+
+def ladder_shares(evidence: Array, ladder: Array) -> Array:
+    """Return the share (L,) of every size on the ladder (L, 4) by evidence; none in the gain is the likeliest.
+
+    What would change nothing has none.
+    """
+    chance = evidence + np.where(ladder[:, 2:].any(1), 0.0, np.log(NO_GAIN_ERROR))
+    chance -= np.where(ladder[:, 0] > COMMON[0], np.log(NO_COMMON), 0.0)
+    chance -= np.where(ladder[:, 3] > 0, np.log(NO_LASTING), 0.0)
+    weight = np.exp(chance - chance.max())
+    weight[weight < NOTHING] = 0.0
+    return np.asarray(weight / weight.sum())
+
+
+def gain_spread(weight: Array, ladder: Array) -> float:
+    """Return how much gains err, drawn anew or lasting."""
+    return float(np.sqrt(weight @ np.square(ladder[:, 2:]).sum(1)))
+
+
+def without_gain(weight: Array, ladder: Array) -> float:
+    """Return the share of the evidence that gains have no error."""
+    return float(weight[~ladder[:, 2:].any(1)].sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Recordings:
+    """Parameters phi (P,) with covariance (P, P) at one size, and the bias (R, B) of every recording beside them.
+
+    inner  (R, B, B) covariance of a bias beside a known body     mean (R, B) bias beside a body that weighs nothing
+    blind  (R, P, B) how phi's information takes up a bias: H_pb H_bb^-1
+    """
+
+    phi: Array
+    covariance: Array
+    inner: Array
+    mean: Array
+    blind: Array
+
+    def solution(self, recording: int) -> Array:
+        """Return [phi, bias] (P + B,) of one recording."""
+        return np.concatenate([self.phi, self.mean[recording] - self.blind[recording].T @ self.phi])
+
+    def doubt(self, recording: int) -> Array:
+        """Return their covariance (P + B, P + B)."""
+        blind = self.blind[recording]
+        cross = -blind.T @ self.covariance
+        return np.block([[self.covariance, cross.T], [cross, self.inner[recording] - cross @ blind]])
+
+
+@dataclass(frozen=True, eq=False)
+class Models:
+    """The answers at L sizes (`ladder_of`): P parameters, B of a bias, R recordings.
+
+    phi (L, P)     covariance, information (L, P, P)     chi2 (L,)
+    share   (L,) of every size by evidence; phi and covariance are zero where it is
+    H, g    of the recordings (R, P + B, P + B), (R, P + B)
+    narrow  (L', R, B, B) inverse spread of the biases drawn anew, one per kind, `kind` (L,) says which
+    common  (L, B, B) V of the common bias, where there is more than one recording
+    """
+
+    phi: Array
+    covariance: Array
+    information: Array
+    share: Array
+    chi2: Array
+    H: Array
+    g: Array
+    narrow: Array
+    kind: Integers
+    common: Array
+
+    @classmethod
+    def of(cls, normals: Sequence[Normal], C: Array, ladder: Array, scale: Array) -> Models:
+        """Return the models at every size of the ladder (L, 4); C (B, B) of a unit bias, scale (P,) units."""
+        size = len(scale)
+        H, g = np.stack([n.H for n in normals]), np.stack([n.g for n in normals])
+        pulls = np.stack([n.pulls for n in normals])
+        mean = pulls.mean(0)
+        anew, rest = (p @ p.swapaxes(1, 2) for p in (pulls, pulls - mean))
+        (kinds, kind), (shared, which) = _distinct(ladder.tobytes())
+        bias, gain, lasting = np.square(kinds.T)[..., None, None, None]
+        narrow, wide = inverses(bias * C + gain * anew + lasting * rest)
+        inner, held = inverses(H[:, size:, size:] + narrow)
+        blind = H[:, :size, size:] @ inner
+        plain = (H[:, :size, :size].sum(0) - (blind @ H[:, size:, :size]).sum(1))[kind]
+        right = (g[:, :size].sum(0) - (blind @ g[:, size:, None])[..., 0].sum(1))[kind]
+        taken = np.einsum("ri,lrij,rj->l", g[:, size:], inner, g[:, size:])[kind]
+        told = (wide + held).sum(1)[kind]
+        common = np.square(shared[:, 0])[:, None, None] * C + np.square(shared[:, 1])[:, None, None] * (mean @ mean.T)
+        if len(normals) > 1 and ladder[:, 0].any():
+            known, cross, pull = _common(H, g, inner @ narrow)
+            root = np.linalg.cholesky(common)[which]
+            held, more = inverses(np.eye(len(C)) + root.swapaxes(1, 2) @ known[kind] @ root)
+            held = root @ held @ root.swapaxes(1, 2)
+            cross, pull = cross[kind], pull[kind][..., None]
+            plain = plain - cross @ held @ cross.swapaxes(1, 2)
+            right = right - (cross @ held @ pull)[..., 0]
+            taken = taken + (pull * (held @ pull)).sum((1, 2))
+            told = told + more
+        unit = np.outer(scale, scale)
+        full = plain * unit
+        ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(size)
+        seen = (inverses(full + ridge)[0] @ (scale * right)[..., None])[..., 0]
+        chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
+        evidence = -0.5 * (chi2 + logarithms(np.eye(size) + full) + told)
+        share = ladder_shares(evidence, ladder)
+        told_of = np.flatnonzero(share)
+        noise = sum((n.noise for n in normals), np.zeros((size, size))) * unit
+        phi, covariance = np.zeros((len(ladder), size)), np.zeros((len(ladder), size, size))
+        phi[told_of], covariance[told_of] = _answers(full[told_of], noise, (scale * right)[told_of])
+        return cls(scale * phi, unit * covariance, plain, share, np.asarray(chi2), H, g, narrow, kind, common[which])
+
+    def mean(self) -> Array:
+        """Return the parameters (P,), averaged over sizes by their evidence."""
+        return np.asarray(self.share @ self.phi)
+
+    def covariance_about(self, phi: Array) -> Array:
+        """Return the covariance (P, P) of parameters told as `phi` (P,): that of every size, and how they differ."""
+        off = self.phi - phi
+        apart = np.einsum("l,lp,lq->pq", self.share, off, off)
+        return np.asarray(np.tensordot(self.share, self.covariance, 1) + apart)
+
+    def recordings(self, model: int) -> Recordings:
+        """Return the biases of all recordings in one model."""
+        size = self.phi.shape[1]
+        H_pb, H_bb, g_b = self.H[:, :size, size:], self.H[:, size:, size:], self.g[:, size:]
+        narrow = self.narrow[self.kind[model]]
+        inner = inverses(H_bb + narrow)[0]
+        mean, blind = (inner @ g_b[..., None])[..., 0], H_pb @ inner
+        if self.common[model].any():
+            share = inner @ narrow
+            known = (H_bb @ share).sum(0)
+            common = np.linalg.inv(np.linalg.inv(self.common[model]) + 0.5 * (known + known.T))
+            inner = inner + share @ common @ share.swapaxes(1, 2)
+            mean = mean + share @ (common @ np.einsum("rij,ri->j", share, g_b))
+            blind = blind + (H_pb @ share).sum(0) @ common @ share.swapaxes(1, 2)
+        return Recordings(self.phi[model], self.covariance[model], inner, mean, blind)
+
+
+@lru_cache(maxsize=8)
+def _distinct(ladder: bytes) -> tuple[tuple[Array, Integers], tuple[Array, Integers]]:
+    """Return the kinds of own biases (L', 3) and of common ones (L'', 2) on a ladder, and which each size has (L,)."""
+    rows = np.frombuffer(ladder).reshape(-1, 4)
+    own, common = (np.unique(rows[:, chosen], axis=0, return_inverse=True) for chosen in ([1, 2, 3], [0, 3]))
+    return (own[0], own[1]), (common[0], common[1])
+
+
+def _common(H: Array, g: Array, share: Array) -> tuple[Array, Array, Array]:
+    """Return a common bias's information (L, B, B), that with the parameters (L, P, B), and its right side (L, B).
+
+    share  (L, R, B, B) of a common bias that a recording's own leaves to be seen
+    """
+    size = H.shape[1] - share.shape[-1]
+    known = (H[:, size:, size:] @ share).sum(1)
+    cross = (H[:, :size, size:] @ share).sum(1)
+    return 0.5 * (known + known.swapaxes(1, 2)), cross, np.einsum("lrij,ri->lj", share, g[:, size:])
+
+
+def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
+    """Return phi (L, P) and covariance (L, P, P) in units of `scale`.
+
+    What noise in the motion adds to the information is taken out. A lost direction stays at zero, as unsure as a body
+    of this mass and size can be.
+    """
+    known, all_of = full - noise, np.eye(len(noise))
+    least = np.maximum(SHOWN**-2.0, RANK * np.trace(known, axis1=1, axis2=2))[:, None, None]
+    if definite(known - noise).all() and definite(known - least * all_of).all():
+        # Every direction is shown, whichever they are.
+        inverse = inverses(known)[0]
+        return (inverse @ right[..., None])[..., 0], inverse @ full @ inverse
+    values, vectors = np.linalg.eigh(known)
+    shown = shown_of(values, vectors, noise)
+    inverse = (vectors * np.where(shown, 1 / np.where(shown, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
+    lost = vectors * ~shown[:, None]
+    covariance = inverse @ full @ inverse + lost @ lost.swapaxes(1, 2)
+    return (inverse @ right[..., None])[..., 0], covariance
+
+
+def condition_of(values: Array, shown: Mask) -> float:
+    """Return the condition number of the rising information (P,) in what is shown, infinite where nothing is."""
+    return float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
+
+
+def shown_of(values: Array, vectors: Array, noise: Array) -> Mask:
+    """Return which rising information (..., P), in units of what a body can be, is more than noise and rounding.
+
+    What noise in the motion alone would seem to say, `noise`, is known to no better than its own size.
+    """
+    seeming = np.einsum("...pk,pq,...qk->...k", vectors, noise, vectors)
+    return np.asarray((values > SHOWN**-2.0) & (values > RANK * values[..., -1:]) & (values > seeming))

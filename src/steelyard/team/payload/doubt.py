@@ -1,0 +1,118 @@
+"""What errors of grasps and gains do to the ten parameters: seen from elsewhere, a force has another moment."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import basis
+from steelyard.spatial import Pose, cross_matrix
+from steelyard.team.payload.body_rows import summing
+from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.payload.model import Group, gain_columns
+
+# The features of the motion and the one of a bias among all that `Spectra` scatters.
+SEEN = np.array([*range(12), -1])
+
+
+def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
+    """Return d phi / d grasps (10, 6 N) for steps in each grasp's own axes; X_BG (N,) in the balance frame."""
+    return _moved(fit, turned_by_step(X_BG))
+
+
+def lost_turns(fit: PayloadFit, X_BG: Pose, lost: Array) -> Array:
+    """Return the covariance (10, 10) that steps which the motion does not show add beyond their slope.
+
+    lost  (6 N, L) as in `Spread`, of the length that each may have
+    An angle that nobody knows may be any: along a circle D' s + D'' (1 - c) the slope may vanish where everything else
+    is off, and a slope of one radian has D'^2 in place of D'^2 / 2 + 3 D''^2 / 2. The fit may have called bias what
+    forces that are turned do not lift; so the mass is as unsure as it is from what they lift on average.
+    """
+    bends = _bends(X_BG, lost)
+    out = _squares(_moved(fit, bends[:, None]))
+    S = sum(part.scatter.sum(0) for group in fit.groups for part in group.parts)
+    up, pushed = S[-1, 3:6] / S[-1, -1], S[-1, 12:-1].reshape(-1, 6, 1) / S[-1, -1]
+    lift = up / (up @ up)
+    slope = (turned_by_step(X_BG) @ pushed[:, None])[..., 3:, 0] @ lift
+    bent = (bends @ pushed)[None, :, 3:, 0] @ lift
+    out[0, 0] += ((slope.ravel() @ lost) ** 2).sum() + _squares(bent)[0, 0]
+    return out
+
+
+def _bends(X_BG: Pose, lost: Array) -> Array:
+    """Return by how much the summing block (N, 6, 6) of each grasp bends, on average over steps along `lost`."""
+    screws = np.einsum("nkl,kab->nlab", lost.reshape(len(X_BG.position), 6, -1), turned_by_step(Pose.identity(1))[0])
+    return np.asarray(summing(X_BG).reshape(6, -1, 6).swapaxes(0, 1) @ (screws @ screws).sum(1))
+
+
+def _squares(each: Array) -> Array:
+    """Return the covariance (P, P) of bends (P, N), whose mean is not zero."""
+    return np.asarray(np.outer(each.sum(1), each.sum(1)) + 0.5 * each @ each.T)
+
+
+def _moved(fit: PayloadFit, changes: Array) -> Array:
+    """Return d phi (10, N C) of each of C changes of the block (6, 6) that sums what a grasp pushes, (N, C, 6, 6)."""
+    count, kinds = changes.shape[:2]
+    flat = changes.reshape(count, 6 * kinds, 6)
+    right = np.zeros((kinds * count, 10))
+    for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
+        for part, blind in zip(group.parts, blinds, strict=True):
+            for W, S in zip(weights, part.scatter, strict=True):
+                pushes = S[SEEN, 12:-1].reshape(len(SEEN), count, 6).transpose(1, 2, 0)
+                change = flat @ pushes
+                right += change.reshape(kinds * count, -1) @ (W @ _levers(blind)).reshape(10, -1).T
+    return np.asarray(_kept(fit) @ right.T)
+
+
+def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
+    """Return the covariance (10, 10) that gain errors of `fit.gain` add beyond their mean, which acts as a bias."""
+    force, unit = gain_columns(D)
+    back, out = _kept(fit), np.zeros((10, 10))
+    for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
+        for part, blind in zip(group.parts, blinds, strict=True):
+            S = part.scatter
+            mean = S[:, :, -1].sum(0) / max(float(S[:, -1, -1].sum()), 1e-300)
+            varying = (S[:, :, 12 + force] - S[:, :, -1:] * mean[12 + force])[:, SEEN]
+            each = np.einsum("kau,kxu->axu", weights @ unit, varying)
+            moved = back @ _levers(blind).reshape(10, -1) @ each.reshape(-1, len(force))
+            out += fit.gain**2 * moved @ moved.T
+    return out
+
+
+def weight_by_gains(groups: Sequence[Group], D: Array) -> float:
+    """Return the share of the weight that gains which err by one, each for itself, on every force axis would make.
+
+    Gains that last make forces larger or smaller alike in every attitude, as another mass does: no motion tells.
+    """
+    force, unit = gain_columns(D)
+    total = sum((part.scatter.sum(0)[:, -1] for group in groups for part in group.parts), np.zeros(1))
+    pushed = unit[3:] * total[12 + force]
+    whole = pushed.sum(1)
+    return float(np.linalg.norm(whole @ pushed) / max(float(whole @ whole), 1e-300))
+
+
+def _levers(blind: Array) -> Array:
+    """Return what the wrench of a row with features SEEN says of the ten parameters (10, 6, 13) beside its bias."""
+    return np.concatenate([basis(), -blind[..., None]], axis=2)
+
+
+def _kept(fit: PayloadFit) -> Array:
+    """Return F^-1 (10, 10) in the directions that the rows show."""
+    scaled = fit.information * np.outer(fit.scale, fit.scale)
+    inverse = np.linalg.pinv(scaled, hermitian=True, rcond=1e-10) * np.outer(fit.scale, fit.scale)
+    keep = np.eye(10) - (fit.scale[:, None] * (fit.lost @ fit.lost.T)) / fit.scale
+    return np.asarray(keep @ inverse)
+
+
+def turned_by_step(X_BG: Pose) -> Array:
+    """Return how the summing block (6, 6) of each grasp changes per step k of its own (N, 6, 6, 6)."""
+    R, P = X_BG.rotation.matrix, cross_matrix(X_BG.position)
+    out = np.zeros((len(R), 6, 6, 6))
+    for k in range(3):
+        axis = cross_matrix(np.eye(3)[k])
+        out[:, k, :3, :3] = out[:, k, 3:, 3:] = R @ axis
+        out[:, k, :3, 3:] = P @ R @ axis
+        out[:, 3 + k, :3, 3:] = cross_matrix(R[:, :, k]) @ R
+    return out

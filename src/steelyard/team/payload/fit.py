@@ -1,0 +1,169 @@
+"""The ten parameters of the payload from all recordings at once, biases and gains under priors of their own.
+
+Still and moving rows are fitted together: the force equation in motion and the spread of tilts share the centre of
+mass. How large biases and gains are is averaged over a ladder by its evidence: with none, no accuracy is lost to them;
+with some, none is pretended. Noise of the wrench per band by expectation maximisation.
+Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, centre and inertia one after the other.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import motion_map
+from steelyard.team.payload.bias_models import (
+    Models,
+    Recordings,
+    condition_of,
+    gain_spread,
+    ladder_of,
+    shown_of,
+    without_gain,
+)
+from steelyard.team.payload.model import Group, least_noise, normal, residual_scatter
+
+# With two robots, whose moment is balanced through the payload alone, it takes up to nine.
+ROUNDS = 12
+# Noise has settled where it changes by less than this share.
+SETTLED = 0.03
+
+
+@dataclass(frozen=True, eq=False)
+class PayloadFit:
+    """Ten parameters (10,) in B with covariance (10, 10), and how they came about.
+
+    lost         (10, L) directions, in units of mass and size, that the rows do not show
+    scale        (10,) those units
+    information  (10, 10) F, so that a change of the rows that moves F phi by d moves phi by F^-1 d
+    gain         spread of the force axes' gains that the recordings show
+    gainless     share of the evidence that gains do not err at all
+    weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
+    """
+
+    parameters: Array
+    covariance: Array
+    lost: Array
+    scale: Array
+    information: Array
+    condition: float
+    gain: float
+    gainless: float
+    groups: tuple[Group, ...]
+    weights: tuple[Array, ...]
+    blind: tuple[tuple[Array, ...], ...]
+    residual: Array
+    chi2: float
+
+
+def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with_gain: bool = True) -> PayloadFit:
+    """Return the fit of groups of recordings.
+
+    D  (6, 6 N) sums the pushes at B     C  (6, 6) of a unit bias per force axis     size  of the team [m]
+    """
+    ladder = ladder_of(sum(len(group.parts) for group in groups), with_gain)
+    phi, groups = _start(groups, D, size)
+    scale = _units(phi, size)
+    starts = np.cumsum([0, *(len(group.parts) for group in groups)])
+    for left in reversed(range(ROUNDS)):
+        weights = tuple(group.weights(phi) for group in groups)
+        normals = [
+            normal(part, D, W, group.motion_noise)
+            for group, W in zip(groups, weights, strict=True)
+            for part in group.parts
+        ]
+        models = Models.of(normals, C, ladder, scale)
+        weight = models.share
+        phi, best = models.mean(), int(np.argmax(weight))
+        beside = models.recordings(best)
+        renewed = tuple(_judged(g, D, beside, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
+        change = max(
+            float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max())
+            for new, old in zip(renewed, groups, strict=True)
+        )
+        # Weights and groups that are told belong together, however it ends.
+        if not left or change < SETTLED:
+            break
+        groups = renewed
+    covariance = models.covariance_about(phi)
+    # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
+    # in the noise already.
+    last = groups[-1]
+    covariance = covariance * (1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0))
+    gain = gain_spread(weight, ladder)
+    rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
+    blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
+    noise = sum((n.noise for n in normals), np.zeros((10, 10)))
+    unit = np.outer(scale, scale)
+    values, vectors = np.linalg.eigh((models.information[best] - noise) * unit)
+    shown = shown_of(values, vectors, noise * unit)
+    condition = condition_of(values, shown)
+    return PayloadFit(
+        phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, gain,
+        without_gain(weight, ladder), groups, weights, blind, _residual(groups),
+        float(models.chi2[best]) / max(6 * rows - 10, 1.0),
+    )  # fmt: skip
+
+
+def _units(phi: Array, size: float) -> Array:
+    mass = max(abs(float(phi[0])), 1e-3)
+    return np.concatenate([[mass], np.full(3, mass * size), np.full(6, mass * size**2)])
+
+
+def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tuple[Group, ...]]:
+    """Return phi by least squares with moments in units of force times size, and the noise that is then left."""
+    unit = np.concatenate([np.full(3, size**2), np.ones(3)])
+    loud = tuple(
+        replace(g, motion_noise=np.zeros_like(g.motion_noise), wrench_noise=np.tile(unit, (len(g.wrench_noise), 1)))
+        for g in groups
+    )
+    weight = np.linalg.inv(np.diag(unit))[None]
+    every = [
+        normal(part, D, np.repeat(weight, len(g.wrench_noise), 0), g.motion_noise) for g in loud for part in g.parts
+    ]
+    flat = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)])
+    first = Models.of(every, np.diag(unit), np.array([[0.0, 1.0, 0.0, 0.0]]), flat).recordings(0)
+    left, count = np.zeros(6), 0.0
+    for k, part in enumerate(part for group in loud for part in group.parts):
+        left += residual_scatter(part, D, first.solution(k), np.zeros((16, 16))).sum(0)
+        count += float(part.judged_rows.sum())
+    phi = first.phi
+    noise = np.maximum(left / max(count, 1.0), least_noise(phi) * unit)
+    return phi, tuple(replace(g, wrench_noise=np.tile(noise, (len(g.wrench_noise), 1))) for g in groups)
+
+
+def _judged(group: Group, D: Array, beside: Recordings, start: int) -> Group:
+    """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
+    squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
+    for k, part in enumerate(group.parts):
+        squares += residual_scatter(part, D, beside.solution(start + k), beside.doubt(start + k))
+        rows += part.judged_rows
+    phi = beside.phi
+    M = motion_map(phi)[:, :6]
+    shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
+    # The mean of a variance given its rows, not the likeliest: weights must not be promised too high.
+    seen = squares / np.maximum(rows - 2, 0.5 * rows + 1e-9)[:, None]
+    thin = rows < 1
+    if thin.any() and not thin.all():
+        seen[thin] = seen[~thin].mean(0)
+    size = np.maximum((D[:, np.arange(D.shape[1]) % 6 >= 3] ** 2).mean(1), 1e-12)
+    seen = np.maximum(seen, least_noise(phi) * size)
+    least = np.maximum(0.02 * seen, least_noise(phi) * size)
+    # Where the path errs less than was thought, its noise shrinks with it.
+    share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
+    return replace(
+        group,
+        motion_noise=group.motion_noise * share[:, None, None],
+        wrench_noise=np.maximum(seen - shared * share[:, None], least),
+    )
+
+
+def _residual(groups: tuple[Group, ...]) -> Array:
+    """Return the rms (6,) of what is left of the summed moment and force, per row."""
+    rows = sum(float(p.rows.sum()) for g in groups for p in g.parts)
+    each = [np.einsum("ki,k->i", g.wrench_noise, p.rows) for g in groups for p in g.parts]
+    total = np.sum(each, axis=0)
+    return np.asarray(np.sqrt(total / max(rows, 1.0)))

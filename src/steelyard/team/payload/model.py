@@ -1,0 +1,119 @@
+"""The wrench equation of a team with everything that is not the payload: force bias and gain of every recording.
+
+Of recording r, at every row, D s - L(phi) x = b_r + noise: s what the robots say they push, D its sum at B, x the
+motion. The bias b_r is that of every force axis, c ~ N(0, s_c^2) all session long and d_r ~ N(0, s_b^2) of the
+recording, and the error of its gain ~ N(0, s_g^2), lasting or drawn anew, times the mean force on it. It is integrated
+out, so that what it hides is not pretended. Constant biases sum to six numbers, since grasps do not move in the
+payload. Gains are not fitted as factors of the measured force: noise would then explain itself.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import basis, motion_map
+from steelyard.logs.log import Integers, Mask
+from steelyard.team.payload.spectra import Spectra
+
+# Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
+ROUNDING = 1e-6
+
+
+def least_noise(phi: Array) -> float:
+    """Return the variance [N^2] below which no force's noise is judged, for a payload of parameters phi (P,)."""
+    return float((ROUNDING * abs(phi[0]) * 9.81) ** 2)
+
+
+@dataclass(frozen=True, eq=False)
+class Group:
+    """Recordings of one kind with common bands, and the noise of each band in B's axes.
+
+    motion_noise  (K, 6, 6) of angular acceleration and acceleration less gravity
+    wrench_noise  (K, 6) of the summed moment and force, beyond what the motion's noise makes
+    """
+
+    parts: tuple[Spectra, ...]
+    motion_noise: Array
+    wrench_noise: Array
+
+    def weights(self, phi: Array) -> Array:
+        """Return the inverse (K, 6, 6) of the noise of a row of the wrench equation."""
+        M = motion_map(phi)[:, :6]
+        noise = M @ self.motion_noise @ M.T
+        noise[:, range(6), range(6)] += self.wrench_noise
+        return np.asarray(np.linalg.inv(noise))
+
+
+@dataclass(frozen=True, eq=False)
+class Normal:
+    """Normal equations of one recording in [phi (10), bias (6)].
+
+    H, g      of what was measured          noise  (10, 10) what the motion's noise adds to H on average
+    constant  the weighted square of the wrench     pulls  (6, 3 N) bias per gain of every force axis
+    """
+
+    H: Array
+    g: Array
+    noise: Array
+    constant: float
+    pulls: Array
+
+
+def gain_columns(D: Array) -> tuple[Integers, Array]:
+    """Return which of the 6 N pushes are forces (3 N,), and the unit wrench at B of each (6, 3 N)."""
+    force: Integers = np.flatnonzero(np.arange(D.shape[1]) % 6 >= 3).astype(np.int64)
+    return force, D[:, force]
+
+
+def unit_bias(D: Array, six_axis: Mask, size: float) -> Array:
+    """Return C (6, 6): a unit bias on every force axis, and `size` [m] times that on moments of six-axis wrists."""
+    _, forces = gain_columns(D)
+    moment = np.repeat(six_axis, 6) & (np.arange(D.shape[1]) % 6 < 3)
+    moments = D[:, moment] * size
+    out = forces @ forces.T + moments @ moments.T
+    # Two grasps leave the moment about their line without bias; a thousandth keeps C regular.
+    out[:3, :3] += 1e-6 * size**2 * np.eye(3)
+    return np.asarray(out)
+
+
+def normal(part: Spectra, D: Array, W: Array, motion_noise: Array) -> Normal:
+    """Return the normal equations of one recording from its scatter; W (K, 6, 6)."""
+    E = basis()
+    S = part.scatter
+    H, g = np.zeros((16, 16)), np.zeros(16)
+    WE = W[:, None] @ E
+    flat = E.reshape(10, -1)
+    H[:10, :10] = (WE @ S[:, None, :12, :12]).sum(0).reshape(10, -1) @ flat.T
+    H[:10, 10:] = np.einsum("kpix,kx->pi", WE, S[:, :12, -1])
+    H[10:, 10:] = np.einsum("kij,k->ij", W, S[:, -1, -1])
+    H[10:, :10] = H[:10, 10:].T
+    to_wrench = S[:, :, 12:-1] @ D.T
+    g[:10] = np.einsum("kpix,kxi->p", WE, to_wrench[:, :12])
+    g[10:] = np.einsum("kij,kj->i", W, to_wrench[:, -1])
+    constant = float(np.einsum("kij,kji->", W, D @ to_wrench[:, 12:-1]))
+    first = E[:, :, :6].reshape(10, -1)
+    noise = ((WE[..., :6] @ motion_noise[:, None]) * part.rows[:, None, None, None]).sum(0).reshape(10, -1) @ first.T
+    force, unit = gain_columns(D)
+    total = S.sum(0)
+    mean = total[12 + force, -1] / max(float(total[-1, -1]), 1e-300)
+    return Normal(H, g, noise, constant, unit * mean)
+
+
+def residual_scatter(part: Spectra, D: Array, solution: Array, covariance: Array) -> Array:
+    """Return the expected scatter (K, 6) of the noise given [phi, bias] (16,) with covariance: residual and doubt."""
+    T = np.zeros((16, 6, 13))
+    T[:10, :, :12] = basis()
+    T[10:, :, -1] = np.eye(6)
+    K = np.zeros((6, part.judged.shape[1]))
+    K[:, 12:-1] = D
+    slope = np.tensordot(solution, T, axes=1)
+    K[:, :12], K[:, -1] = -slope[:, :12], -slope[:, 12]
+    out = np.einsum("kix,ix->ki", K @ part.judged, K)
+    inner = np.concatenate([np.arange(12), [part.judged.shape[1] - 1]])
+    motion = part.judged[:, inner[:, None], inner]
+    flat = T.transpose(1, 2, 0).reshape(-1, 16)
+    doubt = (flat @ covariance @ flat.T).reshape(6, 13, 6, 13)
+    return np.asarray(out + np.einsum("ixiy,kxy->ki", doubt, motion))

@@ -1,0 +1,120 @@
+"""Rows of a recording as frequencies, gathered into bands: one scatter matrix per band.
+
+The wrench is linear in features of the motion at every instant, so it is at every frequency. Noise is not white: that
+of accelerations grows with the fourth power of the frequency, sensors and structures err slowly. In bands narrow enough
+each is white, so that information is counted once and every frequency weighs what it is worth. Rows are tapered at
+their ends, or the ends would spill high frequencies into low ones.
+Source: own; Whittle 1953 for the likelihood.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.fft import dct
+
+from steelyard.check import Array
+from steelyard.logs.log import Integers
+from steelyard.team.payload.body_rows import BodyRows, Run
+
+# A band holds at least so many rows, and its upper end is at least so many times its lower one.
+ROWS, RATIO = 30, 1.35
+# Share of a run, and seconds, over which it is faded in and out: the shorter.
+FADE_SHARE, FADE_S = 0.1, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class Spectra:
+    """One recording: scatter (K, Z, Z) per band of [motion (12), pushed (6 N), 1], and rows (K,) in each.
+
+    judged, judged_rows  the same of the rows by which noise is judged: at rest not the means, which are mostly bias
+    samples              rows of the recording that are in it
+    """
+
+    name: str
+    still: bool
+    scatter: Array
+    rows: Array
+    judged: Array
+    judged_rows: Array
+    samples: int
+
+
+def fade(rows: int, rate: float) -> Array:
+    """Return the taper (T,) of a moving run, its mean square one."""
+    ramp = max(1, int(min(FADE_SHARE * rows, FADE_S * rate)))
+    window = np.ones(rows)
+    rise = 0.5 - 0.5 * np.cos(np.pi * (np.arange(ramp) + 0.5) / ramp)
+    window[:ramp], window[-ramp:] = rise, rise[::-1]
+    return np.asarray(window / np.sqrt((window**2).mean()))
+
+
+def frequencies(run: Run, highest_hz: float) -> Array:
+    """Return the frequencies [Hz] of the rows of a run that are used."""
+    size = len(run.motion)
+    rows = min(size, int(2 * size * highest_hz / run.rate) + 1)
+    return np.asarray(np.arange(rows) * (run.rate / (2 * size)), dtype=np.float64)
+
+
+def band_edges(recordings: Sequence[BodyRows], highest_hz: float) -> Array:
+    """Return the upper ends (K,) [Hz] of bands that all these recordings together fill."""
+    every = np.sort(np.concatenate([frequencies(run, highest_hz)[1:] for r in recordings for run in r.runs]))
+    edges: list[float] = []
+    start = 0
+    while len(every) - start >= 2 * ROWS:
+        stop = start + ROWS
+        if edges:
+            stop = max(stop, int(np.searchsorted(every, RATIO * edges[-1])))
+        if len(every) - stop < ROWS:
+            break
+        edges.append(float(every[stop - 1]))
+        start = stop
+    return np.array([*edges, np.inf])
+
+
+def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
+    """Return the scatter of one recording in the bands that end at `edges` (K,) [Hz]."""
+    width = 12 + recording.runs[0].pushed.shape[1] + 1
+    scatter, rows = np.zeros((len(edges), width, width)), np.zeros(len(edges))
+    judged, judged_rows = scatter.copy(), rows.copy()
+    for run in recording.runs:
+        hz = frequencies(run, highest_hz)
+        flat = np.ones((len(run.motion), width))
+        flat[:, :12], flat[:, 12:-1] = run.motion, run.pushed
+        if not recording.still:
+            flat *= fade(len(flat), run.rate)[:, None]
+        z = dct(flat, axis=0, norm="ortho")[: len(hz)]
+        for band, chosen in enumerate(bands(hz, edges)):
+            scatter[band] += z[chosen].T @ z[chosen]
+            rows[band] += chosen.stop - chosen.start
+        first = int(recording.still)
+        for band, chosen in enumerate(bands(hz[first:], edges)):
+            part = z[first:][chosen]
+            judged[band] += part.T @ part
+            judged_rows[band] += len(part)
+    samples = sum(len(run.motion) for run in recording.runs)
+    return Spectra(recording.name, recording.still, scatter, rows, judged, judged_rows, samples)
+
+
+def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Array:
+    """Return the mean square (3, K) per row, in every band, of noise (T, D) in a path after 0, 1 and 2 differences.
+
+    Bands without rows get nan.
+    """
+    hz = frequencies(run, highest_hz)
+    tapered = values * fade(len(values), run.rate)[:, None]
+    power = (dct(tapered, axis=0, norm="ortho")[: len(hz)] ** 2).mean(1)
+    gain = (2 * run.rate * np.sin(np.pi * hz / run.rate)) ** 2
+    out = np.full((3, len(edges)), np.nan)
+    for band, chosen in enumerate(bands(hz, edges)):
+        if chosen.stop > chosen.start:
+            out[:, band] = [(power[chosen] * gain[chosen] ** k).mean() for k in range(3)]
+    return out
+
+
+def bands(hz: Array, edges: Array) -> list[slice]:
+    """Return which rows each band holds."""
+    ends: Integers = np.searchsorted(hz, edges, side="right")
+    return [slice(int(a), int(b)) for a, b in zip([0, *ends[:-1]], ends, strict=True)]

@@ -1,0 +1,1 @@
+"""Grasps and homes of a team whose bases stand still, from the poses that its robots measure."""

@@ -1,0 +1,111 @@
+"""What a team with standing bases measures, and where everything is."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.log import Integers, Mask
+from steelyard.spatial import Pose
+from steelyard.team.poses.statistic import scatter
+from steelyard.team.turns import moved
+
+
+@dataclass(frozen=True, eq=False)
+class TeamMotion:
+    """Measured poses of N grasps, each in the home of its robot, at T common times.
+
+    poses  X_HG (T, N); where not `valid` they hold anything finite
+    valid  (T, N) whether the robot has a pose at that time
+    twist  (T, N, 6) of each grasp in its own axes per second that its stamps are late; None where not asked for
+    share  (T,) how much each row counts; None where all count as one
+    """
+
+    poses: Pose
+    valid: Mask
+    twist: Array | None = None
+    share: Array | None = None
+
+    def __post_init__(self) -> None:
+        # One layout, one compiled form of what passes over the rows.
+        object.__setattr__(self, "valid", np.ascontiguousarray(self.valid))
+        if self.twist is not None:
+            object.__setattr__(self, "twist", np.ascontiguousarray(self.twist))
+
+    def rows(self, chosen: Any) -> TeamMotion:
+        """Return some of the rows."""
+        twist, share = (None if x is None else x[chosen] for x in (self.twist, self.share))
+        return TeamMotion(self.poses[chosen], self.valid[chosen], twist, share)
+
+    @property
+    def twists(self) -> Array:
+        """The twists, or (0, N, 6) where they were not asked for."""
+        return np.zeros((0, self.count, 6)) if self.twist is None else self.twist
+
+    @property
+    def shares(self) -> Array:
+        """How much each row (T,) counts."""
+        return np.ones(len(self.valid)) if self.share is None else self.share
+
+    @property
+    def count(self) -> int:
+        """Number of robots."""
+        return int(self.valid.shape[1])
+
+    @cached_property
+    def complete(self) -> Mask:
+        """Rows (T,) in which all robots have poses."""
+        return np.asarray(self.valid.all(1))
+
+    @cached_property
+    def patterns(self) -> tuple[Mask, Integers]:
+        """Return the different sets of robots that have poses (C, N), and which of them each row (T,) has."""
+        if self.valid.all():
+            return np.ones((1, self.count), np.bool_), np.zeros(len(self.valid), np.int64)
+        found, place = np.unique(self.valid, axis=0, return_inverse=True)
+        return found, place.ravel()
+
+    def motion_seen(self, grasps: Pose, homes: Pose) -> Pose:
+        """Return the payload (T,) in the reference home as the first robot with a pose at that time sees it."""
+        if self.valid[:, 0].all():
+            return homes[0] @ self.poses[:, 0] @ grasps[0].inverse()
+        first = np.argmax(self.valid, axis=1)
+        return homes[first] @ self.poses[np.arange(len(first)), first] @ grasps[first].inverse()
+
+    @cached_property
+    def scatter(self) -> list[Array]:
+        """Scatter (25 N, 25 N) of the features of every row per pattern; see `poses.statistic`."""
+        found, place = self.patterns
+        every = [self] if len(found) == 1 else [self.rows(place == k) for k in range(len(found))]
+        return [scatter(r.poses.rotation.matrix, r.poses.position, r.twists, r.valid, r.share) for r in every]
+
+
+def in_words(noise: Array) -> str:
+    """Return the rms over robots of the noise (N, 2) [rad, m] of their turns and places, in deg and mm."""
+    turn, place = np.sqrt((noise**2).mean(0))
+    return f"{np.rad2deg(turn):.2g} deg and {1e3 * place:.2g} mm"
+
+
+@dataclass(frozen=True, eq=False)
+class Team:
+    """Where everything is.
+
+    grasps   G (N,) in the reference grasp; the reference's own is the identity
+    homes    Z (N,) in the reference home; the reference's own is the identity
+    motion   X (T,) the reference grasp in the reference home
+    delays   (N,) [s] how late each clock stamps
+    """
+
+    grasps: Pose
+    homes: Pose
+    motion: Pose
+    delays: Array
+
+    def moved(self, steps: Array) -> Team:
+        """Return the team with grasps, homes and delays a small step (N, 13) on, the motion where it is."""
+        grasps, homes = moved(self.grasps, steps[:, :6]), moved(self.homes, steps[:, 6:12])
+        return Team(grasps, homes, self.motion, self.delays + steps[:, 12])

@@ -1,0 +1,297 @@
+"""A team with standing bases: grasps, homes and clocks from poses, and the rows that its payload is weighed by."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import Finding
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.changes.presence import as_long, idle, let_go, presence_findings
+from steelyard.team.changes.slips import SlipAt, alone, edited, find_slip, noise_alone
+from steelyard.team.changes.slips_between import slip_between, step_between
+from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_poses
+from steelyard.team.poses import rows as pose_rows
+from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
+from steelyard.team.poses.measured import Team, TeamMotion
+from steelyard.team.poses.rest import shares_at_rest
+from steelyard.team.poses.start import ENOUGH, first_team
+from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.turns import turns_between, twists_between
+
+# Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
+PUNCTUAL = 2e-4
+# A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
+DOUBTED = 4.0
+CLOCK_ROUNDS = 6
+# Clocks that move by less [s] leave what the rows say as it is: nobody turns a payload far in that time.
+UNCHANGED = 0.02
+# Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
+# that so many poses of all robots together are enough.
+FEW_ROWS, FEW_POSES = 1500, 4500
+# Sweeps over a row with which the motion follows grasps and homes from wherever it was.
+FOLLOWED = 2
+MOST_SLIPS = 3
+# Bases that are said to be level are so to within this [rad].
+LEVEL = 0.02
+# Noise above this share of the motion asks whether the payload is rigid; it must then fall by this factor on average
+# where a slip between recordings is to explain it.
+LOUD, BETTER = 0.05, 3.0
+
+
+Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
+
+
+def _unchanged(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+    return parts
+
+
+def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, ...]:
+    return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
+
+
+@dataclass(frozen=True, eq=False)
+class PoseTeam:
+    """Recordings with their clocks right, the joint fit of poses, and how late each clock is [s]: zero on average.
+
+    clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
+    """
+
+    parts: tuple[Stretch, ...]
+    fit: PoseFit
+    late: Mapping[str, float]
+    findings: tuple[Finding, ...] = ()
+    clocks_left: ClockErrors = NOTHING
+
+    @classmethod
+    def of(cls, log: TeamLog, clocks: bool) -> PoseTeam:
+        """Return the joint fit; raises CannotAnswer where poses or rows in common are missing.
+
+        Robots that let go for a while and grasps that slip are found on the way: first the rows in which a robot
+        pushes with nothing are left out, then those stay out in which it is not where the others say.
+        """
+        raw = stretches(log, {})
+        resting = idle(raw)
+        if not any(rows.any() for rows in resting):
+            return cls._fitted(log, clocks, raw, _unchanged)._without_slips(log, clocks, raw, _unchanged)
+        first = cls._fitted(log, clocks, raw, lambda parts: _unseen(parts, resting))
+        off = first.off(log)
+
+        def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+            return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
+
+        found = presence_findings(raw, edit(raw), log.names)
+        team = cls._fitted(log, clocks, raw, edit)._without_slips(log, clocks, raw, edit)
+        return replace(team, findings=(*found, *team.findings))
+
+    @classmethod
+    def _fitted(cls, log: TeamLog, clocks: bool, parts: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
+        """Return the fit of recordings as they are (`parts`) after an edit."""
+        reference = log.names.index(log.reference)
+        late = dict.fromkeys(log.names, 0.0)
+        parts = edit(parts)
+        data = TeamMotion(*all_poses(parts))
+        start = first_team(data, reference, log.names, _down(log))
+        enough = min(FEW_ROWS, max(ENOUGH, FEW_POSES // data.count))
+        few = slice(None, None, max(1, len(data.valid) // enough))
+        fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
+        if not clocks:
+            fit = fit_poses(data, _followed(data, fit), reference, fit.noise)
+            share = shares_at_rest(parts, fit)
+            if share is not None:
+                fit = fit_poses(replace(data, share=share), fit.team, reference, fit.noise)
+            return cls(parts, fit, late)
+        known = None
+        for left in reversed(range(CLOCK_ROUNDS)):
+            team = _followed(data, fit)
+            timed = replace(data, twist=_twists(parts, team))
+            fit = fit_poses(timed, replace(team, delays=np.zeros(data.count)), reference, fit.noise, NEARLY, known)
+            step = np.abs(fit.team.delays)
+            if not left or (step < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
+                break
+            known = fit.known if step.max() < UNCHANGED else None
+            late = _later(late, fit)
+            parts = edit(stretches(log, late))
+            data = TeamMotion(*all_poses(parts))
+        share = shares_at_rest(parts, fit)
+        if share is None:
+            fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
+        else:
+            fit = fit_poses(replace(timed, share=share), fit.team, reference, fit.noise)
+        return cls(parts, fit, _later(late, fit))
+
+    def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
+        """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were.
+
+        Clocks are judged before: one that is set anew passes for slips.
+        """
+        team, slips = self, list[SlipAt]()
+        left = self._clock_errors(log) if clocks else NOTHING
+        for _ in range(MOST_SLIPS):
+            found = team._slip()
+            if found is None:
+                break
+            # Once more without what follows the slip, which has bent the first fit.
+            before, again = team, edited(edit, [*slips, found])
+            try:
+                team = self._fitted(log, clocks, raw, again)
+            except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+                break
+            # Recordings that differ for another reason than a slip still do.
+            if (
+                before.rough
+                and found.between
+                and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER)
+            ):
+                break
+            slips.append(team._measured(log, found))
+        if not slips:
+            return replace(self, clocks_left=left)
+        team = self._fitted(log, clocks, raw, edited(edit, slips))
+        return replace(team, findings=tuple(slip.finding(log) for slip in slips), clocks_left=left)
+
+    def _clock_errors(self, log: TeamLog) -> ClockErrors:
+        """Return what clocks seem to be off by in single recordings."""
+        left, start = [], 0
+        for part in self.parts:
+            rows = slice(start, start + len(part))
+            start += len(part)
+            left.append(Left(part.time, part.seen, self.fit.rows.residual[rows], self.fit.rows.data.twists[rows]))
+        return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
+
+    def _slip(self) -> SlipAt | None:
+        best, start = None, 0
+        apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
+        for number, part in enumerate(self.parts):
+            rows = slice(start, start + len(part))
+            start += len(part)
+            slip = find_slip(apart[rows], part.seen, part.rate, noise)
+            if slip is not None and (best is None or slip.score > best.slip.score):
+                best = SlipAt(number, float(part.time[slip.row]), slip)
+        return best if best is not None else slip_between(self.parts, apart)
+
+    def _measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
+        """Return the slip with its time and step renewed against the others' motion."""
+        parts = stretches(log, self.late)
+        if found.between:
+            return step_between(found, parts, self._off(parts))
+        raw = parts[found.recording]
+        start = sum(len(part) for part in self.parts[: found.recording])
+        apart = self.residuals(raw, start)[:, found.slip.robot]
+        noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
+        return found.renewed(apart, raw.seen[:, found.slip.robot], raw, noise)
+
+    @cached_property
+    def rough(self) -> bool:
+        """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
+        path = self.fit.team.motion
+        middle = Rotation.nearest(path.rotation.matrix.mean(0))
+        turned = float(np.sqrt((turns_between(middle, path.rotation) ** 2).mean()))
+        moved = float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))
+        return bool((self.fit.noise > LOUD * np.array([turned, moved])).any())
+
+    def gravity(self, log: TeamLog) -> Array:
+        """Return gravity (3,) [m/s^2] in the reference home."""
+        return mean_gravity(log, self.fit.team.homes)
+
+    def level(self, log: TeamLog) -> Array:
+        """Return the direction of gravity over how well it is known (N, 3), as in `Spread`."""
+        team, said = self.fit.team, _down(log)
+        mean = team.motion.rotation.inverse().matrix.mean(0)
+        seen = np.einsum("ab,nbc,nc->na", mean, team.homes.rotation.matrix, said)
+        own = seen[log.names.index(log.reference)]
+        apart = np.linalg.norm(seen - own, axis=1, keepdims=True)
+        told = said.any(1, keepdims=True) & own.any()
+        return np.where(told, team.grasps.rotation.inverse().apply(seen) / np.hypot(LEVEL, apart), 0.0)
+
+    def residuals(self, raw: Stretch, start: int) -> Array:
+        """Return rotation vector and position (T, N, 6) from where the team says to what was measured, used or not."""
+        motion = self.fit.team.motion[np.minimum(start + np.arange(len(raw)), len(self.fit.team.motion.position) - 1)]
+        G, Z = self.fit.team.grasps, self.fit.team.homes
+        return pose_rows.residuals(
+            raw.poses.rotation.matrix, raw.poses.position, raw.seen, G.rotation.matrix, G.position, Z.rotation.matrix,
+            Z.position, motion.rotation.matrix, motion.position,
+        )  # fmt: skip
+
+    def off(self, log: TeamLog) -> list[Array]:
+        """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
+        left = self._off(stretches(log, self.late)) / np.repeat(self.fit.noise, 3, axis=1)
+        each = np.sqrt((left**2).mean(-1))
+        return np.split(each, np.cumsum([len(part) for part in self.parts])[:-1])
+
+    def _off(self, parts: tuple[Stretch, ...]) -> Array:
+        """Return the residuals (T, N, 6) of recordings one after the other."""
+        starts = np.cumsum([0, *(len(part) for part in self.parts)])
+        return np.concatenate([self.residuals(raw, int(start)) for raw, start in zip(parts, starts, strict=False)])
+
+    def rows(self, log: TeamLog, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
+        """Return the rows of every recording beside the residuals (T, N, 6) of their poses, and a row's covariance.
+
+        The covariance (6, 6) is that of the path, in the balance frame's axes.
+        """
+        gravity, fit = self.gravity(log), self.fit
+        frame = balance_frame(fit.team.grasps)
+        noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", fit.J, fit.W, fit.J))
+        noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
+        out, start, residual = [], 0, fit.rows.residual
+        for part in self.parts:
+            rows = slice(start, start + len(part))
+            start += len(part)
+            body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
+            out.append((body, residual[rows]))
+        return out, noise
+
+
+def _later(late: Mapping[str, float], fit: PoseFit) -> dict[str, float]:
+    """Return how late each clock is [s] with what a fit found."""
+    return {name: before + float(more) for (name, before), more in zip(late.items(), fit.team.delays, strict=True)}
+
+
+def _followed(data: TeamMotion, fit: PoseFit) -> Team:
+    """Return the team of a fit with the motion that its grasps and homes give the rows of `data`."""
+    seen = replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes), delays=0 * fit.team.delays)
+    return Rows.settled(data, seen, fit.noise, FOLLOWED).team
+
+
+def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
+    """Return how each grasp's pose moves (T, N, 6) in its own axes per second that its stamps are late.
+
+    At the ends of recordings, where only one side is known, it stays zero.
+    """
+    J, start, out = adjoint_inverse(team.grasps), 0, []
+    for part in parts:
+        motion = team.motion[start : start + len(part)]
+        start += len(part)
+        half = max(1, round(0.05 * part.rate))
+        twist = np.zeros((len(part), 6))
+        if len(part) > 2 * half:
+            between = twists_between(motion[: -2 * half], motion[2 * half :])
+            twist[half:-half] = between * (part.rate / (2 * half))
+        out.append(-(twist @ J.reshape(-1, 6).T).reshape(len(part), -1, 6))
+    return np.concatenate(out)
+
+
+def _down(log: TeamLog) -> Array:
+    """Return the direction of gravity (N, 3) in every home, zero where the base does not tell it."""
+    said = [np.zeros(3) if r.gravity is None else r.gravity / np.linalg.norm(r.gravity) for r in log.robots]
+    return np.array(said)
+
+
+def mean_gravity(log: TeamLog, homes: Pose) -> Array:
+    """Return gravity (3,) [m/s^2] in the reference home: the mean of what the robots' level bases say."""
+    said = [homes[i].rotation.apply(r.gravity) for i, r in enumerate(log.robots) if r.gravity is not None]
+    if not said:
+        raise CannotAnswer("somebody must know where gravity points: give [team] gravity for level bases.")
+    size = np.mean([np.linalg.norm(one) for one in said])
+    mean = np.mean(said, axis=0)
+    return np.asarray(mean * (size / np.linalg.norm(mean)))

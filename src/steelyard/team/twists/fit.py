@@ -1,0 +1,320 @@
+"""Joint maximum likelihood over all grasps from the scatter of twists, for bases that move.
+
+    y_i(t) = Ad(G_i^-1) V(t) + n_i,   n_i ~ N(0, W_i^-1),
+V the payload's twist in the reference grasp. With J the stack of Ad(G_i^-1), V is eliminated: the likelihood is
+tr(P S), P = W - W J (J^T W J)^-1 J^T W. A step d_i of grasp i in its own axes moves its predicted twist by ad(y_i) d_i,
+linear in y, so that gradient and information of a Gauss-Newton step come from S exactly.
+Source: own; Lynch and Park for ad.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numba
+import numpy as np
+from scipy.linalg import LinAlgError, cho_factor, cho_solve
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.logs.log import Integers, Mask
+from steelyard.spatial import Pose, Rotation, axial_vector, cross_matrix
+from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
+from steelyard.team.poses.covariance import Spread
+from steelyard.team.poses.fit import EXACT
+from steelyard.team.poses.noise import noise_of_scatter
+from steelyard.team.poses.solver import SHOWN
+from steelyard.team.poses.start import NOISE_SHARE
+from steelyard.team.twists.statistic import TwistScatter
+
+STEPS = 25
+# Turns about the one axis of rotation that are tried where it is the only one; below this share a second axis is none.
+TURNS, ONE_AXIS = 24, 0.1
+
+
+def _ad() -> Array:
+    """Return A (6, 6, 6) with ad(y)[c, a] = A[c, a, k] y_k."""
+    out = np.zeros((6, 6, 6))
+    for k in range(3):
+        turn = cross_matrix(np.eye(3)[k])
+        out[:3, :3, k] = out[3:, 3:, k] = out[3:, :3, 3 + k] = turn
+    return out
+
+
+AD = _ad()
+# Where its entries are that are not zero, and what they are.
+PLACES, SIGNS = np.argwhere(AD != 0).astype(np.int64), AD[AD != 0]
+
+
+@dataclass(frozen=True, eq=False)
+class TwistFit:
+    """The optimum: grasps (N,), noise (N, 2) [rad/s, m/s], spread, and delays (N,) [s] with standard deviations.
+
+    left  how long the last step was, in standard deviations: next to nothing unless STEPS were too few
+    """
+
+    grasps: Pose
+    noise: Array
+    spread: Spread
+    delays: Array
+    delay_std: Array
+    left: float
+
+
+def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> TwistFit:
+    """Return the joint optimum. Raises CannotAnswer where two robots never spoke together.
+
+    level  (N, 3, 3) sums of the direction of gravity in the reference grasp times that in each, zero where not told:
+           it decides where to start about axes that no turn shows
+    """
+    merged = data.merged()
+    grasps = first_grasps(merged, reference, names, level)
+    unknown = np.concatenate([6 * i + np.arange(6) for i in range(data.count) if i != reference])
+    noise = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), np.full((data.count, 2), 1e-2))
+    for _ in range(STEPS):
+        new = noise_of_scatter(*_full(merged), adjoint_inverse(grasps), noise)
+        quiet = np.abs(np.log(new / noise)).max() < EXACT.noise
+        noise = new
+        H, g, floor = _normal(merged, grasps, noise)
+        step = _step(H, g, floor, unknown)
+        gained = max(float(step @ g[unknown]), 0.0)
+        if quiet and gained < EXACT.chi2:
+            break
+        full = np.zeros(6 * data.count)
+        full[unknown] = step
+        grasps = grasps @ exp(full.reshape(-1, 6))
+    inverse, lost = _shown(H, floor, unknown)
+    factor = np.sqrt(_inflation(data, grasps, noise, H + floor, unknown))
+    size = factor[(unknown % 6) // 3]
+    covariance = inverse @ ((H + floor)[np.ix_(unknown, unknown)] * np.outer(size, size)) @ inverse
+    spread = np.zeros((6 * data.count, 6 * data.count))
+    spread[np.ix_(unknown, unknown)] = covariance
+    blind = np.zeros((6 * data.count, lost.shape[1]))
+    blind[unknown] = lost
+    turn = adjoint(grasps)
+    turn[:, 3:, :3] = 0.0
+    delays, std = _delays(merged, grasps, noise, reference)
+    return TwistFit(grasps, noise, Spread(spread, blind, std, turn), delays, std, float(np.sqrt(gained)))
+
+
+def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[Array, Array]:
+    """Return the payload's twist (T, 6) in R from those of all grasps (T, N, 6), and its covariance for a full row."""
+    J, W = adjoint_inverse(grasps), np.repeat(noise**-2.0, 3, axis=1)
+    each = np.einsum("nka,nk,nkb->nab", J, W, J)
+    info = np.einsum("tn,nab->tab", seen.astype(float), each) if not seen.all() else np.array([each.sum(0)])
+    pull = np.einsum("nka,nk,tnk->ta", J, W, twist * seen[..., None])
+    some: Mask = np.asarray(seen.any(1)) if len(info) > 1 else np.ones(1, np.bool_)
+    inverse = np.linalg.inv(np.where(some[:, None, None], info, np.eye(6)))
+    return np.einsum("tab,tb->ta", np.broadcast_to(inverse, (len(twist), 6, 6)), pull), np.linalg.inv(each.sum(0))
+
+
+def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> Pose:
+    """Return the star of pairs with the reference, in closed form from the scatter; `level` as in `fit_twists`."""
+    turns, places = [], []
+    for i in range(data.count):
+        if i == reference:
+            turns.append(np.eye(3))
+            places.append(np.zeros(3))
+            continue
+        S = data.pair(reference, i)
+        if not S.any():
+            raise CannotAnswer(_never_together(data, reference, i, names))
+        R, p = _pair(S, np.zeros((3, 3)) if level is None else level[i])
+        turns.append(R)
+        places.append(p)
+    return Pose(Rotation(np.stack(turns)), np.stack(places))
+
+
+def _never_together(data: TwistScatter, reference: int, i: int, names: tuple[str, ...]) -> str:
+    """Say why no row has the twists of two robots."""
+    for k in (i, reference):
+        if not data.spoke[:, k].any():
+            return (
+                f"'{names[k]}' gives no twists while others move: give its angular_velocity and linear_velocity, or, "
+                'if its base stands, its poses without base = "moving".'
+            )
+    return f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; record them together."
+
+
+def _pair(S: Array, level: Array) -> tuple[Array, Array]:
+    """Return rotation (3, 3) and position (3,) of the second robot's grasp in the first's from their scatter."""
+    w_w, v_v = S[:3, 6:9], S[3:6, 9:12]
+    values, axes = np.linalg.eigh(S[:3, :3])
+    candidates = [Rotation.aligning(w_w).matrix, Rotation.aligning(v_v).matrix]
+    one = values[1] < ONE_AXIS**2 * values[2]
+    if level.any() and (one or values[1] < NOISE_SHARE * _turned(S, candidates[0]) / 3):
+        return _upright(S, level, candidates, axes[:, 2])
+    if one:
+        for angle in np.arange(1, TURNS) * (2 * np.pi / TURNS):
+            candidates.append(Rotation.exp(angle * axes[:, 2]).matrix @ candidates[0])
+    found = [_position(S, R) for R in candidates]
+    best = int(np.argmin([cost for _, cost in found]))
+    return candidates[best], found[best][0]
+
+
+def _upright(S: Array, level: Array, candidates: list[Array], axis: Array) -> tuple[Array, Array]:
+    """Return rotation and position where turns do not show the rotation, and gravity shows some of it."""
+    size, told = float(np.trace(S[:3, :3])), float(np.linalg.svd(level, compute_uv=False).sum())
+    turning = S[:3, 6:9] / max(size, 1e-300) + level / told
+    moving = S[3:6, 9:12] / max(float(np.trace(S[3:6, 3:6])), 1e-300)
+    upright = Rotation.aligning(turning).matrix
+    vertical = np.linalg.svd(level)[0][:, 0]
+    every = [*candidates, upright, Rotation.aligning(turning + moving).matrix]
+    for about in (axis, vertical):
+        turns = Rotation.exp(np.arange(1, TURNS)[:, None] * (2 * np.pi / TURNS) * about).matrix
+        every += list(turns @ upright)
+    found = [_position(S, R) for R in every]
+    tilted = [2 * (1 - float((R * level).sum()) / told) for R in every]
+    best = int(np.argmin([cost + tilt for (_, cost), tilt in zip(found, tilted, strict=True)]))
+    return every[best], found[best][0]
+
+
+def _turned(S: Array, R: Array) -> float:
+    """Return what a rotation leaves of the turns."""
+    return float(np.trace(S[:3, :3]) + np.trace(S[6:9, 6:9]) - 2 * np.trace(R @ S[6:9, :3]))
+
+
+def _position(S: Array, R: Array) -> tuple[Array, float]:
+    """Return p that makes v_i - R v_j = -[R w_j] p hold best, and what is left with the misfit of the rotation."""
+    q_q = R @ S[6:9, 6:9] @ R.T
+    # Columns are q = R w_j, rows u = v_i - R v_j.
+    u_q = (S[3:6, 6:9] - R @ S[9:12, 6:9]) @ R.T
+    u_u = S[3:6, 3:6] - S[3:6, 9:12] @ R.T - R @ S[9:12, 3:6] + R @ S[9:12, 9:12] @ R.T
+    A = np.trace(q_q) * np.eye(3) - q_q
+    # -sum [q]^T u = sum q x u, entry by entry.
+    b = axial_vector(u_q)
+    p = np.linalg.solve(A + (1e-3 * np.trace(A) + 1e-300) * np.eye(3) * 1e-3, b)
+    left = float(np.trace(u_u) - 2 * p @ b + p @ A @ p)
+    turned = _turned(S, R)
+    return p, left / max(np.trace(S[3:6, 3:6]), 1e-300) + turned / max(np.trace(S[:3, :3]), 1e-300)
+
+
+def _full(merged: TwistScatter) -> tuple[Array, float]:
+    """Return the scatter of rows in which all spoke, or of the pattern with most rows, and how many those are."""
+    best = int(np.argmax(merged.rows * merged.spoke.all(1)))
+    size = 6 * merged.count
+    return merged.scatter[best][:size, :size], float(merged.rows[best] if merged.spoke[best].all() else 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class _Split:
+    """What of measured twists y (6 N) is the payload's, J c with c = A^-1 (W J)^T y, and what is left, W y - W J c.
+
+    W  (6 N,) weights, zero for robots that did not speak     J, WJ  (6 N, 6)     inner  A^-1 (6, 6)
+    """
+
+    W: Array
+    J: Array
+    WJ: Array
+    inner: Array
+
+    @classmethod
+    def of(cls, spoke: Array, grasps: Pose, noise: Array) -> _Split:
+        W = (np.repeat(noise**-2.0, 3, axis=1) * spoke[:, None]).ravel()
+        J = adjoint_inverse(grasps).reshape(-1, 6) * np.repeat(spoke, 6)[:, None]
+        WJ = J * W[:, None]
+        return cls(W, J, WJ, np.asarray(np.linalg.inv(WJ.T @ J), dtype=np.float64))
+
+    @property
+    def P(self) -> Array:
+        """The weight (6 N, 6 N) of twists with the payload's eliminated."""
+        return np.diag(self.W) - self.WJ @ self.inner @ self.WJ.T
+
+    def scores(self, y: Array) -> Array:
+        """Return sum ad(y_i)^T (P y)_i (6 N,) of twists with scatter y (6 N, 6 N)."""
+        c = self.inner @ (self.WJ.T @ y)
+        left, count = self.W[:, None] * y - self.WJ @ c, len(self.W) // 6
+        # (P y) (J c)^T with c = A^-1 (W J)^T y: only the blocks of a grasp with itself.
+        mixed = (left @ self.WJ @ self.inner).reshape(count, 6, 6) @ self.J.reshape(count, 6, 6).swapaxes(1, 2)
+        return np.asarray(np.einsum("cak,nck->na", AD, mixed).ravel())
+
+
+def _normal(merged: TwistScatter, grasps: Pose, noise: Array) -> tuple[Array, Array, Array]:
+    """Return information, gradient of all steps (6 N), and what noise alone would add to the information."""
+    size = 6 * merged.count
+    H, g, floor = np.zeros((size, size)), np.zeros(size), np.zeros((size, size))
+    for S, rows, spoke in zip(merged.scatter, merged.rows, merged.spoke, strict=True):
+        split, y = _Split.of(spoke, grasps, noise), S[:size, :size]
+        P, fitted = split.P, split.J @ split.inner
+        payload = split.WJ.T @ y @ split.WJ
+        H += contracted(P, fitted @ payload @ fitted.T, PLACES, SIGNS)
+        floor += contracted(P, rows * (fitted @ split.J.T), PLACES, SIGNS)
+        g += split.scores(y)
+    return H - floor, g, floor
+
+
+@numba.njit(cache=True)
+def contracted(P: Array, S: Array, places: Integers, signs: Array) -> Array:
+    """Return sum_t ad(y_i)^T P_ij ad(y_j) for y with scatter S (6 N, 6 N), from the entries of ad that are not zero."""
+    count = len(P) // 6
+    out = np.zeros_like(P)
+    for i in range(count):
+        for j in range(count):
+            for m in range(len(signs)):
+                c, a, k = places[m]
+                for n in range(len(signs)):
+                    d, b, e = places[n]
+                    entry = P[6 * i + c, 6 * j + d] * S[6 * i + k, 6 * j + e]
+                    out[6 * i + a, 6 * j + b] += signs[m] * signs[n] * entry
+    return out
+
+
+def _step(H: Array, g: Array, floor: Array, unknown: Array) -> Array:
+    """Return the step in the unknown parameters, in the directions that are shown."""
+    inner = H[np.ix_(unknown, unknown)]
+    try:
+        # All are shown where the information exceeds SHOWN^2 times that of noise along every direction.
+        np.linalg.cholesky(inner - SHOWN**2 * floor[np.ix_(unknown, unknown)])
+        return np.asarray(cho_solve(cho_factor(inner, lower=True), g[unknown]))
+    except LinAlgError:
+        return np.asarray(_shown(H, floor, unknown)[0] @ g[unknown])
+
+
+def _shown(H: Array, floor: Array, unknown: Array) -> tuple[Array, Array]:
+    """Return the inverse and the lost directions of the unknown steps.
+
+    A direction is lost where its information is less than SHOWN^2 times what noise alone seems to say of it.
+    """
+    H, floor = H[np.ix_(unknown, unknown)], floor[np.ix_(unknown, unknown)]
+    try:
+        np.linalg.cholesky(H - SHOWN**2 * floor)
+        return np.asarray(np.linalg.inv(H)), np.zeros((len(unknown), 0))
+    except LinAlgError:
+        root = np.linalg.cholesky(floor + 1e-12 * np.diag(np.diag(floor) + 1e-300))
+    back = np.linalg.inv(root)
+    values, vectors = np.linalg.eigh(back @ H @ back.T)
+    basis = back.T @ vectors
+    shown = values > SHOWN**2
+    return (basis[:, shown] / values[shown]) @ basis[:, shown].T, basis[:, ~shown]
+
+
+def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown: Array) -> Array:
+    """Return how much larger than for white noise the scores of whole windows scatter, for rotation and position."""
+    size = 6 * data.count
+    windows = np.zeros((int(data.window.max()) + 1, size))
+    for S, spoke, window in zip(data.scatter, data.spoke, data.window, strict=True):
+        windows[window] += _Split.of(spoke, grasps, noise).scores(S[:size, :size])
+    if len(windows) < 4:
+        return np.ones(2)
+    ratio = (windows**2).sum(0)[unknown] / np.maximum(np.diag(H)[unknown], 1e-300)
+    kind = (unknown % 6) // 3
+    return np.array([max(float(ratio[kind == k].mean()), 1.0) for k in range(2)])
+
+
+def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) -> tuple[Array, Array]:
+    """Return how late every clock is (N,) [s] and its standard deviation, beside known grasps."""
+    count = merged.count
+    size = 6 * count
+    H, g = np.zeros((count, count)), np.zeros(count)
+    for S, spoke in zip(merged.scatter, merged.spoke, strict=True):
+        split = _Split.of(spoke, grasps, noise)
+        P, fitted = split.P, split.J @ split.inner
+        rate = fitted @ (split.WJ.T @ S[size:, size:] @ split.WJ) @ fitted.T
+        H += (P * rate).reshape(count, 6, count, 6).sum((1, 3))
+        mixed = P @ (S[:size, size:] @ split.WJ)
+        g -= np.einsum("ak,ak->a", mixed, fitted).reshape(count, 6).sum(1)
+    others = np.arange(count) != reference
+    delays, std = np.zeros(count), np.zeros(count)
+    inverse = np.linalg.pinv(H[np.ix_(others, others)], hermitian=True)
+    delays[others], std[others] = inverse @ g[others], np.sqrt(np.maximum(np.diag(inverse), 0))
+    return delays, std

@@ -1,0 +1,148 @@
+"""A team whose bases move: grasps and clocks from twists, and the rows that its payload is weighed by."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Pose
+from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
+from steelyard.team.twists.rows import TwistStretch, twist_stretches
+from steelyard.team.twists.statistic import TwistScatter, rates_of_change
+
+# Clocks are moved where they are off by more than this [s] and so many standard deviations, and then until the last
+# step is below the shares of both.
+PUNCTUAL, DOUBTED, SETTLED = 2e-4, 4.0, 0.05
+CLOCK_ROUNDS = 10
+# A level sensor, or a base that is said to be level, is so to within this [rad].
+LEVEL = 0.02
+# Noise above this share of the motion: robots disagree.
+LOUD = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class TwistTeam:
+    """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s].
+
+    clocks_left  what clocks seem to be off by in single recordings
+    """
+
+    parts: tuple[TwistStretch, ...]
+    fit: TwistFit
+    late: Mapping[str, float]
+    clocks_left: ClockErrors = NOTHING
+
+    @classmethod
+    def of(cls, log: TeamLog, clocks: bool) -> TwistTeam:
+        """Return the joint fit; raises CannotAnswer where twists or rows in common are missing."""
+        reference = log.names.index(log.reference)
+        late = dict.fromkeys(log.names, 0.0)
+        for left in reversed(range(CLOCK_ROUNDS)):
+            parts = twist_stretches(log, late)
+            fit = fit_twists(TwistScatter.of(parts), reference, log.names, _level_pairs(parts, reference))
+            enough = (SETTLED if any(late.values()) else 1.0) * np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)
+            settled = bool((np.abs(fit.delays) < enough).all())
+            # What is told of clocks is what the rows and the fit were made with.
+            if not (clocks and left) or settled:
+                break
+            late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
+        team = cls(parts, fit, late)
+        return replace(team, clocks_left=team._clock_errors(log)) if clocks else team
+
+    def _clock_errors(self, log: TeamLog) -> ClockErrors:
+        """Return what clocks seem to be off by in single recordings."""
+        J, W, left = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), []
+        for part in self.parts:
+            slope = -rates_of_change(part)
+            apart = self._left(part)[0] - slope * self.fit.delays[:, None]
+            left.append(Left(part.rows.time, part.seen, apart, slope))
+        return clock_errors(log, tuple(left), J, W)
+
+    @property
+    def rough(self) -> bool:
+        """Whether twists err by a good part of what they are."""
+        square = sum((part.twist**2 * part.seen[..., None]).sum((0, 1)) for part in self.parts)
+        rows = sum(int(part.seen.sum()) for part in self.parts)
+        size = np.sqrt(square.reshape(2, 3).sum(1) / (3 * rows))
+        return bool((self.fit.noise > LOUD * size).any())
+
+    @property
+    def share(self) -> Array:
+        """Noise (N, 2) as a share of each robot's twists (rms), turning and moving; all of what does not move."""
+        square = sum((part.twist**2 * part.seen[..., None]).sum(0).reshape(-1, 2, 3).sum(2) for part in self.parts)
+        rows = sum(part.seen.sum(0) for part in self.parts)
+        size = np.sqrt(square / (3 * np.maximum(rows, 1))[:, None])
+        return np.asarray(np.divide(self.fit.noise, size, out=np.ones_like(size), where=size > 0))
+
+    def down(self) -> Array | None:
+        """Return the mean direction of gravity (3,) in R, None where nobody can tell it."""
+        told = [(_down(part, self.fit.grasps)) for part in self.parts]
+        rows = np.concatenate([down[level] for down, level in told])
+        if not len(rows):
+            return None
+        mean = rows.mean(0)
+        return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
+
+    def level(self, reference: int) -> Array:
+        """Return the line of gravity over how well it is known (N, 3), as in `Spread`."""
+        pairs = _level_pairs(self.parts, reference)
+        seen = np.linalg.svd(pairs[reference])[0][:, 0] @ pairs
+        size = np.linalg.norm(pairs, axis=(1, 2))
+        # Of unit vectors, half the squared distance is one less their product.
+        apart = 1 - np.einsum("nab,nab->n", self.fit.grasps.rotation.matrix, pairs) / np.maximum(size, 1e-300)
+        known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
+        return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
+
+    def _left(self, part: TwistStretch) -> tuple[Array, Array, Array]:
+        """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6)."""
+        fused, covariance = fused_twist(part.twist, part.seen, self.fit.grasps, self.fit.noise)
+        moved = np.einsum("nij,tj->tni", adjoint_inverse(self.fit.grasps), fused)
+        return (part.twist - moved) * part.seen[..., None], fused, covariance
+
+    def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
+        """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
+
+        The covariance (6, 6) is that of the fused twist, in the balance frame's axes.
+        """
+        grasps = self.fit.grasps
+        frame = balance_frame(grasps)
+        into = adjoint_inverse(frame)
+        out = []
+        for part in self.parts:
+            left, fused, covariance = self._left(part)
+            down, level = _down(part, frame.inverse() @ grasps)
+            known = level & (part.seen.any(1) | (part.rows.kind == "still"))
+            out.append((from_twists(part.rows, fused @ into.T, -down, known, highest_hz), left))
+        if not any(_down(part, grasps)[1].any() for part in self.parts):
+            raise CannotAnswer(
+                "somebody must know where gravity points: give a gravity channel of a robot whose base moves, or "
+                "[team] gravity for a level base that stands."
+            )
+        return out, into @ covariance @ into.T
+
+
+def _level_pairs(parts: tuple[TwistStretch, ...], reference: int) -> Array:
+    """Return sums (N, 3, 3) of the direction of gravity in the reference grasp times that in each."""
+    out = np.zeros((parts[0].level.shape[1], 3, 3))
+    for part in parts:
+        size = np.linalg.norm(part.down, axis=2, keepdims=True)
+        unit = np.divide(part.down, size, out=np.zeros_like(part.down), where=(size > 0) & part.level[..., None])
+        out += np.einsum("ta,tnb->nab", unit[:, reference], unit)
+    return out
+
+
+def _down(part: TwistStretch, X_BG: Pose) -> tuple[Array, Mask]:
+    """Return gravity (T, 3) in B as the robots that can tell it say on average, and in which rows (T,) one can."""
+    each = np.einsum("nij,tnj->tni", X_BG.rotation.matrix, part.down) * part.level[..., None]
+    count = part.level.sum(1)
+    return each.sum(1) / np.maximum(count, 1)[:, None], np.asarray(count > 0)
