@@ -284,7 +284,7 @@ def needs_twists(log: TeamLog) -> bool:
 
 
 def _groups(made: list[tuple[BodyRows, Array]], noise: Array, highest_hz: float, order: int) -> tuple[Group, ...]:
-    """Return the recordings with complete wrenches in two groups, at rest and in motion; `order` of models."""
+    """Return the recordings with complete wrenches in two groups, at rest and in motion; order 2: poses, 1: twists."""
     out = []
     for still in (True, False):
         some = [(body, left) for body, left in made if body.runs and body.still == still]
