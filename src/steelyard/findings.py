@@ -40,7 +40,7 @@ REMEDIES: dict[str, str] = {
     "centroids-coplanar": "Move between the poses as well, or merge parts of the same material.",
     "more-parts-than-rank": "Merge parts of the same material, or turn the object faster between the poses.",
     "surface-open": "Close the surface: weld equal vertices, fill holes, or scan the missing side.",
-    "views-disagree": "Check fx, fy, cx, cy and depth_unit_m in camera.json, and that each pose belongs to its image.",
+    "views-disagree": "Check the hand-eye calibration, camera.json, and that each pose belongs to its image.",
     "object-cut": "Move the camera back, or aim it at the middle, so that most images hold the whole object.",
     "several-objects": "Scan one object at a time, or check that the one kept is the one meant.",
     "cloud-in-mm": "Give the points in metres; they were read as millimetres.",

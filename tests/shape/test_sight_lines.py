@@ -11,7 +11,7 @@ from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.depth_images import pixel_of
 from steelyard.shape.middle import middle_mean, quantile
-from steelyard.shape.table_plane import table_spreads
+from steelyard.shape.table_plane import table_planes
 from steelyard.shape.volume import enclose
 
 CAMERA = np.array([60.0, 60.0, 32.0, 24.0])
@@ -95,8 +95,10 @@ def test_the_noise_of_every_view_is_told_about_its_own_plane() -> None:
     height = 0.001 * view + 0.01 * xy[:, 0] + depth**2 * rng.normal(0, std)
     height[::40] += 0.015  # what lies on the table
     sampled = np.column_stack([xy, height, depth, view])
-    found = table_spreads(sampled, np.column_stack([xy, height]), 0.05)
-    assert found == pytest.approx([0.004, 0.008, 0.002], rel=0.2)  # the second has too few points
+    found = table_planes(sampled, np.column_stack([xy, height]), 0.05)
+    assert found[:, 0] == pytest.approx([0, 2, 3])  # the second has too few points
+    assert found[:, 1:4] == pytest.approx(np.array([[0, 0.01, 0], [0.002, 0.01, 0], [0.003, 0.01, 0]]), abs=2e-3)
+    assert found[:, 4] == pytest.approx([0.004, 0.008, 0.002], rel=0.2)
 
 
 def test_carving_twice_by_the_same_views_changes_nothing_and_needs_the_complex() -> None:

@@ -2,43 +2,87 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.common_table import slid
 from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.scene import LEAST_VIEWS, Scene, settled, surfels
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Region, Scene, object_on_table, settled, surfels
 from steelyard.shape.thinning import spread_to
 
 _STEPS = 3
-_POSE_STD = (0.005, np.radians(1.0))  # how far reported poses may be off [m, rad]
+_POSE_STD = (0.01, np.radians(2.0))  # how far reported poses may be off [m, rad]
 _DISAGREE = 2.0  # times the depth noise: views that spread less are left where they are
-_WINDOWS = (0.012, 0.006, 0.003)  # how far off the surface views may be, round by round [m]
+_WINDOWS = (0.012, 0.012, 0.006, 0.006, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
+_FAR = (0.02, 0.02, 0.02, *_WINDOWS)
 _BETTER = 0.9  # of the spread before: else the cameras are left where they are
 _MODEL = 2500  # points that views are fitted to
+_NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
+_STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
 
 
-def agreed(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float) -> tuple[Array, float, float | None]:
-    """Return patches, how far the views disagree, and the rms shift of cameras if moving them made it better.
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The object as the views have it together.
 
-    Views and the surface that they give together are fitted to each other in turn.
+    region   where it lies      patches  (N, 8) of its surface and of the table around it
+    spread   median spread of the views about the surface, in standard deviations of depth
+    crossed  share of what views say of its surface that is to have seen past it
     """
-    before = _disagreement(scene, patches)
-    if before < _DISAGREE or len(scene.R) < 2:
-        return patches, before, None
-    given, current = (scene.R, scene.p), patches
-    for window in _WINDOWS:
-        xyz, normal = _model(scene, current, window)
-        scene.R, scene.p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
-        current = surfels(scene, mask, low, pitch)
-    after = _disagreement(scene, current)
-    if after > _BETTER * before:
+
+    region: Region
+    patches: Array
+    spread: float
+    crossed: float
+
+    @classmethod
+    def by(cls, scene: Scene) -> Seen:
+        """Return what the views see from where their cameras now are; CannotAnswer where they agree on nothing."""
+        region = object_on_table(scene)
+        patches = surfels(scene, region)
+        xyz, normal = _model(scene, patches, _NEAR)
+        support = settled(scene, xyz, normal, _NEAR, 1)
+        good = support[:, 0] >= LEAST_VIEWS
+        spread = float(np.median(support[good, 2])) / (0.7 * scene.sigma) if good.any() else np.inf
+        on, past = settled(scene, xyz, normal, WINDOW, 0)[xyz[:, 2] > _STANDS_OUT * scene.sigma, :2].sum(0)
+        return cls(region, patches, spread, float(past / max(on + past, 1.0)))
+
+
+def agreed(scene: Scene, first: Seen, off: bool) -> Seen:
+    """Return what the views see, their cameras moved until they agree where that makes it better.
+
+    first  from the poses as they are
+    off    whether those are known to be wrong, since views had to be levelled; else only the spread tells
+
+    Views and the surface that they give together are fitted to each other in turn. Where poses are off, that is tried
+    from where they are and from where `slid` brings them: the less they then cross the surface, the better.
+    """
+    if len(scene.R) < 2 or (not off and first.spread < _DISAGREE):
+        return first
+    given = scene.R, scene.p
+    tries = [(_fitted(scene, first, _FAR), scene.R, scene.p)]
+    if off:
         scene.R, scene.p = given
-        return patches, before, None
-    shift = float(np.sqrt(((scene.p - given[1]) ** 2).sum(1).mean()))
-    return current, after, shift
+        slid(scene)
+        tries.append((_fitted(scene, Seen.by(scene), _WINDOWS), scene.R, scene.p))
+    best, scene.R, scene.p = min(tries, key=lambda each: each[0].crossed)
+    if not off and best.spread > _BETTER * first.spread:
+        scene.R, scene.p = given
+        return first
+    return best
+
+
+def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
+    """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
+    for window in windows:
+        xyz, normal = _model(scene, seen.patches, window)
+        scene.R, scene.p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+        seen = Seen.by(scene)
+    return seen
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
@@ -49,14 +93,6 @@ def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
     support = settled(scene, xyz, normal, window, 1)
     good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
     return xyz[good], normal[good]
-
-
-def _disagreement(scene: Scene, patches: Array) -> float:
-    """Return the median spread of the views about the surface, in standard deviations of depth."""
-    xyz, normal = _model(scene, patches, 0.005)
-    support = settled(scene, xyz, normal, 0.005, 1)
-    good = support[:, 0] >= LEAST_VIEWS
-    return float(np.median(support[good, 2])) / (0.7 * scene.sigma) if good.any() else np.inf
 
 
 def moved(

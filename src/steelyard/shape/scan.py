@@ -16,9 +16,10 @@ from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.common_table import levelled
 from steelyard.shape.image_borders import cut_off
-from steelyard.shape.registration import agreed
-from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, object_on_table, scene_of, surface_of, surfels
+from steelyard.shape.registration import Seen, agreed
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, scene_of, surface_of
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
@@ -31,6 +32,8 @@ _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour,
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
+_TABLE_OFF = 0.003  # of the table in the views, rms [m], from which on poses or camera are said to be wrong
+_STILL = 1e-9  # move of a camera that is none [m]
 _LOST = 0.1  # of where the object stands: so much without surface is not a ragged rim
 
 
@@ -71,7 +74,6 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     """
     clock = _Clock()
     scene, table = scene_of(views)
-    clock.lap("table")
     try:
         found = _surface(scene, points, clock)
     except CannotAnswer as error:
@@ -83,7 +85,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
     findings = _findings(scene, found)
     return Scan(
-        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(views), noise_std=scene.sigma,
+        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
     )  # fmt: skip
 
@@ -94,6 +96,7 @@ class _Surface:
 
     others    objects that stand beside it
     disagree  spread of the views, in depth noise
+    off       how far off the views had the table before it was levelled, rms [m]; 0 where it was not
     shift     rms move of the cameras that made them agree [m], None where none was needed
     lost      share of where the object stands without surface
     """
@@ -102,21 +105,26 @@ class _Surface:
     normal: Array
     others: int
     disagree: float
+    off: float
     shift: float | None
     lost: float
 
 
 def _surface(scene: Scene, points: int, clock: _Clock) -> _Surface:
-    mask, low, pitch, others = object_on_table(scene)
+    off = levelled(scene)
+    if off > _TABLE_OFF and likely_mistake(scene.views):
+        raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
+    clock.lap("table")
+    seen = Seen.by(scene)
     clock.lap("object")
-    patches = surfels(scene, mask, low, pitch)
-    clock.lap("surfels")
-    patches, disagree, shift = agreed(scene, patches, mask, low, pitch)
+    seen = agreed(scene, seen, off > 0)
+    moved = scene.p - (scene.X_WT.inverse() @ scene.views.X_WC).position
+    shift = float(np.sqrt((moved**2).sum(1).mean())) if np.abs(moved).max() > _STILL else None
     clock.lap("registration")
-    xyz, normal = surface_of(scene, patches, mask, low, pitch, points)
-    lost = lost_share(scene, xyz, low, pitch)
+    xyz, normal = surface_of(scene, seen.patches, seen.region, points)
+    lost = lost_share(scene, xyz, seen.region)
     clock.lap("surface")
-    return _Surface(xyz, normal, others, disagree, shift, lost)
+    return _Surface(xyz, normal, seen.region.others, seen.spread, off, shift, lost)
 
 
 class _Clock:
@@ -200,7 +208,8 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
                 f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept.",
             )
         )
-    wrong = disagree > _WRONG or (shift is not None and shift > _FAR)
+    far = shift is not None and (shift > _FAR or surface.off > _TABLE_OFF)
+    wrong = disagree > _WRONG or far
     why = " " + said if wrong and (said := likely_mistake(scene.views)) else ""
     if disagree > _WRONG:
         found.append(
@@ -211,9 +220,14 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
                 f"{why}",
             )
         )
-    if shift is not None and shift > _FAR:
-        text = f"The cameras had to be moved by {1e3 * shift:.0f} mm (rms) until the views agreed.{why}"
-        found.append(Finding.of("views-disagree", text))
+    if far:
+        found.append(
+            Finding.of(
+                "views-disagree",
+                f"The views have the table {1e3 * surface.off:.2g} mm (rms) too high or too low at the object, and the "
+                f"cameras had to be moved by {1e3 * (shift or 0.0):.2g} mm (rms) until the views agreed.{why}",
+            )
+        )
     if cut := cut_off(scene, surface.xyz):
         found.append(cut)
     if (lost := surface.lost) > _LOST:

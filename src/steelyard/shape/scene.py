@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
-from steelyard.shape.table_plane import find_table, looked_at, table_frame, table_spreads
+from steelyard.shape.table_plane import find_table, looked_at, table_frame, table_planes
 from steelyard.shape.thinning import in_cubes, spread_to
 from steelyard.shape.view_mistakes import advice
 from steelyard.shape.views import TablePlane, Views
@@ -59,6 +59,21 @@ class Scene:
         """Return what every pass over the images needs: depth, its unit, the camera and its poses."""
         return self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p
 
+    def keep(self, rows: Any) -> None:
+        """Leave out all views but those of `rows`."""
+        if len(rows) < len(self.R):
+            self.views, self.R, self.p = self.views.chosen(rows), self.R[rows], self.p[rows]
+
+
+class Region(NamedTuple):
+    """Where on the table the object lies, with a margin: mask (I, J) of cells, corner (2,) and cell [m], and how many
+    other objects stand there."""
+
+    mask: Any
+    low: Array
+    pitch: float
+    others: int
+
 
 def scene_of(views: Views) -> tuple[Scene, TablePlane]:
     """Return the images in the table's frame, and the table."""
@@ -80,14 +95,14 @@ def scene_of(views: Views) -> tuple[Scene, TablePlane]:
 
 def _depth_noise(sampled: Array, xyz: Array, unit: float, distance: float) -> float:
     """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points."""
-    spreads = table_spreads(sampled, xyz, 0.03 * distance)
+    spreads = table_planes(sampled, xyz, 0.03 * distance)[:, 4]
     # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
     found = float(np.median(spreads)) / 0.7 if len(spreads) else 0.0
     return max(found, float(unit / np.sqrt(12) / distance**2))
 
 
-def object_on_table(scene: Scene) -> tuple[Any, Array, float, int]:
-    """Return where on the table the object lies, with a margin: mask (I, J), corner (2,), cell [m]; other objects."""
+def object_on_table(scene: Scene) -> Region:
+    """Return where the largest object on the table lies; CannotAnswer where nothing stands out of it."""
     pitch = 2 * scene.pixel
     half = int(_REACH * scene.distance / pitch)
     low = np.full(2, -half * pitch)
@@ -113,24 +128,24 @@ def object_on_table(scene: Scene) -> tuple[Any, Array, float, int]:
     mine &= ~stranger
     scene.stands = label == largest
     scene.highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
-    return mine, low, pitch, others
+    return Region(mine, low, pitch, others)
 
 
-def lost_share(scene: Scene, xyz: Array, low: Array, pitch: float) -> float:
+def lost_share(scene: Scene, xyz: Array, region: Region) -> float:
     """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
     covered = np.zeros_like(scene.stands)
-    i, j = np.floor((xyz[:, :2] - low) / pitch).astype(int).T
+    i, j = np.floor((xyz[:, :2] - region.low) / region.pitch).astype(int).T
     covered[i.clip(0, len(covered) - 1), j.clip(0, covered.shape[1] - 1)] = True
     covered = ndimage.binary_dilation(covered, np.ones((3, 3)), iterations=_NEAR)
     return float((scene.stands & ~covered).sum() / scene.stands.sum())
 
 
-def surfels(scene: Scene, mask: Any, low: Array, pitch: float) -> Array:
+def surfels(scene: Scene, region: Region) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
     cell = _CELL * scene.pixel
     floor = -4 * scene.sigma - 2 * cell
     layers = int((min(scene.highest, _REACH * scene.distance) - floor) / cell) + 2
-    found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, mask, low, pitch, cell, floor, layers, scene.noise)
+    found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
     if not len(found):
         raise CannotAnswer("no object was found on the table: the views agree on no surface there.")
@@ -146,8 +161,9 @@ def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int)
     return support
 
 
-def surface_of(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float, points: int) -> tuple[Array, Array]:
+def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tuple[Array, Array]:
     """Return points (N, 3) of the object's surface and normals, settled among the views."""
+    mask = region.mask
     order = np.argsort(-patches[:, 6], kind="stable")
     rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _SEEDS * points, scene.pixel)
     xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
@@ -157,7 +173,7 @@ def surface_of(scene: Scene, patches: Array, mask: Any, low: Array, pitch: float
     table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
     level, rough = 0.0, 0.1 * scene.sigma
     object_cells = ndimage.binary_erosion(mask, np.ones((3, 3)), iterations=3)
-    cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
+    cell = np.floor((xyz[:, :2] - region.low) / region.pitch).astype(int)
     around = table & ~object_cells[cell[:, 0].clip(0, mask.shape[0] - 1), cell[:, 1].clip(0, mask.shape[1] - 1)]
     if around.sum() >= 20:
         level = float(np.median(xyz[around, 2]))

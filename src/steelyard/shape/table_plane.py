@@ -100,20 +100,21 @@ def table_frame(table: TablePlane, middle: Array) -> Pose:
 
 
 @numba.njit(cache=True, nogil=True)
-def table_spreads(sampled: Array, xyz: Array, near: float) -> Array:
-    """Return the spread (K,) of the table's points about a plane of each view's own, heights over squared depth [1/m].
+def table_planes(sampled: Array, xyz: Array, near: float) -> Array:
+    """Return the table as each view for itself has it (K, 5): number of the view, height a + b x + c y, spread.
 
     sampled  (N, 5) with the depth [m] and the number of the view in the last two columns, view by view
     xyz      (N, 3) the points in the table's frame
     near     height within which points belong to the table [m]
 
-    Least squares, points beyond three spreads left out from the second round on. Views of few points have none.
+    The spread is that of the points about the plane, heights over squared depth [1/m]. Least squares, points beyond
+    three spreads left out from the second round on. Views of few points have none.
     """
-    out, count, a = np.empty(len(xyz) // _FEW + 1), 0, 0
+    out, count, a = np.empty((len(xyz) // _FEW + 1, 5)), 0, 0
     A, b, rest = np.empty((len(xyz), 3)), np.empty(len(xyz)), np.empty(len(xyz))
     while a < len(xyz):
-        n, i = 0, a
-        while i < len(xyz) and sampled[i, 4] == sampled[a, 4]:
+        n, i, view = 0, a, sampled[a, 4]
+        while i < len(xyz) and sampled[i, 4] == view:
             if abs(xyz[i, 2]) < near:
                 scale = sampled[i, 3] ** 2
                 A[n, 0], A[n, 1], A[n, 2], b[n] = 1 / scale, xyz[i, 0] / scale, xyz[i, 1] / scale, xyz[i, 2] / scale
@@ -128,7 +129,7 @@ def table_spreads(sampled: Array, xyz: Array, near: float) -> Array:
             for j in range(n):
                 rest[j] = b[j] - A[j, 0] * plane[0] - A[j, 1] * plane[1] - A[j, 2] * plane[2]
             spread = (quantile(rest, n, 0.75) - quantile(rest, n, 0.25)) / 1.35
-        out[count] = spread
+        out[count, 0], out[count, 1:4], out[count, 4] = view, plane, spread
         count += 1
     return out[:count]
 

@@ -1,0 +1,153 @@
+"""Poses that are clearly off: every view saw the same table, and the same things standing on it.
+
+A table tells height and tilt of every view, three of six numbers, far better than an arm and its hand-eye calibration
+do. What stands on it tells the rest, coarsely here and finely in `registration`.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numba
+import numpy as np
+from scipy import ndimage
+
+from steelyard.check import Array
+from steelyard.shape import depth_images as images
+from steelyard.shape.scene import Scene
+from steelyard.shape.table_plane import table_planes
+from steelyard.spatial import Rotation
+
+_SAMPLES = (60_000, 600_000)  # pixels that tell the table, and what stands on it
+_NEAR = (0.1, 0.05, 0.05)  # of the camera's distance, round by round: points so near the table may be on it
+_ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judged by what it lifts
+_STEEPEST = np.tan(np.radians(8.0))  # tilt of a view's table that no arm's error explains
+_MOST = 0.75  # share of the views that must show the table
+_REACH = 0.5  # of the camera's distance: how far from where the cameras look things are compared
+_CAP = 0.02  # of the camera's distance: heights beyond it count alike, so that walls make no ramps in oblique views
+_BLURS = (0.020, 0.020, 0.014, 0.014, 0.010, 0.010, 0.007, 0.007, 0.005, 0.005, 0.005, 0.005)  # of the heights [m]
+_CELLS = 2.5  # of the map of heights in a blur
+_PULL = 0.02  # of what heights tell of a usual view: so much holds it where it is
+_SEEN = 0.05  # pixels in a cell, blurred, from which on its height counts as known
+
+
+def levelled(scene: Scene) -> float:
+    """Turn and lift views until the table is level in each; return how far off they had it, rms [m].
+
+    Zero, and nothing moved, where that is less than the depth noise, or where too few views show a table. Where
+    something is moved, views without a table are left out: nobody knows where they are.
+    """
+    before = _off(scene, _NEAR[0])
+    if _off(scene, _NEAR[-1]) < scene.sigma or np.isinf(before):
+        return 0.0
+    for near in _NEAR:
+        planes = _tables(scene, near)
+        view, (height, *slope) = planes[:, 0].astype(int), planes[:, 1:4].T
+        normal = np.stack([-slope[0], -slope[1], np.ones(len(view))], axis=1)
+        long = np.linalg.norm(normal, axis=1)
+        turned = np.cross(normal / long[:, None], [0.0, 0.0, 1.0])
+        over = scene.p[view, 2] - height - slope[0] * scene.p[view, 0] - slope[1] * scene.p[view, 1]
+        # About the camera itself: so a wrong orientation, the worst of the errors at the object, is undone whole.
+        scene.R[view] = Rotation.exp(turned).matrix @ scene.R[view]
+        scene.p[view, 2] = over / long
+    scene.keep(view)
+    return before
+
+
+def _off(scene: Scene, near: float) -> float:
+    """Return by how much the views have the table off the level, `_ACROSS` the middle on both sides: rms [m].
+
+    Infinite where too few of them show one.
+    """
+    planes = _tables(scene, near)
+    if len(planes) < _MOST * len(scene.R):
+        return np.inf
+    return float(np.sqrt((planes[:, 1:4] ** 2 @ [1.0, *[(_ACROSS * scene.distance) ** 2] * 2]).mean()))
+
+
+def _tables(scene: Scene, near: float) -> Array:
+    """Return the table as the views have it, those left out that have it too steep; see `table_planes`."""
+    sampled = images.sampled(*scene.images(), _stride(scene, _SAMPLES[0]))
+    planes = table_planes(sampled, sampled[:, :3].copy(), near * scene.distance)
+    return np.asarray(planes[np.hypot(planes[:, 2], planes[:, 3]) < _STEEPEST])
+
+
+def _stride(scene: Scene, pixels: int) -> int:
+    return max(1, int(np.sqrt(scene.views.depth.size / pixels)))
+
+
+def slid(scene: Scene) -> None:
+    """Slide and turn level views on the table until they have the same heights on it.
+
+    Every view by itself, to the mean of all by Gauss and Newton, from wide blurs to narrow ones. It finds its way from
+    afar and ends a millimetre or two off: a view sees what faces it, and the mean is of both sides.
+    """
+    sampled = images.sampled(*scene.images(), _stride(scene, _SAMPLES[1]))
+    half, cap = _REACH * scene.distance, max(6 * scene.sigma, _CAP * scene.distance)
+    sampled = sampled[(np.abs(sampled[:, :2]) < half).all(1)]
+    start, view = sampled[:, :2], sampled[:, 4].astype(np.int64)
+    now = np.column_stack([start, sampled[:, 2].clip(-cap, cap)])
+    moved = np.zeros((len(scene.R), 3))
+    for blur in _BLURS:
+        pitch = blur / _CELLS
+        count, total = ndimage.gaussian_filter(
+            _mapped(now, half, pitch), (0, _CELLS, _CELLS), mode="constant", output=np.float64
+        )
+        mean = np.where(count > _SEEN, total / np.maximum(count, _SEEN), np.nan)
+        H, g = _normal_equations(now, view, len(moved), mean, half, pitch, 0.25 * cap)
+        pull = _PULL * np.median(H[:, 0, 0] + H[:, 1, 1]) * np.array([1.0, 1.0, half**2])
+        moved -= np.linalg.solve(H + np.diag(pull + 1e-12), (g + pull * moved)[..., None])[..., 0]
+        # The whole is free to slide: it stays where it is.
+        moved -= moved.mean(0)
+        now[:, :2] = np.einsum("nij,nj->ni", _turns(moved)[view, :2, :2], start) + moved[view, :2]
+    scene.R = np.ascontiguousarray(_turns(moved) @ scene.R)
+    scene.p = np.einsum("vij,vj->vi", _turns(moved), scene.p)
+    scene.p[:, :2] += moved[:, :2]
+
+
+def _turns(moved: Array) -> Array:
+    """Return the rotations (V, 3, 3) about the vertical of steps (V, 3) x, y [m] and angle [rad]."""
+    return np.asarray(Rotation.exp(moved[:, 2:] * np.array([0.0, 0.0, 1.0])).matrix)
+
+
+@numba.njit(cache=True, nogil=True)
+def _mapped(points: Any, half: float, pitch: float) -> Any:
+    """Return the number of points (N, 3) in every cell of the table, and the sum of their heights: (2, I, I)."""
+    size = int(2 * half / pitch) + 1
+    out = np.zeros((2, size, size))
+    for n in range(len(points)):
+        i, j = int((points[n, 0] + half) / pitch), int((points[n, 1] + half) / pitch)
+        if 0 <= i < size and 0 <= j < size:
+            out[0, i, j] += 1
+            out[1, i, j] += points[n, 2]
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
+def _normal_equations(
+    points: Any, view: Any, views: int, mean: Any, half: float, pitch: float, huber: float
+) -> tuple[Any, Any]:
+    """Return Hessian (V, 3, 3) and gradient (V, 3), per view, of half the squares of the mean (I, I) less heights.
+
+    For steps x, y [m] and angle [rad] of the view. Differences beyond `huber` [m] weigh less; nan is not known.
+    """
+    H, g, row = np.zeros((views, 3, 3)), np.zeros((views, 3)), np.zeros(3)
+    for n in range(len(points)):
+        x, y = (points[n, 0] + half) / pitch - 0.5, (points[n, 1] + half) / pitch - 0.5
+        i, j = int(np.floor(x)), int(np.floor(y))
+        if i < 0 or j < 0 or i + 1 >= len(mean) or j + 1 >= len(mean):
+            continue
+        a, b = x - i, y - j
+        along, across = mean[i + 1, j] - mean[i, j], mean[i, j + 1] - mean[i, j]
+        bent = mean[i + 1, j + 1] - mean[i, j] - along - across
+        left = mean[i, j] + a * along + b * across + a * b * bent - points[n, 2]
+        if np.isnan(left):
+            continue
+        row[0], row[1] = (along + b * bent) / pitch, (across + a * bent) / pitch
+        row[2] = row[1] * points[n, 0] - row[0] * points[n, 1]
+        weight = min(1.0, huber / (abs(left) + 1e-12))
+        for r in range(3):
+            g[view[n], r] += weight * row[r] * left
+            for c in range(3):
+                H[view[n], r, c] += weight * row[r] * row[c]
+    return H, g

@@ -1,0 +1,98 @@
+"""Views whose poses are clearly off: the table and what stands on it tell how."""
+
+from __future__ import annotations
+
+from functools import cache
+
+import numpy as np
+import pytest
+
+from steelyard.shape.carving import carved
+from steelyard.shape.common_table import levelled, slid
+from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.scene import Scene, scene_of
+from steelyard.shape.views import Views
+from steelyard.shape.volume import enclose
+from steelyard.simulate.camera import disturbed
+from steelyard.simulate.scanning import Scanned, scan_mesh
+from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.catalogue import build
+from steelyard.workshop.finish import painted
+
+HAND_EYE = Pose(Rotation.exp(np.radians([0.6, -0.8, 0.3])), np.array([0.003, -0.002, 0.003]))
+
+
+@cache
+def pliers() -> Scanned:
+    return scan_mesh(painted(build("pliers")), 0, count=36)
+
+
+def apart(scene: Scene, true: Pose) -> tuple[float, float, float]:
+    """Return how far the views are apart: along the table and over it [m], and in tilt [rad], rms about their mean."""
+    error = Pose(Rotation.nearest(scene.R), scene.p) @ (scene.X_WT.inverse() @ true).inverse()
+    place, turn = error.position - error.position.mean(0), error.rotation.log() - error.rotation.log().mean(0)
+    return tuple(float(np.sqrt((x**2).sum(1).mean())) for x in (place[:, :2], place[:, 2:], turn[:, :2]))  # type: ignore[return-value]
+
+
+def wrong_by(views: Views, kind: str) -> Views:
+    if kind == "hand-eye":
+        return views.posed(views.X_WC @ HAND_EYE)
+    return views.posed(disturbed(views.X_WC, 4.0, 1.0, np.random.default_rng(1)))
+
+
+@pytest.mark.parametrize("kind", ["each", "hand-eye"])
+def test_the_table_tells_height_and_tilt_of_every_view(kind: str) -> None:
+    scene, _ = scene_of(wrong_by(pliers().views, kind))
+    true = pliers().views.X_WC
+    before = apart(scene, true)
+    assert before[1] > 1e-3
+    assert levelled(scene) > 1e-3
+    _, over, tilt = apart(scene, true)
+    assert over < 1e-4
+    assert tilt < np.radians(0.05)
+
+
+def test_what_stands_on_the_table_tells_the_rest_from_afar() -> None:
+    scene, _ = scene_of(wrong_by(pliers().views, "each"))
+    true = pliers().views.X_WC
+    levelled(scene)
+    assert apart(scene, true)[0] > 5e-3
+    slid(scene)
+    assert apart(scene, true)[0] < 2.5e-3
+
+
+def test_right_poses_are_left_alone() -> None:
+    scene, _ = scene_of(pliers().views)
+    R, p = scene.R.copy(), scene.p.copy()
+    assert levelled(scene) == 0.0
+    np.testing.assert_array_equal(scene.R, R)
+    np.testing.assert_array_equal(scene.p, p)
+
+
+def test_a_view_without_a_table_is_left_out_where_others_are_moved() -> None:
+    views = wrong_by(pliers().views, "each")
+    lost = Pose(Rotation.exp(np.radians([25.0, 0.0, 0.0])), np.zeros(3))
+    poses = views.X_WC.position.copy()
+    turns = views.X_WC.rotation.matrix.copy()
+    turns[7] = (views.X_WC[7] @ lost).rotation.matrix
+    scene, _ = scene_of(views.posed(Pose(Rotation(turns), poses)))
+    levelled(scene)
+    assert len(scene.R) == len(scene.views) == len(scene.p) == 35
+
+
+def volume(scan: Scan) -> float:
+    return carved(enclose(scan.cloud), scan.empty).mesh.volume
+
+
+def test_a_scan_from_poses_one_degree_off_keeps_its_volume_and_says_so() -> None:
+    found = fuse(wrong_by(pliers().views, "each"))
+    assert [finding.code for finding in found.findings] == ["views-disagree"]
+    assert "mm (rms) too high or too low" in found.findings[0].message
+    assert volume(found) == pytest.approx(volume(fuse(pliers().views)), rel=0.1)
+
+
+def test_a_scan_with_a_wrong_hand_eye_pose_keeps_its_volume() -> None:
+    found = fuse(wrong_by(pliers().views, "hand-eye"))
+    assert found.moved_m is not None
+    assert found.disagree < 1.6
+    assert volume(found) == pytest.approx(volume(fuse(pliers().views)), rel=0.1)
