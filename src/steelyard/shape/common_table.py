@@ -20,7 +20,7 @@ from steelyard.spatial import Rotation
 
 _SAMPLES = (60_000, 600_000)  # pixels that tell the table, and what stands on it
 _NEAR = (0.1, 0.05, 0.05)  # of the camera's distance, round by round: points so near the table may be on it
-_ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judged by what it lifts
+ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judged by what it lifts
 _STEEPEST = np.tan(np.radians(8.0))  # tilt of a view's table that no arm's error explains
 _MOST = 0.75  # share of the views that must show the table
 _REACH = 0.5  # of the camera's distance: how far from where the cameras look things are compared
@@ -55,14 +55,14 @@ def levelled(scene: Scene) -> float:
 
 
 def _off(scene: Scene, near: float) -> float:
-    """Return by how much the views have the table off the level, `_ACROSS` the middle on both sides: rms [m].
+    """Return by how much the views have the table off the level, `ACROSS` the middle on both sides: rms [m].
 
     Infinite where too few of them show one.
     """
     planes = _tables(scene, near)
     if len(planes) < _MOST * len(scene.R):
         return np.inf
-    return float(np.sqrt((planes[:, 1:4] ** 2 @ [1.0, *[(_ACROSS * scene.distance) ** 2] * 2]).mean()))
+    return float(np.sqrt((planes[:, 1:4] ** 2 @ [1.0, *[(ACROSS * scene.distance) ** 2] * 2]).mean()))
 
 
 def _tables(scene: Scene, near: float) -> Array:

@@ -15,6 +15,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
+from steelyard.shape.camera_error import CameraError, camera_error
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.common_table import levelled
 from steelyard.shape.image_borders import cut_off
@@ -97,6 +98,7 @@ class _Surface:
     others    objects that stand beside it
     disagree  spread of the views, in depth noise
     off       how far off the views had the table before it was levelled, rms [m]; 0 where it was not
+    camera    what that says against focal length and hand-eye calibration
     shift     rms move of the cameras that made them agree [m], None where none was needed
     lost      share of where the object stands without surface
     """
@@ -106,6 +108,7 @@ class _Surface:
     others: int
     disagree: float
     off: float
+    camera: CameraError
     shift: float | None
     lost: float
 
@@ -114,6 +117,7 @@ def _surface(scene: Scene, points: int, clock: _Clock) -> _Surface:
     off = levelled(scene)
     if off > _TABLE_OFF and likely_mistake(scene.views):
         raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
+    camera = camera_error(scene) if off else CameraError()
     clock.lap("table")
     seen = Seen.by(scene)
     clock.lap("object")
@@ -124,7 +128,7 @@ def _surface(scene: Scene, points: int, clock: _Clock) -> _Surface:
     xyz, normal = surface_of(scene, seen.patches, seen.region, points)
     lost = lost_share(scene, xyz, seen.region)
     clock.lap("surface")
-    return _Surface(xyz, normal, seen.region.others, seen.spread, off, shift, lost)
+    return _Surface(xyz, normal, seen.region.others, seen.spread, off, camera, shift, lost)
 
 
 class _Clock:
@@ -208,9 +212,11 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
                 f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept.",
             )
         )
-    far = shift is not None and (shift > _FAR or surface.off > _TABLE_OFF)
-    wrong = disagree > _WRONG or far
-    why = " " + said if wrong and (said := likely_mistake(scene.views)) else ""
+    far = shift is not None and (shift > _FAR or surface.off > _TABLE_OFF or surface.camera.focal != 1.0)
+    said = (
+        surface.camera.said(scene.views.intrinsics) or likely_mistake(scene.views) if disagree > _WRONG or far else ""
+    )
+    why = " " + said if said else ""
     if disagree > _WRONG:
         found.append(
             Finding.of(
