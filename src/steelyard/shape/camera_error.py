@@ -1,13 +1,13 @@
-"""Which one error of the camera explains how its views have the table: focal lengths, how it sits at the wrist.
+"""What of the camera explains how its views have the table: focal length, principal point, how it sits at the wrist.
 
-Every levelled view says where the table lies as its camera measures it: a direction and a distance. A wrong focal
-length tilts that the more the more obliquely the camera looks, half sin(2 e) of its share at an elevation e; a camera
-turned at the wrist tilts it by the same angle everywhere. Views of different elevations tell the two apart.
+Every levelled view says where the table lies as its camera measures it: a direction and a distance. A focal length
+that is wrong tilts that by half sin(2 e) of its share at an elevation e, a principal point by cos(e)^2, a camera
+turned at the wrist by the same angle everywhere. Views of different elevations tell them apart.
 """
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,58 +17,57 @@ from steelyard.shape.scene import Scene
 from steelyard.shape.views import Intrinsics
 from steelyard.spatial import Pose, Rotation
 
-_SURE = 6.0  # standard errors of what is named: those of so few blocks are too small by half
-_LENS = 0.02  # of the focal length: less is hardly worth a word, and passes for errors of the arm
-_TURN = np.radians(0.2)  # at the wrist, likewise
+_SURE = 6.0  # standard errors of a focal length that is believed
+_PASSES = 3.0  # of the tilts that are left: so much may errors of an arm that go with its posture pass for
+_LEAST = 0.01  # of the focal length: a lens that errs less is as good
+_TURNED = np.radians(0.2)  # at the wrist, likewise
 _EXPLAINED = 0.5  # of what is left without it: so little must be left with it
 _ROUGH = 1e-3  # of heights [m]: beyond it a view counts less
 _BLOCKS = 10  # of views one after the other, whose errors may hang together
-_LEAST = 12  # views that can tell
-# Columns of the unknowns: log of the focal length, turn and shift at the wrist, slope and height of the table.
-_FOCAL, _WRIST, _PLACE, _SLOPE, _HEIGHT = 0, slice(1, 4), slice(4, 7), slice(7, 9), 9
-_PRIOR = np.array([0.3, *[0.3] * 3, *[0.02] * 3, 0.1, 0.1, 0.1])  # standard deviations, of parts, rad, m and slopes
+_FEW = 12  # views that can tell
+# Of the unknowns: logarithm of the focal length given over the true one, principal point as the tangent of the angle
+# that it is off, turn [rad] and shift [m] of the camera at the wrist, slopes and height [m] of the table.
+_FOCAL, _POINT, _TURN, _SHIFT, _SLOPE, _HEIGHT = 0, slice(1, 3), slice(3, 6), slice(6, 9), slice(9, 11), 11
+_LENS = slice(0, 3)
+_STD = np.array([0.3, 0.1, 0.1, *[0.3] * 3, *[0.02] * 3, 0.1, 0.1, 0.1])  # of them, before anything is known
 
 
 @dataclass(frozen=True)
 class CameraError:
-    """What is wrong with the camera by the table that its views share; 1 and 0 where nothing is.
+    """What is wrong with the camera, by the table that its views share.
 
-    focal   true focal length over the given one
-    turned  angle by which the camera sits turned at the wrist [rad]
+    lens    with which they have one table, None where the given one is as good
+    turned  angle by which the camera sits turned at the wrist [rad], 0 where that explains little
     """
 
-    focal: float = 1.0
+    lens: Intrinsics | None = None
     turned: float = 0.0
-
-    def said(self, lens: Intrinsics) -> str:
-        """Return a sentence on it to whom gave the lens; "" where nothing is wrong."""
-        causes = []
-        if self.focal != 1.0:
-            causes.append(
-                f"with focal lengths times {self.focal:.3f} (fx {self.focal * lens.fx:.0f}, fy "
-                f"{self.focal * lens.fy:.0f} in camera.json)"
-            )
-        if self.turned:
-            causes.append(
-                f"with a camera turned by {np.degrees(self.turned):.1f} degrees at the wrist (calibrate hand to eye "
-                "anew)"
-            )
-        return f"{' and '.join(causes).capitalize()} the views would have one table." if causes else ""
 
 
 def camera_error(scene: Scene) -> CameraError:
-    """Return what the views, just levelled, say against focal length and hand-eye calibration."""
-    if len(scene.R) < _LEAST:
+    """Return what the views, just levelled, say against intrinsics and hand-eye calibration."""
+    if len(scene.R) < _FEW:
         return CameraError()
     given = scene.X_WT.inverse() @ scene.views.X_WC
     seen = _Tables(given, scene.R[:, 2], scene.p[:, 2], ACROSS * scene.distance)
-    free = np.ones(len(_PRIOR), bool)
-    found, left, std = seen.explained(free)
-    lens = bool(abs(found[_FOCAL]) > max(_SURE * std[_FOCAL], _LENS))
-    free[_FOCAL], free[_WRIST], free[_PLACE] = lens, False, False
-    turned = float(np.linalg.norm(found[_WRIST]))
-    turns = turned > _TURN and left < _EXPLAINED * seen.explained(free)[1]
-    return CameraError(float(np.exp(-found[_FOCAL])) if lens else 1.0, turned if turns else 0.0)
+    free = np.ones(len(_STD), bool)
+    for _ in range(2):  # the second time with what the first found of the lens, and nothing else
+        found, left, std = seen.explained(free)
+        off = np.abs(found[_LENS])
+        suspected = free[_LENS] & (off > np.maximum(_SURE * std[_LENS], _LEAST))
+        free[_LENS] = suspected & (off > _PASSES * left / seen.across)
+    lens, turned = found[_LENS] * free[_LENS], float(np.linalg.norm(found[_TURN]))
+    free[_TURN] = free[_SHIFT] = False
+    # A lens that is only suspected tilts tables as a turned camera does: then nothing is said of either.
+    plain = bool((suspected == free[_LENS]).all()) and turned > _TURNED
+    turns = plain and left < _EXPLAINED * seen.explained(free)[1]
+    return CameraError(_corrected(scene.views.intrinsics, *lens) if lens.any() else None, turned if turns else 0.0)
+
+
+def _corrected(lens: Intrinsics, log_focal: float, x: float, y: float) -> Intrinsics:
+    k, cx, cy = np.exp(-log_focal), lens.cx + x * lens.fx, lens.cy + y * lens.fy
+    inside = np.clip([cx, cy], 0.0, [lens.width - 1, lens.height - 1])
+    return replace(lens, fx=float(k * lens.fx), fy=float(k * lens.fy), cx=float(inside[0]), cy=float(inside[1]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,24 +85,21 @@ class _Tables:
     across: float
 
     def apart(self, x: Array) -> Array:
-        """Return by how much the views measure the table apart from one that all share (V, 4) [m].
-
-        x (10,) of the camera: logarithm of the focal length over the true one, turn [rad] and shift [m] at the
-        wrist; of the table: two slopes and a height [m].
-        """
+        """Return by how much the views measure the table apart from one that all share (V, 4) [m], by unknowns x."""
         R, p = self.given.rotation.matrix, self.given.position
         up = np.append(x[_SLOPE], 1.0) / np.sqrt(1 + x[_SLOPE] @ x[_SLOPE])
-        # A focal length k times too long has all points k times too near the axis, so normals lean k times as far.
-        lens = np.exp(x[_FOCAL]) * np.array([1.0, 1.0, 0.0]) + np.array([0.0, 0.0, 1.0])
-        normal = (up @ R @ Rotation.exp(x[_WRIST]).matrix) * lens
+        # What is measured at (x, y, z) is at (k (x - ex z), k (y - ey z), z): so planes m become M m.
+        k, (ex, ey) = np.exp(x[_FOCAL]), x[_POINT]
+        M = np.array([[k, 0, 0], [0, k, 0], [-k * ex, -k * ey, 1]])
+        normal = up @ R @ Rotation.exp(x[_TURN]).matrix @ M.T
         long = np.linalg.norm(normal, axis=1)
-        height = ((p + R @ x[_PLACE]) @ up - x[_HEIGHT]) / long
+        height = ((p + R @ x[_SHIFT]) @ up - x[_HEIGHT]) / long
         return np.column_stack([self.across * (normal / long[:, None] - self.normal), height - self.height])
 
     def explained(self, free: Array) -> tuple[Array, float, Array]:
-        """Return the unknowns (10,) that explain most, what they leave, rms [m], and standard errors (10,).
+        """Return the unknowns (12,) that explain most, what they leave, rms [m], and standard errors (12,).
 
-        free (10,) which are not held at zero. The errors are of blocks of views, since those of an arm hang together.
+        free (12,) which are not held at zero. The errors are of blocks of views, since those of an arm hang together.
         """
         from scipy.optimize import least_squares
 
@@ -113,13 +109,24 @@ class _Tables:
             return x
 
         def residual(y: Array) -> Array:
-            return np.append(self.apart(spread(y)).ravel(), _ROUGH * y / _PRIOR[free])
+            return np.append(self.apart(spread(y)).ravel(), _ROUGH * y / _STD[free])
 
         fit = least_squares(residual, np.zeros(int(free.sum())), loss="soft_l1", f_scale=_ROUGH)
         rest = self.apart(spread(fit.x))
-        J = fit.jac[: rest.size].reshape(len(rest), 4, -1)
-        pulls = np.einsum("vri,vr->vi", J, rest)
-        block = np.arange(len(rest)) * _BLOCKS // len(rest)
-        summed = np.stack([pulls[block == b].sum(0) for b in range(_BLOCKS)])
-        inverse = np.linalg.inv(fit.jac.T @ fit.jac)
-        return spread(fit.x), float(np.sqrt((rest**2).sum(1).mean())), spread(np.linalg.norm(summed @ inverse, axis=0))
+        std = _jackknifed(fit.jac, rest)
+        return spread(fit.x), float(np.sqrt((rest**2).sum(1).mean())), spread(std)
+
+
+def _jackknifed(J: Array, rest: Array) -> Array:
+    """Return standard errors of what J leaves as `rest` (V, 4): by how much it would be other without a block of views.
+
+    J  Jacobian, weighed as the rows were, of all `rest` and of what was known before
+    """
+    weigh = (1 + (rest / _ROUGH) ** 2) ** -0.25
+    block = np.arange(len(rest)) * _BLOCKS // len(rest)
+    rows, H = J[: rest.size].reshape(len(rest), 4, -1), J.T @ J
+    without = []
+    for b in range(_BLOCKS):
+        own = rows[block == b].reshape(-1, J.shape[1])
+        without.append(np.linalg.solve(H - own.T @ own, own.T @ (weigh * rest)[block == b].ravel()))
+    return np.asarray(np.sqrt((1 - 1 / _BLOCKS) * np.square(without).sum(0)))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -24,7 +24,7 @@ from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, scene_
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
-from steelyard.shape.views import TablePlane, Views
+from steelyard.shape.views import Intrinsics, TablePlane, Views
 
 POINTS = 3000  # of the cloud, about
 _CELLS = 8000  # of the grid under the object, about
@@ -76,7 +76,12 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock = _Clock()
     scene, table = scene_of(views)
     try:
-        found = _surface(scene, points, clock)
+        level = _levelled(scene)
+        if level.camera.lens:
+            scene, table = scene_of(replace(scene.views, intrinsics=level.camera.lens))
+        off = levelled(scene) if level.camera.lens else level.off
+        clock.lap("table")
+        found = _surface(scene, points, off > 0, clock)
     except CannotAnswer as error:
         raise CannotAnswer(" ".join(filter(None, (str(error), likely_mistake(views))))) from None
     xyz, normal, seen, spacing, bottom = _closed(scene, found.xyz, found.normal, points)
@@ -84,7 +89,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     rgb, coloured = _colours(scene, xyz, normal, seen)
     clock.lap("colour")
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, found)
+    findings = _findings(scene, found, level)
     return Scan(
         cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
@@ -97,8 +102,6 @@ class _Surface:
 
     others    objects that stand beside it
     disagree  spread of the views, in depth noise
-    off       how far off the views had the table before it was levelled, rms [m]; 0 where it was not
-    camera    what that says against focal length and hand-eye calibration
     shift     rms move of the cameras that made them agree [m], None where none was needed
     lost      share of where the object stands without surface
     """
@@ -107,28 +110,38 @@ class _Surface:
     normal: Array
     others: int
     disagree: float
-    off: float
-    camera: CameraError
     shift: float | None
     lost: float
 
 
-def _surface(scene: Scene, points: int, clock: _Clock) -> _Surface:
-    off = levelled(scene)
+@dataclass(frozen=True)
+class _Level:
+    """How far off the views had the table before they were levelled, rms [m], 0 where they were not; what that says
+    of the camera, and the lens as it was given."""
+
+    off: float
+    camera: CameraError
+    given: Intrinsics
+
+
+def _levelled(scene: Scene) -> _Level:
+    given, off = scene.views.intrinsics, levelled(scene)
     if off > _TABLE_OFF and likely_mistake(scene.views):
         raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
-    camera = camera_error(scene) if off else CameraError()
-    clock.lap("table")
+    return _Level(off, camera_error(scene) if off else CameraError(), given)
+
+
+def _surface(scene: Scene, points: int, off: bool, clock: _Clock) -> _Surface:
     seen = Seen.by(scene)
     clock.lap("object")
-    seen = agreed(scene, seen, off > 0)
+    seen = agreed(scene, seen, off)
     moved = scene.p - (scene.X_WT.inverse() @ scene.views.X_WC).position
     shift = float(np.sqrt((moved**2).sum(1).mean())) if np.abs(moved).max() > _STILL else None
     clock.lap("registration")
     xyz, normal = surface_of(scene, seen.patches, seen.region, points)
     lost = lost_share(scene, xyz, seen.region)
     clock.lap("surface")
-    return _Surface(xyz, normal, seen.region.others, seen.spread, off, camera, shift, lost)
+    return _Surface(xyz, normal, seen.region.others, seen.spread, shift, lost)
 
 
 class _Clock:
@@ -203,7 +216,7 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
+def _findings(scene: Scene, surface: _Surface, level: _Level) -> tuple[Finding, ...]:
     found, disagree, shift = [], surface.disagree, surface.shift
     if others := surface.others:
         found.append(
@@ -212,11 +225,8 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
                 f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept.",
             )
         )
-    far = shift is not None and (shift > _FAR or surface.off > _TABLE_OFF or surface.camera.focal != 1.0)
-    said = (
-        surface.camera.said(scene.views.intrinsics) or likely_mistake(scene.views) if disagree > _WRONG or far else ""
-    )
-    why = " " + said if said else ""
+    far = shift is not None and (shift > _FAR or level.off > _TABLE_OFF)
+    why = " " + said if (disagree > _WRONG or far) and (said := likely_mistake(scene.views)) else ""
     if disagree > _WRONG:
         found.append(
             Finding.of(
@@ -226,14 +236,8 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
                 f"{why}",
             )
         )
-    if far:
-        found.append(
-            Finding.of(
-                "views-disagree",
-                f"The views have the table {1e3 * surface.off:.2g} mm (rms) too high or too low at the object, and the "
-                f"cameras had to be moved by {1e3 * (shift or 0.0):.2g} mm (rms) until the views agreed.{why}",
-            )
-        )
+    if far or level.camera.lens:
+        found.append(Finding.of("views-disagree", _said_of(level, shift) + why))
     if cut := cut_off(scene, surface.xyz):
         found.append(cut)
     if (lost := surface.lost) > _LOST:
@@ -246,3 +250,19 @@ def _findings(scene: Scene, surface: _Surface) -> tuple[Finding, ...]:
             )
         )
     return tuple(found)
+
+
+def _said_of(level: _Level, shift: float | None) -> str:
+    """Return what to know of views that had the table too high or too low, after a shift [m] of the cameras."""
+    said = [f"The views have the table {1e3 * level.off:.2g} mm (rms) too high or too low at the object."]
+    if lens := level.camera.lens:
+        said.append(f"They were read with {_named(lens)} instead of {_named(level.given)}: then they have one table.")
+    if turned := level.camera.turned:
+        said.append(f"A camera turned by {np.degrees(turned):.1f} degrees at the wrist explains it.")
+    if shift:
+        said.append(f"The cameras had to be moved by {1e3 * shift:.2g} mm (rms) until the views agreed.")
+    return " ".join(said)
+
+
+def _named(lens: Intrinsics) -> str:
+    return f"fx {lens.fx:.0f}, fy {lens.fy:.0f}, cx {lens.cx:.0f}, cy {lens.cy:.0f}"

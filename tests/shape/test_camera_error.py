@@ -1,0 +1,100 @@
+"""What a shared table tells of the camera: a wrong lens, a wrong hand-eye pose, and nothing of an arm's own errors."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from steelyard.shape.camera_error import CameraError, camera_error
+from steelyard.shape.carving import carved
+from steelyard.shape.common_table import levelled
+from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.scene import scene_of
+from steelyard.shape.views import Views
+from steelyard.shape.volume import enclose
+from steelyard.simulate.camera import disturbed
+from steelyard.simulate.scanning import scan_mesh
+from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.catalogue import build
+from steelyard.workshop.finish import painted
+
+
+@cache
+def views() -> Views:
+    return scan_mesh(painted(build("pliers")), 0, count=36).views
+
+
+def seen_with(read: Views, focal: float = 1.0, cy: float = 0.0) -> Views:
+    """Return views whose description has a wrong lens."""
+    lens = read.intrinsics
+    return replace(read, intrinsics=replace(lens, fx=focal * lens.fx, fy=focal * lens.fy, cy=lens.cy + cy))
+
+
+def swayed(read: Views, std_deg: float, seed: int) -> Views:
+    """Return views of an arm whose errors change slowly along its way, as those of joints do."""
+    rng = np.random.default_rng(seed)
+    way = 2 * np.pi * np.linspace(0, 1, len(read))[:, None]
+    waves = sum(rng.normal(size=6) * np.sin(n * way + rng.uniform(0, 2 * np.pi, 6)) for n in (1, 2, 3))
+    wave = np.asarray(waves) / np.sqrt(1.5)
+    turn = Rotation.exp(np.radians(std_deg) * wave[:, :3] / np.sqrt(3))
+    return read.posed(read.X_WC @ Pose(turn, 4e-3 * std_deg * wave[:, 3:] / np.sqrt(3)))
+
+
+def told(read: Views) -> CameraError:
+    scene, _ = scene_of(read)
+    assert levelled(scene) > 0
+    return camera_error(scene)
+
+
+@pytest.mark.parametrize("focal", [0.9, 0.95, 1.03, 1.1])
+def test_the_focal_length_is_found_from_the_table_alone(focal: float) -> None:
+    lens = told(seen_with(views(), focal)).lens
+    assert lens is not None
+    assert lens.fx == pytest.approx(615, rel=0.004)
+    assert (lens.cx, lens.cy) == (320, 240)
+
+
+def test_a_principal_point_is_found_beside_a_focal_length() -> None:
+    lens = told(seen_with(views(), 1.05, 10)).lens
+    assert lens is not None
+    assert lens.fx == pytest.approx(615, rel=0.004)
+    assert lens.cy == pytest.approx(240, abs=0.6)
+
+
+def test_errors_of_the_arm_blur_the_focal_length_and_do_not_hide_it() -> None:
+    read = seen_with(views(), 1.05)
+    lens = told(read.posed(disturbed(read.X_WC, 1.0, 0.2, np.random.default_rng(1)))).lens
+    assert lens is not None
+    assert lens.fx == pytest.approx(615, rel=0.015)
+
+
+def test_a_turned_camera_is_no_wrong_lens() -> None:
+    wrong = Pose(Rotation.exp(np.radians([0.6, -0.7, 0.4])), np.array([0.003, -0.002, 0.003]))
+    found = told(views().posed(views().X_WC @ wrong))
+    assert found.lens is None
+    assert np.degrees(found.turned) == pytest.approx(1.0, abs=0.05)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_errors_of_the_arm_are_no_wrong_lens(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    assert told(views().posed(disturbed(views().X_WC, 4.0, 1.0, rng))) == CameraError()
+    assert told(swayed(views(), 0.5, seed)).lens is None
+
+
+def test_a_handful_of_views_tells_nothing() -> None:
+    assert told(seen_with(views().chosen(np.arange(0, 36, 4)), 1.1)) == CameraError()
+
+
+def volume(scan: Scan) -> float:
+    return carved(enclose(scan.cloud), scan.empty).mesh.volume
+
+
+def test_a_scan_is_read_with_the_lens_that_its_table_asks_for_and_says_so() -> None:
+    found = fuse(seen_with(views(), 1.05))
+    assert [finding.code for finding in found.findings] == ["views-disagree"]
+    assert "read with fx 615, fy 615, cx 320, cy 240 instead of fx 646" in found.findings[0].message
+    assert volume(found) == pytest.approx(volume(fuse(views())), rel=0.03)
