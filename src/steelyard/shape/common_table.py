@@ -21,6 +21,7 @@ from steelyard.spatial import Rotation
 _SAMPLES = (60_000, 600_000)  # pixels that tell the table, and what stands on it
 _NEAR = (0.1, 0.05, 0.05)  # of the camera's distance, round by round: points so near the table may be on it
 ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judged by what it lifts
+_LEVEL = 0.25  # of the depth noise: tables that are less off are level
 _STEEPEST = np.tan(np.radians(8.0))  # tilt of a view's table that no arm's error explains
 _MOST = 0.75  # share of the views that must show the table
 _REACH = 0.5  # of the camera's distance: how far from where the cameras look things are compared
@@ -34,11 +35,11 @@ _SEEN = 0.05  # pixels in a cell, blurred, from which on its height counts as kn
 def levelled(scene: Scene) -> float:
     """Turn and lift views until the table is level in each; return how far off they had it, rms [m].
 
-    Zero, and nothing moved, where that is less than the depth noise, or where too few views show a table. Where
+    Zero, and nothing moved, where that is far less than the depth noise, or where too few views show a table. Where
     something is moved, views without a table are left out: nobody knows where they are.
     """
     before = _off(scene, _NEAR[0])
-    if _off(scene, _NEAR[-1]) < scene.sigma or np.isinf(before):
+    if _off(scene, _NEAR[-1]) < _LEVEL * scene.sigma or np.isinf(before):
         return 0.0
     for near in _NEAR:
         planes = _tables(scene, near)

@@ -16,10 +16,11 @@ from steelyard.shape.thinning import spread_to
 
 _STEPS = 3
 _POSE_STD = (0.01, np.radians(2.0))  # how far reported poses may be off [m, rad]
-_DISAGREE = 2.0  # times the depth noise: views that spread less are left where they are
-_WINDOWS = (0.012, 0.012, 0.006, 0.006, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
+_APART = 0.8  # of the depth noise: views that one fit moves apart by less are left where they are, rms
+_NEARBY = 0.001  # views that one fit moves apart by less need no search [m], rms
+_FINE = (0.006, 0.006, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
+_WINDOWS = (0.012, 0.012, *_FINE)
 _FAR = (0.02, 0.02, 0.02, *_WINDOWS)
-_BETTER = 0.9  # of the spread before: else the cameras are left where they are
 _MODEL = 2500  # points that views are fitted to
 _NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
 _STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
@@ -56,33 +57,46 @@ def agreed(scene: Scene, first: Seen, off: bool) -> Seen:
     """Return what the views see, their cameras moved until they agree where that makes it better.
 
     first  from the poses as they are
-    off    whether those are known to be wrong, since views had to be levelled; else only the spread tells
+    off    whether those are known to be wrong, since views had to be levelled
 
-    Views and the surface that they give together are fitted to each other in turn. Where poses are off, that is tried
-    from where they are and from where `slid` brings them: the less they then cross the surface, the better.
+    Views and the surface that they give together are fitted to each other in turn. One such fit tells whether it is
+    worth while: how far it would move the views apart. Where poses are off by more than a little, it is tried from
+    where they are and from where `slid` brings them: the less views then cross the surface, the better.
     """
-    if len(scene.R) < 2 or (not off and first.spread < _DISAGREE):
+    if len(scene.R) < 2 or _apart(scene, first, _FINE[-1]) < _APART * scene.sigma:
         return first
-    given = scene.R, scene.p
-    tries = [(_fitted(scene, first, _FAR), scene.R, scene.p)]
-    if off:
+    given, near = (scene.R, scene.p), _apart(scene, first, _FAR[0]) < _NEARBY
+    tries = [(first, *given), (_fitted(scene, first, _FINE if near else _FAR), scene.R, scene.p)]
+    if off and not near:
         scene.R, scene.p = given
         slid(scene)
         tries.append((_fitted(scene, Seen.by(scene), _WINDOWS), scene.R, scene.p))
     best, scene.R, scene.p = min(tries, key=lambda each: each[0].crossed)
-    if not off and best.spread > _BETTER * first.spread:
-        scene.R, scene.p = given
-        return first
     return best
+
+
+def _apart(scene: Scene, seen: Seen, window: float) -> float:
+    """Return how far one fit to the surface would move apart what the views see of the object, rms [m]."""
+    R, p, xyz = _fit(scene, seen, window)
+    high = xyz[:, 2] > _STANDS_OUT * scene.sigma
+    middle = (xyz[high] if high.any() else xyz).mean(0)
+    moved = p + np.einsum("vij,vj->vi", R @ np.swapaxes(scene.R, 1, 2), middle - scene.p) - middle
+    return float(np.sqrt(moved.var(0).sum()))
 
 
 def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
     """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
     for window in windows:
-        xyz, normal = _model(scene, seen.patches, window)
-        scene.R, scene.p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+        scene.R, scene.p, _ = _fit(scene, seen, window)
         seen = Seen.by(scene)
     return seen
+
+
+def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array]:
+    """Return poses (V, 3, 3), (V, 3) that fit the views to their own surface, and the points (N, 3) of it."""
+    xyz, normal = _model(scene, seen.patches, window)
+    R, p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+    return R, p, xyz
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
