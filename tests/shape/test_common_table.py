@@ -42,7 +42,7 @@ def wrong_by(views: Views, kind: str) -> Views:
 
 @pytest.mark.parametrize("kind", ["each", "hand-eye"])
 def test_the_table_tells_height_and_tilt_of_every_view(kind: str) -> None:
-    scene, _ = scene_of(wrong_by(pliers().views, kind))
+    scene = scene_of(wrong_by(pliers().views, kind))
     true = pliers().views.X_WC
     before = apart(scene, true)
     assert before[1] > 1e-3
@@ -53,7 +53,7 @@ def test_the_table_tells_height_and_tilt_of_every_view(kind: str) -> None:
 
 
 def test_what_stands_on_the_table_tells_the_rest_from_afar() -> None:
-    scene, _ = scene_of(wrong_by(pliers().views, "each"))
+    scene = scene_of(wrong_by(pliers().views, "each"))
     true = pliers().views.X_WC
     levelled(scene)
     assert apart(scene, true)[0] > 5e-3
@@ -62,7 +62,7 @@ def test_what_stands_on_the_table_tells_the_rest_from_afar() -> None:
 
 
 def test_right_poses_are_left_alone() -> None:
-    scene, _ = scene_of(pliers().views)
+    scene = scene_of(pliers().views)
     R, p = scene.R.copy(), scene.p.copy()
     assert levelled(scene) == 0.0
     np.testing.assert_array_equal(scene.R, R)
@@ -75,7 +75,7 @@ def test_a_view_without_a_table_is_left_out_where_others_are_moved() -> None:
     poses = views.X_WC.position.copy()
     turns = views.X_WC.rotation.matrix.copy()
     turns[7] = (views.X_WC[7] @ lost).rotation.matrix
-    scene, _ = scene_of(views.posed(Pose(Rotation(turns), poses)))
+    scene = scene_of(views.posed(Pose(Rotation(turns), poses)))
     levelled(scene)
     assert len(scene.R) == len(scene.views) == len(scene.p) == 35
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import time
+from math import degrees
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -52,6 +53,7 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
         "depth_noise_m": fused.noise_std,
         "disagreement": fused.disagree,
         "cameras_moved_m": fused.moved_m,
+        "place_std": None if (placed := fused.placement) is None else {"m": placed.std_m, "rad": placed.std_rad},
         "cpu_s": round(seconds, 4),
         "stages": {name: round(value, 4) for name, value in fused.stages.items()},
         "findings": [finding.plain() for finding in fused.findings],
@@ -64,7 +66,10 @@ def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str
 
     cloud, n = fused.cloud, fused.table.normal
     size = " x ".join(f"{1e3 * length:.0f}" for length in cloud.xyz.max(0) - cloud.xyz.min(0))
-    moved = "as reported" if fused.moved_m is None else f"moved by {1e3 * fused.moved_m:.1f} mm (rms) until they agree"
+    placed, moved = fused.placement, "as reported"
+    if placed and fused.moved_m is not None:
+        unsure = f"{1e3 * placed.std_m:.2g} mm and {degrees(placed.std_rad):.2g} degrees"
+        moved = f"moved by {1e3 * fused.moved_m:.1f} mm (rms) until they agree; the cloud is placed to {unsure}"
     rows = [
         ("views", f"{fused.views}, poses {moved}"),
         ("points", f"{len(cloud)}: {fused.seen} seen, {len(cloud) - fused.seen} close the underside"),

@@ -50,6 +50,12 @@ class ShapeError:
         com, share = max(self.com_m, MEASURED.com_m), max(self.inertia_share, MEASURED.inertia_share)
         return replace(self, com_m=factor * com, inertia_share=factor * share, stretch=factor * self.stretch)
 
+    def placed(self, std_m: float, std_rad: float) -> ShapeError:
+        """Return the error with a place in the sensor that is less sure by these standard deviations."""
+        return replace(
+            self, grasp_m=float(np.hypot(self.grasp_m, std_m)), grasp_rad=float(np.hypot(self.grasp_rad, std_rad))
+        )
+
     def grasp_steps(self) -> list[Pose]:
         """Return displacements of one standard deviation along and about each axis that has one."""
         if not (self.grasp_m or self.grasp_rad):

@@ -274,15 +274,14 @@ def _shape(parts: Parts | Shape, pose: Pose | None, std: tuple[float, float] | N
         raise BadValue(
             "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
         )
-    grasp_m, grasp_rad = std or (0.0, 0.0)
-    grasp = {"grasp_m": grasp_m, "grasp_rad": grasp_rad}
+    grasp = std or (0.0, 0.0)
     if isinstance(parts, Parts):
         _require_metres(parts)
         error = MEASURED.at_least(parts.com_std, parts.stretch)
-        return (parts.in_frame(pose),), None, replace(error, **grasp)
+        return (parts.in_frame(pose),), None, error.placed(*grasp)
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(pose) for cut in cuts.parts)
-    return placed, cuts.prior, replace(parts.error, **grasp)
+    return placed, cuts.prior, parts.error.placed(*grasp)
 
 
 def _volume(parts: Parts | Shape, placed: Placed) -> tuple[float, float]:

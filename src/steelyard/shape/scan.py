@@ -15,16 +15,18 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
-from steelyard.shape.camera_error import CameraError, camera_error
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.common_table import levelled
 from steelyard.shape.image_borders import cut_off
+from steelyard.shape.lens_error import lens_by_table
+from steelyard.shape.placement import Placement, placement
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, scene_of, surface_of
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
 from steelyard.shape.views import Intrinsics, TablePlane, Views
+from steelyard.spatial import Pose, Rotation
 
 POINTS = 3000  # of the cloud, about
 _CELLS = 8000  # of the grid under the object, about
@@ -50,6 +52,7 @@ class Scan:
     noise_std  depth noise at the object's distance, found on the table [m]
     disagree   spread of the views about the surface, in depth noise: 1 where they agree
     moved_m    rms shift of the cameras by registration, None where the poses were good enough
+    placement  what moved cameras say of where the cloud lies as a whole, None where the poses were good enough
     findings   what you must know
     stages     CPU time of each step [s]
     empty      whether points (N, 3) of W are known to be outside the object
@@ -63,6 +66,7 @@ class Scan:
     noise_std: float
     disagree: float
     moved_m: float | None
+    placement: Placement | None
     findings: tuple[Finding, ...]
     stages: dict[str, float]
     empty: Callable[[Array], Any] = field(repr=False)
@@ -74,12 +78,12 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     Raises CannotAnswer where no table or no object on it is found.
     """
     clock = _Clock()
-    scene, table = scene_of(views)
+    scene = scene_of(views)
     try:
         level = _levelled(scene)
-        if level.camera.lens:
-            scene, table = scene_of(replace(scene.views, intrinsics=level.camera.lens))
-        off = levelled(scene) if level.camera.lens else level.off
+        if level.lens:
+            scene = scene_of(replace(scene.views, intrinsics=level.lens))
+        off = levelled(scene) if level.lens else level.off
         clock.lap("table")
         found = _surface(scene, points, off > 0, clock)
     except CannotAnswer as error:
@@ -88,12 +92,22 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock.lap("underside")
     rgb, coloured = _colours(scene, xyz, normal, seen)
     clock.lap("colour")
+    placed = None if found.shift is None else _placed(scene, xyz.mean(0))
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, found, level)
+    findings = _findings(scene, found, level, placed)
     return Scan(
-        cloud=cloud, spacing=spacing, table=table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
-        disagree=found.disagree, moved_m=found.shift, findings=findings, stages=clock.laps, empty=_empty(scene, bottom),
+        cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
+        disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
+        empty=_empty(scene, bottom),
     )  # fmt: skip
+
+
+def _placed(scene: Scene, middle: Array) -> Placement:
+    """Move the scene to where the reported poses have it, all together, and return how surely."""
+    found = Pose(Rotation.nearest(scene.R), scene.p)
+    placed = placement(scene.X_WT.inverse() @ scene.views.X_WC, found, middle)
+    scene.X_WT = scene.X_WT @ placed.common.inverse()
+    return placed
 
 
 @dataclass(frozen=True, eq=False)
@@ -116,19 +130,19 @@ class _Surface:
 
 @dataclass(frozen=True)
 class _Level:
-    """How far off the views had the table before they were levelled, rms [m], 0 where they were not; what that says
-    of the camera, and the lens as it was given."""
+    """How far off the views had the table before they were levelled, rms [m], 0 where they were not; the lens as it was
+    given, and the one with which they have one table, None where the given one is as good."""
 
     off: float
-    camera: CameraError
     given: Intrinsics
+    lens: Intrinsics | None
 
 
 def _levelled(scene: Scene) -> _Level:
     given, off = scene.views.intrinsics, levelled(scene)
     if off > _TABLE_OFF and likely_mistake(scene.views):
         raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
-    return _Level(off, camera_error(scene) if off else CameraError(), given)
+    return _Level(off, given, lens_by_table(scene) if off else None)
 
 
 def _surface(scene: Scene, points: int, off: bool, clock: _Clock) -> _Surface:
@@ -216,7 +230,7 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, surface: _Surface, level: _Level) -> tuple[Finding, ...]:
+def _findings(scene: Scene, surface: _Surface, level: _Level, placed: Placement | None) -> tuple[Finding, ...]:
     found, disagree, shift = [], surface.disagree, surface.shift
     if others := surface.others:
         found.append(
@@ -236,8 +250,8 @@ def _findings(scene: Scene, surface: _Surface, level: _Level) -> tuple[Finding, 
                 f"{why}",
             )
         )
-    if far or level.camera.lens:
-        found.append(Finding.of("views-disagree", _said_of(level, shift) + why))
+    if far or level.lens:
+        found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
     if cut := cut_off(scene, surface.xyz):
         found.append(cut)
     if (lost := surface.lost) > _LOST:
@@ -252,15 +266,18 @@ def _findings(scene: Scene, surface: _Surface, level: _Level) -> tuple[Finding, 
     return tuple(found)
 
 
-def _said_of(level: _Level, shift: float | None) -> str:
+def _said_of(level: _Level, shift: float | None, placed: Placement | None) -> str:
     """Return what to know of views that had the table too high or too low, after a shift [m] of the cameras."""
     said = [f"The views have the table {1e3 * level.off:.2g} mm (rms) too high or too low at the object."]
-    if lens := level.camera.lens:
+    if lens := level.lens:
         said.append(f"They were read with {_named(lens)} instead of {_named(level.given)}: then they have one table.")
-    if turned := level.camera.turned:
-        said.append(f"A camera turned by {np.degrees(turned):.1f} degrees at the wrist explains it.")
     if shift:
         said.append(f"The cameras had to be moved by {1e3 * shift:.2g} mm (rms) until the views agreed.")
+    if placed and (wrist := placed.at_wrist):
+        said.append(
+            f"A camera that sits {1e3 * wrist[0]:.2g} mm and {np.degrees(wrist[1]):.2g} degrees from where its pose at "
+            "the wrist says explains most of that: calibrate it anew."
+        )
     return " ".join(said)
 
 

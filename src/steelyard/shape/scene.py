@@ -46,6 +46,12 @@ class Scene:
     stands: Any = None  # cells (I, J) of the map of heights in which the object stands out of the table
 
     @property
+    def table(self) -> TablePlane:
+        """The plane that the object lies on, in W."""
+        normal = self.X_WT.rotation.matrix[:, 2]
+        return TablePlane(normal, float(normal @ self.X_WT.position))
+
+    @property
     def pixel(self) -> float:
         """Width of a pixel at the object [m]."""
         return self.distance / self.views.intrinsics.fx
@@ -75,8 +81,8 @@ class Region(NamedTuple):
     others: int
 
 
-def scene_of(views: Views) -> tuple[Scene, TablePlane]:
-    """Return the images in the table's frame, and the table."""
+def scene_of(views: Views) -> Scene:
+    """Return the images in the table's frame."""
     R, p = views.X_WC.rotation.matrix, views.X_WC.position
     stride = max(1, int(np.sqrt(views.depth.size / _SAMPLES)))
     sampled = images.sampled(views.depth, views.depth_unit, views.intrinsics.vector, R, p, stride)
@@ -90,7 +96,7 @@ def scene_of(views: Views) -> tuple[Scene, TablePlane]:
     noise = _depth_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), views.depth_unit, distance)
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
-    return Scene(views, X_WT, R.copy(), p.copy(), distance, noise), table
+    return Scene(views, X_WT, R.copy(), p.copy(), distance, noise)
 
 
 def _depth_noise(sampled: Array, xyz: Array, unit: float, distance: float) -> float:

@@ -1,4 +1,4 @@
-"""What of the camera explains how its views have the table: focal length, principal point, how it sits at the wrist.
+"""What of the lens explains how its views have the table: focal length and principal point.
 
 Every levelled view says where the table lies as its camera measures it: a direction and a distance. A focal length
 that is wrong tilts that by half sin(2 e) of its share at an elevation e, a principal point by cos(e)^2, a camera
@@ -20,8 +20,6 @@ from steelyard.spatial import Pose, Rotation
 _SURE = 6.0  # standard errors of a focal length that is believed
 _PASSES = 3.0  # of the tilts that are left: so much may errors of an arm that go with its posture pass for
 _LEAST = 0.01  # of the focal length: a lens that errs less is as good
-_TURNED = np.radians(0.2)  # at the wrist, likewise
-_EXPLAINED = 0.5  # of what is left without it: so little must be left with it
 _ROUGH = 1e-3  # of heights [m]: beyond it a view counts less
 _BLOCKS = 10  # of views one after the other, whose errors may hang together
 _FEW = 12  # views that can tell
@@ -32,36 +30,19 @@ _LENS = slice(0, 3)
 _STD = np.array([0.3, 0.1, 0.1, *[0.3] * 3, *[0.02] * 3, 0.1, 0.1, 0.1])  # of them, before anything is known
 
 
-@dataclass(frozen=True)
-class CameraError:
-    """What is wrong with the camera, by the table that its views share.
-
-    lens    with which they have one table, None where the given one is as good
-    turned  angle by which the camera sits turned at the wrist [rad], 0 where that explains little
-    """
-
-    lens: Intrinsics | None = None
-    turned: float = 0.0
-
-
-def camera_error(scene: Scene) -> CameraError:
-    """Return what the views, just levelled, say against intrinsics and hand-eye calibration."""
+def lens_by_table(scene: Scene) -> Intrinsics | None:
+    """Return the lens with which the views, just levelled, have one table; None where the given one is as good."""
     if len(scene.R) < _FEW:
-        return CameraError()
+        return None
     given = scene.X_WT.inverse() @ scene.views.X_WC
     seen = _Tables(given, scene.R[:, 2], scene.p[:, 2], ACROSS * scene.distance)
     free = np.ones(len(_STD), bool)
     for _ in range(2):  # the second time with what the first found of the lens, and nothing else
         found, left, std = seen.explained(free)
         off = np.abs(found[_LENS])
-        suspected = free[_LENS] & (off > np.maximum(_SURE * std[_LENS], _LEAST))
-        free[_LENS] = suspected & (off > _PASSES * left / seen.across)
-    lens, turned = found[_LENS] * free[_LENS], float(np.linalg.norm(found[_TURN]))
-    free[_TURN] = free[_SHIFT] = False
-    # A lens that is only suspected tilts tables as a turned camera does: then nothing is said of either.
-    plain = bool((suspected == free[_LENS]).all()) and turned > _TURNED
-    turns = plain and left < _EXPLAINED * seen.explained(free)[1]
-    return CameraError(_corrected(scene.views.intrinsics, *lens) if lens.any() else None, turned if turns else 0.0)
+        free[_LENS] &= off > np.maximum(np.maximum(_SURE * std[_LENS], _LEAST), _PASSES * left / seen.across)
+    lens = found[_LENS] * free[_LENS]
+    return _corrected(scene.views.intrinsics, *lens) if lens.any() else None
 
 
 def _corrected(lens: Intrinsics, log_focal: float, x: float, y: float) -> Intrinsics:

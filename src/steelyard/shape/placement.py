@@ -1,0 +1,94 @@
+"""Where a scan lies as a whole, once its cameras were moved until they agreed.
+
+Their views fit each other wherever all of them are put together. What they were moved by says where that is, and how
+surely: errors of the arm average out over the views, one of the camera's pose at the wrist does not, and is told from
+them by how it turns with the camera.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.spatial import Pose, Rotation
+
+_ROUNDS = 50  # of the variances
+_WRIST = 0.3  # of what views are off by, each by itself: an error at the wrist is believed to be no less, rms
+_BENT = 0.03  # of an error at the wrist: moves are put together as vectors, which they are not quite
+_FEW = 12  # views that can tell such an error from a wrong lens
+_LEAST = 1e-12  # share of the moves that is no variance
+
+
+@dataclass(frozen=True, eq=False)
+class Placement:
+    """What cameras that had to be moved say of where the scan lies.
+
+    common          motion that the moves of all cameras have in common: all are to be moved back by it
+    std_m, std_rad  standard deviations of the place that this leaves, per axis [m], [rad]
+    at_wrist        shift [m] and turn [rad] of the camera at the wrist that explain most of the moves, or None
+    """
+
+    common: Pose
+    std_m: float
+    std_rad: float
+    at_wrist: tuple[float, float] | None
+
+
+def placement(given: Pose, found: Pose, middle: Array) -> Placement:
+    """Return what cameras (V,), given where they were reported and found elsewhere, say of a scan about `middle` (3,).
+
+    All in one frame. The moves are judged by what they do to the object: shift it and turn it about its middle.
+    """
+    move, R = found @ given.inverse(), given.rotation.matrix
+    shift, turn = _Moves.of(move.apply(middle) - middle, R), _Moves.of(move.rotation.log(), R)
+    back = Rotation.exp(turn.common)
+    common = Pose(back, middle - back.apply(middle) + shift.common)
+    at_wrist = None
+    if len(R) >= _FEW and _explains(shift, turn):
+        seen = given.inverse().apply(middle).mean(0)
+        at_wrist = float(np.linalg.norm(shift.own - np.cross(turn.own, seen))), float(np.linalg.norm(turn.own))
+    return Placement(common, shift.std, turn.std, at_wrist)
+
+
+def _explains(shift: _Moves, turn: _Moves) -> bool:
+    """Return whether an error at the wrist leaves less than half of what the moves differ by, rms."""
+    return min(shift.left, turn.left) < 0.5 and max(shift.left, turn.left) < 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class _Moves:
+    """Moves m_k (3,) of views as g + R_k h + e_k: what is common to all, the camera's own, and each view's alone.
+
+    common  g (3,)    std   of it, per axis     own  h (3,)
+    left    e over what m differ by, rms
+    """
+
+    common: Array
+    std: float
+    own: Array
+    left: float
+
+    @classmethod
+    def of(cls, moves: Array, R: Array) -> _Moves:
+        """Return the parts of moves (V, 3) of cameras with axes R (V, 3, 3).
+
+        How large h and e are is found with them, by expectation and maximisation: without an error at the wrist h goes
+        to nothing, and g is the mean.
+        """
+        A = np.concatenate([R, np.broadcast_to(np.eye(3), R.shape)], axis=2).reshape(-1, 6)
+        b, n = moves.reshape(-1), moves.size
+        normal, right = A.T @ A, A.T @ b
+        least = _LEAST * float(b @ b) / n + 1e-30
+        of_own = of_each = float(b @ b) / n + least
+        for _ in range(_ROUNDS):
+            covariance = np.linalg.inv(normal / of_each + np.diag([1 / of_own] * 3 + [0.0] * 3))
+            x = covariance @ right / of_each
+            rest = b - A @ x
+            of_each = float(rest @ rest + np.trace(normal @ covariance)) / n + least
+            of_own = max(float(x[:3] @ x[:3] + np.trace(covariance[:3, :3])) / 3, _WRIST**2 * of_each)
+        apart = moves - moves.mean(0)
+        left = np.sqrt(float(rest @ rest) / max(float((apart**2).sum()), least))
+        std = np.sqrt((np.trace(covariance[3:, 3:]) + _BENT**2 * (x[:3] @ x[:3])) / 3)
+        return cls(x[3:], float(std), x[:3], float(left))
