@@ -73,9 +73,7 @@ def test_errors_of_the_arm_blur_the_focal_length_and_do_not_hide_it() -> None:
 
 def test_a_turned_camera_is_no_wrong_lens() -> None:
     wrong = Pose(Rotation.exp(np.radians([0.6, -0.7, 0.4])), np.array([0.003, -0.002, 0.003]))
-    found = told(views().posed(views().X_WC @ wrong))
-    assert found is None
-    assert np.degrees(found.turned) == pytest.approx(1.0, abs=0.05)
+    assert told(views().posed(views().X_WC @ wrong)) is None
 
 
 @pytest.mark.parametrize("seed", range(3))
