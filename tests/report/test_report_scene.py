@@ -16,7 +16,7 @@ from steelyard.inertia.solids import ellipsoid
 from steelyard.report import Report, scene_of_mesh, scene_of_solid
 from steelyard.report.drawing import _magnified, drawing
 from steelyard.report.scene import pose_from_centroids
-from steelyard.report.surfaces import corner_normals, part_skins, thinned
+from steelyard.report.surfaces import corner_normals, evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh, open_edges, part_moments
 from steelyard.shape.tets import TetMesh
@@ -60,6 +60,20 @@ def test_thinned_surfaces_keep_their_shape() -> None:
     assert len(same_v) == len(points)
 
 
+def test_a_noisy_sphere_is_drawn_even_and_as_large_as_it_was() -> None:
+    points, faces = sphere()
+    noisy = points * (1 + 0.02 * np.random.default_rng(0).normal(size=(len(points), 1)))
+    even = np.linalg.norm(evened(noisy, faces), axis=1)
+    assert even.std() < 0.6 * np.linalg.norm(noisy, axis=1).std()
+    assert even.mean() == pytest.approx(np.linalg.norm(noisy, axis=1).mean(), abs=0.002)
+
+
+def test_what_no_triangle_uses_stays_where_it_is() -> None:
+    points, faces = sphere(200)
+    lone = np.vstack([points, [[3.0, 0.0, 0.0]]])
+    np.testing.assert_array_equal(evened(lone, faces)[-1], [3, 0, 0])
+
+
 def test_normals_are_smooth_on_a_sphere_and_sharp_on_a_box() -> None:
     points, faces = sphere(1000)
     assert (corner_normals(points, faces) * points[faces]).sum(-1).min() > 0.999
@@ -73,8 +87,8 @@ def test_colours_come_from_the_nearest_point(solid: TetMesh) -> None:
     rgb = np.random.default_rng(1).integers(0, 256, solid.vertices.shape)
     scene = scene_of_solid(solid, np.zeros(len(solid), int), Cloud(solid.vertices, rgb))
     (body,) = scene.bodies
-    for vertex, colour in zip(body.vertices, body.rgb, strict=True):
-        np.testing.assert_array_equal(colour, rgb[(solid.vertices == vertex).all(1)][0])
+    nearest = np.linalg.norm(body.vertices[:, None] - solid.vertices, axis=2).argmin(1)
+    np.testing.assert_array_equal(body.rgb, rgb[nearest])
 
 
 def found(com: tuple[float, float, float], std: float) -> Estimate:

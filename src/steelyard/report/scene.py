@@ -11,7 +11,7 @@ from scipy.spatial import cKDTree
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.report.surfaces import compact, part_skins, thinned
+from steelyard.report.surfaces import compact, evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Colours, Integers, TriangleMesh
 from steelyard.shape.tets import TetMesh
@@ -66,7 +66,7 @@ class Scene:
 def scene_of_solid(
     solid: TetMesh, labels: Integers, cloud: Cloud | None = None, rgb: Array | None = None, X_SO: Pose | None = None
 ) -> Scene:
-    """Return the scene of a solid whose cells belong to parts.
+    """Return the scene of a solid whose cells belong to parts; what its noise makes stick out is evened.
 
     labels  (T,) part of each cell
     cloud   gives every vertex the colour of its nearest point
@@ -75,7 +75,8 @@ def scene_of_solid(
     labels = np.asarray(labels, np.int64)
     if labels.shape != (len(solid),):
         raise BadValue(f"{len(solid)} cells need one label each; got {labels.shape}.")
-    skins = [(k, solid.vertices, faces) for k, faces in part_skins(solid, labels)]
+    vertices = evened(solid.vertices, solid.surface)
+    skins = [(k, vertices, faces) for k, faces in part_skins(solid, labels)]
     return Scene(_bodies(skins, cloud, rgb), _thinned_cloud(cloud), X_SO)
 
 
