@@ -25,7 +25,7 @@ from steelyard.team.clocks.search import F, searched
 from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.axis import Split, find_split, rigidity_findings
+from steelyard.team.hinge.axis import UNPLACED, Split, find_split, rigidity_findings
 from steelyard.team.hinge.bodies import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
@@ -98,10 +98,14 @@ class JointTeam:
             log, moving, begun = self._fitted(log, TwistTeam.of)
             if moving.rough:
                 require_one_velocity_unit(log, moving)
+            apart = rigidity_findings(moving.split, log.names, UNPLACED)
+            if moving.split is not None and moving.split.sure:
+                raise CannotAnswer(" ".join(finding.message for finding in apart))
             grasps, noise, late, left = moving.fit.grasps, moving.fit.noise, moving.late, moving.fit.left
             spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
             made, path = moving.rows(self.highest_hz)
-            found, down, order = [], moving.down(), 1
+            found = [*moving.findings, *apart]
+            down, order = moving.down(), 1
         else:
             log, standing, begun, yields = self._standing(log)
             grasps, noise = standing.fit.team.grasps, standing.fit.noise

@@ -7,7 +7,6 @@ along directions that err independently of each other: what turns the others' mo
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numba
@@ -59,13 +58,16 @@ class SlipAt:
         """Whether the grasp slipped before the recording began."""
         return not np.isfinite(self.time)
 
-    def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array) -> SlipAt:
-        """Return the slip from the residuals (T, 6) of its robot against the others' motion; noise (6, 6) of a row."""
-        score = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)), noise)[0]
+    def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array, drifts: bool = False) -> SlipAt:
+        """Return the slip from the residuals (T, 6) of its robot against the others' motion; noise (6, 6) of a row.
+
+        drifts  whether residuals far apart in time differ by more than the slip, as added up twists do
+        """
+        score, step = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)), noise)
         row = int(np.argmax(score))
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
-        full = apart[after].mean(0) - apart[before].mean(0)
+        full = step[row] if drifts else apart[after].mean(0) - apart[before].mean(0)
         angle, distance = float(np.linalg.norm(full[:3])), float(np.linalg.norm(full[3:]))
         slip = Slip(self.slip.robot, row, distance, angle, float(score[row]))
         return replace(self, time=float(middle), slip=slip, step=full)
@@ -103,22 +105,8 @@ class SlipAt:
             what = f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'"
         return Finding.of(
             "grasp-slipped",
-            f"{what}; from there on its poses are left out and its forces act from where it then was.",
+            f"{what}; from there on its motion is left out and its forces act from where it then was.",
         )
-
-
-def edited(
-    edit: Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]], slips: Sequence[SlipAt]
-) -> Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]:
-    """Return an edit of recordings after which slips are taken out too."""
-
-    def both(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-        parts = edit(parts)
-        for slip in slips:
-            parts = slip.applied(parts)
-        return parts
-
-    return both
 
 
 def alone(residual: Array, J: Array, W: Array) -> Array:

@@ -33,6 +33,12 @@ ROUNDS = 8
 # What is left counts from so many times the power of the noise.
 LOUD = 5.0
 PARTS = (slice(0, 3), slice(3, 6))
+# Why bodies are not weighed.
+UNSHOWN = (
+    "The motion shows too little of it to weigh the bodies: what is given is for the payload as if it were one. Open "
+    "and close the hinge while tilting the payload about two axes."
+)
+UNPLACED = "Two bodies are weighed from poses only: let the bases stand and log poses, or hold the hinge fast."
 # Rows that must be there.
 FEWEST = 200
 # Gaps up to so long [s] are bridged: half a period of the fastest motion that is kept.
@@ -40,23 +46,27 @@ BRIDGED_S = 0.5 / CUTOFF_HZ
 
 
 def moving_twists(parts: Sequence[Stretch]) -> tuple[Array, Array, float]:
-    """Return low-passed twists (T, N, 6) of the longest recording in motion, its longest run of rows without long gaps.
+    """Return low-passed twists (T, N, 6) of the longest recording in motion, and what `smoothed` says of them."""
+    part = max((p for p in parts if p.kind != "still"), key=len, default=parts[0])
+    every = [differenced(part.poses[:, i], part.seen[:, i], part.rate) for i in range(part.seen.shape[1])]
+    return smoothed(np.stack([v for v, _ in every], axis=1), np.all([seen for _, seen in every], axis=0), part.rate)
+
+
+def smoothed(twist: Array, seen: Mask, rate: float) -> tuple[Array, Array, float]:
+    """Return twists (T, N, 6) low-passed, over the longest run of rows without long gaps that all have `seen` (T,).
 
     Rows that some robot missed are bridged by straight lines, in the twists of all robots alike, so that what is a
     fixed linear map of another twist stays one. Also the mean square (N, 2) of what the filter took away of the rows
     that all saw, turning and moving, and the rate [Hz].
     """
-    part = max((p for p in parts if p.kind != "still"), key=len, default=parts[0])
-    every = [differenced(part.poses[:, i], part.seen[:, i], part.rate) for i in range(part.seen.shape[1])]
-    good = longest_run(np.flatnonzero(np.all([seen for _, seen in every], axis=0)), round(BRIDGED_S * part.rate))
+    good = longest_run(np.flatnonzero(seen), round(BRIDGED_S * rate))
     if len(good) < FEWEST:
-        return np.zeros((0, len(every), 6)), np.zeros((len(every), 2)), part.rate
-    seen = np.stack([values[good] for values, _ in every], axis=1).reshape(len(good), -1)
+        return np.zeros((0, twist.shape[1], 6)), np.zeros((twist.shape[1], 2)), rate
     rows = np.arange(good[0], good[-1] + 1)
-    twist = np.stack([np.interp(rows, good, column) for column in seen.T], axis=1)
-    smooth = lowpass(twist, min(CUTOFF_HZ, 0.4 * part.rate), part.rate)
-    taken = ((twist - smooth)[good - good[0]] ** 2).mean(0).reshape(-1, 2, 3).mean(2)
-    return smooth.reshape(len(rows), -1, 6), taken, part.rate
+    bridged = np.stack([np.interp(rows, good, column) for column in twist[good].reshape(len(good), -1).T], axis=1)
+    smooth = lowpass(bridged, min(CUTOFF_HZ, 0.4 * rate), rate)
+    taken = ((bridged - smooth)[good - good[0]] ** 2).mean(0).reshape(-1, 2, 3).mean(2)
+    return smooth.reshape(len(rows), -1, 6), taken, rate
 
 
 def differenced(path: Pose, seen: Mask, rate: float) -> tuple[Array, Mask]:
@@ -138,10 +148,19 @@ class Split:
     twist: Array
     hinge: tuple[Array, Array, float] | None
 
+    @property
+    def sure(self) -> bool:
+        """Whether there is a hinge that no bad sensor of one robot can feign: several move alike on either side."""
+        return self.hinge is not None and min(len(group) for group in self.groups) > 1
+
 
 def find_split(parts: Sequence[Stretch], first: int = 0) -> Split | None:
     """Return how the grasps fall apart, the group of robot `first` before the others; None for one rigid body."""
-    twist, noise, rate = moving_twists(parts)
+    return split_of(*moving_twists(parts), first)
+
+
+def split_of(twist: Array, noise: Array, rate: float, first: int = 0) -> Split | None:
+    """Return what `find_split` does from twists (T, N, 6) as `smoothed` returns them."""
     if not len(twist):
         return None
     groups = sorted(bodies(twist, noise), key=lambda group: first not in group)
@@ -155,8 +174,11 @@ def find_split(parts: Sequence[Stretch], first: int = 0) -> Split | None:
     return Split(tuple(groups), twist, None)
 
 
-def rigidity_findings(split: Split | None, names: Sequence[str]) -> list[Finding]:
-    """Return payload-jointed with the hinge's axis, or payload-not-rigid, where the grasps are not on one body."""
+def rigidity_findings(split: Split | None, names: Sequence[str], unweighed: str = UNSHOWN) -> list[Finding]:
+    """Return payload-jointed with the hinge's axis, or payload-not-rigid, where the grasps are not on one body.
+
+    unweighed  why the two bodies are not weighed, and what to do
+    """
     if split is None:
         return []
     called = [" and ".join(f"'{names[i]}'" for i in group) for group in split.groups]
@@ -168,8 +190,7 @@ def rigidity_findings(split: Split | None, names: Sequence[str]) -> list[Finding
                 "payload-jointed",
                 f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) "
                 f"through ({text[1]}) mm of grasp '{names[split.groups[1][0]]}', which swung by "
-                f"{np.rad2deg(swing):.0f} deg. The motion shows too little of it to weigh the bodies: what is given is "
-                "for the payload as if it were one. Open and close the hinge while tilting the payload about two axes.",
+                f"{np.rad2deg(swing):.0f} deg. {unweighed}",
             )
         ]
     return [

@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.changes.presence import as_long, idle, let_go, presence_findings
-from steelyard.team.changes.slips import SlipAt, alone, edited, find_slip, noise_alone
+from steelyard.team.changes.found import Edit, without_changes
+from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
 from steelyard.team.changes.slips_between import slip_between, step_between
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
@@ -41,23 +40,10 @@ UNCHANGED = 0.02
 FEW_ROWS, FEW_POSES = 1500, 4500
 # Sweeps over a row with which the motion follows grasps and homes from wherever it was.
 FOLLOWED = 2
-MOST_SLIPS = 3
 # Bases that are said to be level are so to within this [rad].
 LEVEL = 0.02
-# Noise above this share of the motion asks whether the payload is rigid; it must then fall by this factor on average
-# where a slip between recordings is to explain it.
-LOUD, BETTER = 0.05, 3.0
-
-
-Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
-
-
-def _unchanged(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-    return parts
-
-
-def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, ...]:
-    return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
+# Noise above this share of the motion asks whether the payload is rigid.
+LOUD = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -77,22 +63,10 @@ class PoseTeam:
     def of(cls, log: TeamLog, clocks: bool) -> PoseTeam:
         """Return the joint fit; raises CannotAnswer where poses or rows in common are missing.
 
-        Robots that let go for a while and grasps that slip are found on the way: first the rows in which a robot
-        pushes with nothing are left out, then those stay out in which it is not where the others say.
+        Robots that let go for a while and grasps that slip are found on the way.
         """
         raw = stretches(log, {})
-        resting = idle(raw)
-        if not any(rows.any() for rows in resting):
-            return cls._fitted(log, clocks, raw, _unchanged)._without_slips(log, clocks, raw, _unchanged)
-        first = cls._fitted(log, clocks, raw, lambda parts: _unseen(parts, resting))
-        off = first.off(log)
-
-        def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-            return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
-
-        found = presence_findings(raw, edit(raw), log.names)
-        team = cls._fitted(log, clocks, raw, edit)._without_slips(log, clocks, raw, edit)
-        return replace(team, findings=(*found, *team.findings))
+        return without_changes(log, clocks, raw, lambda edit: cls._fitted(log, clocks, raw, edit))
 
     @classmethod
     def _fitted(cls, log: TeamLog, clocks: bool, parts: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
@@ -130,37 +104,7 @@ class PoseTeam:
             fit = fit_poses(replace(timed, share=share), fit.team, reference, fit.noise)
         return cls(parts, fit, _later(late, fit))
 
-    def _without_slips(self, log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], edit: Edit) -> PoseTeam:
-        """Return the team with grasps that slip taken out from there on, their wrenches moved to where they were.
-
-        Clocks are judged before: one that is set anew passes for slips.
-        """
-        team, slips = self, list[SlipAt]()
-        left = self._clock_errors(log) if clocks else NOTHING
-        for _ in range(MOST_SLIPS):
-            found = team._slip()
-            if found is None:
-                break
-            # Once more without what follows the slip, which has bent the first fit.
-            before, again = team, edited(edit, [*slips, found])
-            try:
-                team = self._fitted(log, clocks, raw, again)
-            except (BadValue, CannotAnswer, np.linalg.LinAlgError):
-                break
-            # Recordings that differ for another reason than a slip still do.
-            if (
-                before.rough
-                and found.between
-                and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER)
-            ):
-                break
-            slips.append(team._measured(log, found))
-        if not slips:
-            return replace(self, clocks_left=left)
-        team = self._fitted(log, clocks, raw, edited(edit, slips))
-        return replace(team, findings=tuple(slip.finding(log) for slip in slips), clocks_left=left)
-
-    def _clock_errors(self, log: TeamLog) -> ClockErrors:
+    def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
         left, start = [], 0
         for part in self.parts:
@@ -169,7 +113,8 @@ class PoseTeam:
             left.append(Left(part.time, part.seen, self.fit.rows.residual[rows], self.fit.rows.data.twists[rows]))
         return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
 
-    def _slip(self) -> SlipAt | None:
+    def slip(self) -> SlipAt | None:
+        """Return the clearest slip, within a recording or else between two."""
         best, start = None, 0
         apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
         for number, part in enumerate(self.parts):
@@ -180,7 +125,7 @@ class PoseTeam:
                 best = SlipAt(number, float(part.time[slip.row]), slip)
         return best if best is not None else slip_between(self.parts, apart)
 
-    def _measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
+    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""
         parts = stretches(log, self.late)
         if found.between:

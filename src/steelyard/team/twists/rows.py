@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -34,6 +34,20 @@ class TwistStretch:
     seen: Mask
     down: Array
     level: Mask
+
+    @property
+    def used(self) -> Stretch:
+        """The rows, seen where twists are."""
+        return replace(self.rows, seen=self.seen)
+
+    def changed(self, used: Stretch) -> TwistStretch:
+        """Return the recording with the rows that are left (`used`) of its own.
+
+        Who lets go or slips no longer knows where down is for the payload, unless nobody else does.
+        """
+        level = self.level & ~(self.seen & ~used.seen)
+        level[~level.any(1)] = self.level[~level.any(1)]
+        return replace(self, rows=replace(used, seen=self.rows.seen), seen=used.seen, level=level)
 
 
 def twist_stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[TwistStretch, ...]:

@@ -3,18 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.changes.found import Edit, without_changes
+from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.hinge.axis import Split, smoothed, split_of
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twists.rows import TwistStretch, twist_stretches
@@ -34,21 +39,31 @@ LOUD = 0.1
 class TwistTeam:
     """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s].
 
-    clocks_left  what clocks seem to be off by in single recordings
+    clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
     """
 
     parts: tuple[TwistStretch, ...]
     fit: TwistFit
     late: Mapping[str, float]
+    findings: tuple[Finding, ...] = ()
     clocks_left: ClockErrors = NOTHING
 
     @classmethod
     def of(cls, log: TeamLog, clocks: bool) -> TwistTeam:
-        """Return the joint fit; raises CannotAnswer where twists or rows in common are missing."""
+        """Return the joint fit; raises CannotAnswer where twists or rows in common are missing.
+
+        Robots that let go for a while and grasps that slip are found on the way.
+        """
+        raw = tuple(part.used for part in twist_stretches(log, {}))
+        return without_changes(log, clocks, raw, lambda edit: cls._fitted(log, clocks, edit))
+
+    @classmethod
+    def _fitted(cls, log: TeamLog, clocks: bool, edit: Edit) -> TwistTeam:
+        """Return the fit of recordings after an edit."""
         reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
         for left in reversed(range(CLOCK_ROUNDS)):
-            parts = twist_stretches(log, late)
+            parts = _changed(twist_stretches(log, late), edit)
             fit = fit_twists(TwistScatter.of(parts), reference, log.names, _level_pairs(parts, reference))
             enough = (SETTLED if any(late.values()) else 1.0) * np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)
             settled = bool((np.abs(fit.delays) < enough).all())
@@ -56,10 +71,9 @@ class TwistTeam:
             if not (clocks and left) or settled:
                 break
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
-        team = cls(parts, fit, late)
-        return replace(team, clocks_left=team._clock_errors(log)) if clocks else team
+        return cls(parts, fit, late)
 
-    def _clock_errors(self, log: TeamLog) -> ClockErrors:
+    def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
         J, W, left = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), []
         for part in self.parts:
@@ -67,6 +81,42 @@ class TwistTeam:
             apart = self._left(part)[0] - slope * self.fit.delays[:, None]
             left.append(Left(part.rows.time, part.seen, apart, slope))
         return clock_errors(log, tuple(left), J, W)
+
+    def off(self, log: TeamLog) -> list[Array]:
+        """Return by how many times its noise each twist is off (T, N) what the others say, for every recording."""
+        noise = np.repeat(self.fit.noise, 3, axis=1)
+        raw = twist_stretches(log, self.late)
+        return [
+            np.sqrt(((self._against(was, now) / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
+        ]
+
+    def slip(self) -> SlipAt | None:
+        """Return the clearest slip within a recording; none where a hinge is the cause."""
+        if self.split is not None and self.split.sure:
+            return None
+        J, W, best = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), None
+        noise = noise_alone(J, W)
+        for number, part in enumerate(self.parts):
+            apart = np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate
+            slip = find_slip(apart, part.seen, part.rows.rate, noise)
+            if slip is not None and (best is None or slip.score > best.slip.score):
+                best = SlipAt(number, float(part.rows.time[slip.row]), slip)
+        return best
+
+    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
+        """Return the slip with its time and step renewed against the others' motion."""
+        raw, robot = twist_stretches(log, self.late)[found.recording], found.slip.robot
+        J, W = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1)
+        apart = np.cumsum(self._against(raw, self.parts[found.recording])[:, robot], axis=0) / raw.rows.rate
+        return found.renewed(apart, raw.seen[:, robot], raw.rows, noise_alone(J, W)[robot], drifts=True)
+
+    @cached_property
+    def split(self) -> Split | None:
+        """How grasps fall apart where they do not move as on one rigid body."""
+        if not self.rough:
+            return None
+        part = max((p for p in self.parts if p.rows.kind != "still"), key=lambda p: len(p.rows), default=self.parts[0])
+        return split_of(*smoothed(part.twist, np.asarray(part.seen.all(1)), part.rows.rate))
 
     @property
     def rough(self) -> bool:
@@ -103,6 +153,13 @@ class TwistTeam:
         known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
         return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
 
+    def _against(self, was: TwistStretch, now: TwistStretch) -> Array:
+        """Return what twists (T, N, 6) of a recording as it was differ by from the motion that is left of it now."""
+        fused, _ = fused_twist(now.twist, now.seen, self.fit.grasps, self.fit.noise)
+        moved = np.einsum("nij,tj->tni", adjoint_inverse(self.fit.grasps), fused)
+        told = was.seen & now.seen.any(1, keepdims=True)
+        return np.asarray((was.twist - moved) * told[..., None])
+
     def _left(self, part: TwistStretch) -> tuple[Array, Array, Array]:
         """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6)."""
         fused, covariance = fused_twist(part.twist, part.seen, self.fit.grasps, self.fit.noise)
@@ -129,6 +186,11 @@ class TwistTeam:
                 "[team] gravity for a level base that stands."
             )
         return out, into @ covariance @ into.T
+
+
+def _changed(parts: tuple[TwistStretch, ...], edit: Edit) -> tuple[TwistStretch, ...]:
+    """Return recordings after an edit of their rows."""
+    return tuple(p.changed(used) for p, used in zip(parts, edit(tuple(p.used for p in parts)), strict=True))
 
 
 def _level_pairs(parts: tuple[TwistStretch, ...], reference: int) -> Array:

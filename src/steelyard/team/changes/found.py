@@ -1,0 +1,128 @@
+"""Robots that let go for a while and grasps that slip: found on the way to a joint fit, and taken out of it.
+
+First the rows in which a robot pushes with nothing are left out, then those stay out in which it is not where the
+others say. Then slips, the clearest first, each judged anew by a fit without what follows it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import Field, replace
+from typing import Any, ClassVar, Protocol, TypeVar
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import Finding
+from steelyard.logs.log import Mask
+from steelyard.logs.team_log import TeamLog
+from steelyard.team.changes.presence import as_long, idle, let_go, presence_findings
+from steelyard.team.changes.slips import SlipAt
+from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.stacked import Stretch
+
+MOST_SLIPS = 3
+# Noise of a rough fit must fall by this factor on average where a slip between recordings is to explain it.
+BETTER = 3.0
+
+Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
+
+
+class Fitted(Protocol):
+    """A joint fit of poses or twists, with what it leaves."""
+
+    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
+
+    @property
+    def fit(self) -> Any:
+        """The optimum, with its noise (N, 2)."""
+
+    @property
+    def findings(self) -> tuple[Finding, ...]:
+        """What was found on the way."""
+
+    @property
+    def rough(self) -> bool:
+        """Whether robots disagree."""
+
+    def clock_errors(self, log: TeamLog) -> ClockErrors:
+        """Return what clocks seem to be off by in single recordings."""
+
+    def off(self, log: TeamLog) -> list[Array]:
+        """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
+
+    def slip(self) -> SlipAt | None:
+        """Return the clearest slip."""
+
+    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
+        """Return a slip with time and step by this fit, which was made without what follows it."""
+
+
+F = TypeVar("F", bound=Fitted)
+
+
+def without_changes(log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], fitted: Callable[[Edit], F]) -> F:
+    """Return the fit without what robots that let go and grasps that slip say, and with findings that name them.
+
+    raw     the recordings as they are, seen where the fit can use them
+    fitted  makes the fit of recordings after an edit
+    """
+    resting = idle(raw)
+    if not any(rows.any() for rows in resting):
+        return _without_slips(log, clocks, fitted(_unchanged), fitted, _unchanged)
+    off = fitted(lambda parts: _unseen(parts, resting)).off(log)
+
+    def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
+
+    found = presence_findings(raw, edit(raw), log.names)
+    team = _without_slips(log, clocks, fitted(edit), fitted, edit)
+    return replace(team, findings=(*found, *team.findings))
+
+
+def _without_slips(log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit], F], edit: Edit) -> F:
+    """Return the fit with grasps that slip taken out from there on, their wrenches moved to where they were.
+
+    Clocks are judged before: one that is set anew passes for slips.
+    """
+    team, slips = given, list[SlipAt]()
+    left = given.clock_errors(log) if clocks else NOTHING
+    for _ in range(MOST_SLIPS):
+        found = team.slip()
+        if found is None:
+            break
+        # Once more without what follows the slip, which has bent the first fit.
+        before, again = team, edited(edit, [*slips, found])
+        try:
+            team = fitted(again)
+        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+            break
+        # Recordings that differ for another reason than a slip still do.
+        if before.rough and found.between and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER):
+            break
+        slips.append(team.measured(log, found))
+    if not slips:
+        return replace(given, clocks_left=left)
+    team = fitted(edited(edit, slips))
+    return replace(team, findings=tuple(slip.finding(log) for slip in slips), clocks_left=left)
+
+
+def edited(edit: Edit, slips: Sequence[SlipAt]) -> Edit:
+    """Return an edit of recordings after which slips are taken out too."""
+
+    def both(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        parts = edit(parts)
+        for slip in slips:
+            parts = slip.applied(parts)
+        return parts
+
+    return both
+
+
+def _unchanged(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+    return parts
+
+
+def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, ...]:
+    return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
