@@ -15,8 +15,9 @@ def test_one_of_each_event_and_its_lines() -> None:
     late = found["late_clock"]
     assert late["offset_error_ms"]["worst"] < 0.5
     assert late["ratio_without"] > 2 * late["ratio_clocks"]
-    assert {name: (s["found"], s["false"]) for name, s in found["slips"].items()} == {"B": (1, 0), "C": (1, 0)}
-    assert found["leaving"]["named"] == 1
+    hits = {name: (s["found"], s["false"]) for name, s in found["slips"].items()}
+    assert hits == {"B": (1, 0), "C": (1, 0), "twists": (1, 0)}
+    assert found["leaving"]["named"] == found["leaving_twists"]["named"] == 1
     lines = "\n".join(_events(found))
     assert "1 of 1 found within 0.3 s, 0 false alarms" in lines
     assert "one of 4 leaves at half: named in 1 of 1" in lines

@@ -12,22 +12,27 @@ from steelyard.bench.pool import spread
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import Presence, Slip, TeamScene, case
+from steelyard.simulate.team_cases import Presence, Slip, TeamNoise, TeamScene, case
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
 LATE_CASE, LATE_S = "B", 0.013
-SLIP_CASES, SLIP_M, SLIP_AT, SLIP_ROWS = ("B", "C"), 0.005, 7.0, 1500
-LEFT_CASE, LEAVER, LEFT_TEAM = "C", 2, 4
+SLIP_M, SLIP_AT, SLIP_ROWS = 0.005, 7.0, 1500
+LEAVER, LEFT_TEAM = 2, 4
+# Bases that stand, by case, and bases that move, whose robots measure twists.
+TWISTS = TeamNoise(force_white_N=1.0, rate_rad_s=0.008, velocity_m_s=0.002)
+SLIP_SCENES = {"B": case("B"), "C": case("C"), "twists": TeamScene(TWISTS, sensing="twists", bases_move=True)}
+LEFT_SCENES = {name: replace(SLIP_SCENES[name], robots=LEFT_TEAM) for name in ("C", "twists")}
 LEFT_KINDS = ("position_mm", "mass_pct", "com_mm", "inertia_pct")
 FIRST_SEED = 7000
 RULES = (
     "late_clock: case B, robot 1 stamps 13 ms late; position error over that of the same trials with clocks in step, "
     "with and without the estimate of clocks. slips: one motion of 15 s, robot 1 slips by 5 mm in a random direction "
     "within 0.1 s at 7 s; found = named, of that robot, within 0.3 s of the middle of the slip; false = named without "
-    "one. leaving: case C, four robots, one lets go at half of the motion; errors over those of the same log with that "
-    "told and its poses from there on left out."
+    "one. leaving: four robots, one lets go at half of the motion; errors over those of the same log with that told "
+    "and its motion from there on left out. twists: bases move, twists have white noise of 8 mrad/s and 2 mm/s, forces "
+    "of 1 N."
 )
 
 
@@ -61,7 +66,7 @@ def slip_trial(job: tuple[str, int, bool]) -> tuple[bool, float]:
     name, seed, slips = job
     way = np.random.default_rng([seed, 4]).normal(size=3)
     slip = Slip(1, SLIP_M * way / np.linalg.norm(way), SLIP_AT) if slips else None
-    scene: TeamScene = replace(case(name), slip=slip, kinds=("motion",), motion_samples=SLIP_ROWS)
+    scene = replace(SLIP_SCENES[name], slip=slip, kinds=("motion",), motion_samples=SLIP_ROWS)
     made = simulate_team(scene, seed)
     named = [f.message for f in JointTeam().identify(made.log).findings if f.code == "grasp-slipped"]
     if not slips:
@@ -73,7 +78,7 @@ def slip_trial(job: tuple[str, int, bool]) -> tuple[bool, float]:
 
 
 def told(made: TeamTrial) -> TeamLog:
-    """Return the log in which the robot that leaves says so, and has no poses from there on."""
+    """Return the log in which the robot that leaves says so, and measures no motion from there on."""
     log, name = made.log, f"robot{LEAVER}"
     last = log.recordings[-1]
     track, holds = last.tracks[name], made.truth.holds[:, LEAVER]
@@ -82,9 +87,10 @@ def told(made: TeamTrial) -> TeamLog:
     return log.with_recordings(*log.recordings[:-1], replace(last, tracks={**last.tracks, name: said}))
 
 
-def leaving_trial(seed: int) -> tuple[bool, Array]:
+def leaving_trial(job: tuple[str, int]) -> tuple[bool, Array]:
     """Return whether the leaving was named; squared errors (2, 4) found and told, by LEFT_KINDS."""
-    scene = case(LEFT_CASE, LEFT_TEAM)
+    name, seed = job
+    scene = LEFT_SCENES[name]
     half = scene.motion_samples / 200
     made = simulate_team(replace(scene, presence=(Presence(LEAVER, leaves=half),)), seed)
     rows, named = [], False
@@ -119,15 +125,18 @@ def run(trials: int, slips: int, workers: int) -> dict[str, Any]:
             "ratio_clocks": float(clocks.mean() / step.mean()), "ratio_without": float(without.mean() / step.mean()),
         },
     }  # fmt: skip
-    out["slips"] = {name: _slips(name, slips, workers) for name in SLIP_CASES} if slips else {}
-    named, squares = zip(*spread(leaving_trial, seeds, workers), strict=True)
+    out["slips"] = {name: _slips(name, slips, workers) for name in SLIP_SCENES} if slips else {}
+    return out | {"leaving": _leaving("C", seeds, workers), "leaving_twists": _leaving("twists", seeds, workers)}
+
+
+def _leaving(name: str, seeds: Sequence[int], workers: int) -> dict[str, Any]:
+    named, squares = zip(*spread(leaving_trial, [(name, seed) for seed in seeds], workers), strict=True)
     rms = np.sqrt(np.nanmean(squares, axis=0))
     errors = {
         kind: {"found": float(found), "told": float(told), "ratio": float(found / told)}
         for kind, found, told in zip(LEFT_KINDS, *rms, strict=True)
     }
-    out["leaving"] = {"case": LEFT_CASE, "robots": LEFT_TEAM, "trials": trials, "named": sum(named), **errors}
-    return out
+    return {"case": name, "robots": LEFT_TEAM, "trials": len(seeds), "named": sum(named), **errors}
 
 
 def _slips(name: str, trials: int, workers: int) -> dict[str, Any]:

@@ -55,7 +55,7 @@ def _events(events: dict[str, Any]) -> list[str]:
     """Return lines on a late clock, slips and a robot that leaves."""
     if not events:
         return []
-    late, left = events["late_clock"], events["leaving"]
+    late = events["late_clock"]
     error = late["offset_error_ms"]
     lines = [
         f"case {late['case']}, one robot {late['late_ms']:.0f} ms late: offset off by {error['mean']:.3f} ms, at worst "
@@ -67,12 +67,13 @@ def _events(events: dict[str, Any]) -> list[str]:
             f"case {name}, slips of 5 mm: {slip['found']} of {slip['trials']} found within 0.3 s, "
             f"{slip['false']} false alarms in {slip['trials']} logs without"
         )
-    shares = ", ".join(f"{kind} {left[kind]['ratio']:.2f}" for kind in left if isinstance(left[kind], dict))
-    return [
-        *lines,
-        f"case {left['case']}, one of {left['robots']} leaves at half: named in {left['named']} of {left['trials']}; "
-        f"rms error over that when told: {shares}",
-    ]
+    for left in (events["leaving"], events["leaving_twists"]):
+        shares = ", ".join(f"{kind} {left[kind]['ratio']:.2f}" for kind in left if isinstance(left[kind], dict))
+        lines.append(
+            f"case {left['case']}, one of {left['robots']} leaves at half: named in {left['named']} of "
+            f"{left['trials']}; rms error over that when told: {shares}"
+        )
+    return lines
 
 
 def _troubles(troubles: dict[str, Any]) -> list[str]:

@@ -20,8 +20,9 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Rotation
 from steelyard.team.stacked import Stretch
 
-# [s] on either side that are averaged, and left out between, where the slip itself may last.
-WINDOW_S, GAP_S = 1.0, 0.1
+# [s] on either side that are averaged, and left out between, where the slip itself may last. Twists that are added up
+# wander ever farther: only what is near tells a step from that.
+WINDOW_S, NEAR_S, GAP_S = 1.0, 0.1, 0.1
 # How likely noise alone may be taken for a slip in one recording, and the size [m, rad] from which a step counts.
 CHANCE, LEAST_M, LEAST_RAD = 1e-4, 1e-3, 2e-3
 # Share of rows of a window that must have been measured.
@@ -59,11 +60,9 @@ class SlipAt:
         return not np.isfinite(self.time)
 
     def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array, drifts: bool = False) -> SlipAt:
-        """Return the slip from the residuals (T, 6) of its robot against the others' motion; noise (6, 6) of a row.
-
-        drifts  whether residuals far apart in time differ by more than the slip, as added up twists do
-        """
-        score, step = _steps(apart, seen, round(WINDOW_S * part.rate), max(1, round(GAP_S * part.rate / 2)), noise)
+        """Return the slip from the residuals (T, 6) of its robot against the others' motion, as `find_slip`."""
+        width = max(2, round((NEAR_S if drifts else WINDOW_S) * part.rate))
+        score, step = _steps(apart, seen, width, max(1, round(GAP_S * part.rate / 2)), noise)
         row = int(np.argmax(score))
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
@@ -147,13 +146,14 @@ def noise_alone(J: Array, W: Array) -> Array:
     return np.asarray(out)
 
 
-def find_slip(apart: Array, seen: Mask, rate: float, noise: Array) -> Slip | None:
+def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool = False) -> Slip | None:
     """Return the clearest slip of one recording, None where there is none.
 
-    apart  (T, N, 6) rotation vector and position of each grasp against what the others say
-    noise  (N, 6, 6) of a row of it, as far as its directions go
+    apart   (T, N, 6) rotation vector and position of each grasp against what the others say
+    noise   (N, 6, 6) of a row of it, as far as its directions go
+    drifts  whether rows far apart in time differ by more than a slip, as added up twists do
     """
-    width, gap = round(WINDOW_S * rate), max(1, round(GAP_S * rate / 2))
+    width, gap = max(2, round((NEAR_S if drifts else WINDOW_S) * rate)), max(1, round(GAP_S * rate / 2))
     rows, count = seen.shape
     if rows < 4 * (width + gap) or count < 2:
         return None

@@ -98,7 +98,7 @@ class TwistTeam:
         noise = noise_alone(J, W)
         for number, part in enumerate(self.parts):
             apart = np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate
-            slip = find_slip(apart, part.seen, part.rows.rate, noise)
+            slip = find_slip(apart, part.seen, part.rows.rate, noise, drifts=True)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.rows.time[slip.row]), slip)
         return best
