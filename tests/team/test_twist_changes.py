@@ -59,6 +59,18 @@ def test_a_slip_of_a_second_is_one_too() -> None:
     assert "'robot1'" in messages(found, "grasp-slipped")[0]
 
 
+@pytest.mark.parametrize("robot", [0, 1], ids=["the reference", "another"])
+def test_a_slip_between_recordings_is_named_and_taken_out(robot: int) -> None:
+    before = Slip(robot, np.array([0.006, 0.0, 0.008]), -1.0)
+    made, found = answered(replace(SCENE, slip=before))
+    (message,) = messages(found, "grasp-slipped")
+    assert f"The grasp of 'robot{robot}' slipped by " in message
+    assert "between 'grasp-0' and 'motion-5'" in message
+    assert float(message.split(" by ")[1].split(" mm")[0]) == pytest.approx(10.0, abs=2.0)
+    bars = 1e3 * np.linalg.norm([found.grasps[name].std_m for name in made.log.names], axis=1)
+    assert (placed(made, found) <= 2.5 * bars).all()
+
+
 @pytest.mark.parametrize(
     ("event", "code"),
     [(Presence(2, leaves=8.0), "robot-left"), (Presence(2, joins=7.0), "robot-joined")],

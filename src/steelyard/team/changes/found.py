@@ -52,7 +52,7 @@ class Fitted(Protocol):
     def off(self, log: TeamLog) -> list[Array]:
         """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
 
-    def slip(self) -> SlipAt | None:
+    def slip(self, log: TeamLog) -> SlipAt | None:
         """Return the clearest slip."""
 
     def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
@@ -89,7 +89,7 @@ def _without_slips(log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit]
     team, slips = given, list[SlipAt]()
     left = given.clock_errors(log) if clocks else NOTHING
     for _ in range(MOST_SLIPS):
-        found = team.slip()
+        found = team.slip(log)
         if found is None:
             break
         # Once more without what follows the slip, which has bent the first fit.

@@ -46,13 +46,15 @@ class Slip:
 class SlipAt:
     """A slip in one recording at `time` [s]; `step` (6,) rotation and position of the grasp after it, in its own axes.
 
-    Without a step the rows after it are left out of everything. A time of -inf is before the recording.
+    Without a step the rows after it are left out of everything. A time of -inf is before the recording, and after
+    recording `since`; that is the one before unless it is given.
     """
 
     recording: int
     time: float
     slip: Slip
     step: Array | None = None
+    since: int | None = None
 
     @property
     def between(self) -> bool:
@@ -98,8 +100,9 @@ class SlipAt:
         name, record = log.names[self.slip.robot], log.recordings[self.recording].name
         size = f"{1e3 * self.slip.distance:.1f} mm and {np.rad2deg(self.slip.angle):.2f} deg"
         if self.between:
-            before = log.recordings[self.recording - 1].name
-            what = f"The grasp of '{name}' slipped by {size}, or its base was moved, between '{before}' and '{record}'"
+            before = log.recordings[self.recording - 1 if self.since is None else self.since].name
+            base = "" if log.robots[self.slip.robot].base == "moving" else ", or its base was moved,"
+            what = f"The grasp of '{name}' slipped by {size}{base} between '{before}' and '{record}'"
         else:
             what = f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'"
         return Finding.of(

@@ -113,7 +113,7 @@ class PoseTeam:
             left.append(Left(part.time, part.seen, self.fit.rows.residual[rows], self.fit.rows.data.twists[rows]))
         return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
 
-    def slip(self) -> SlipAt | None:
+    def slip(self, log: TeamLog) -> SlipAt | None:
         """Return the clearest slip, within a recording or else between two."""
         best, start = None, 0
         apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)

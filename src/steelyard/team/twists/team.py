@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -23,6 +23,7 @@ from steelyard.team.hinge.axis import Split, smoothed, split_of
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twists.rows import TwistStretch, twist_stretches
+from steelyard.team.twists.slips_between import slip_between
 from steelyard.team.twists.statistic import TwistScatter, rates_of_change
 
 # Clocks are moved where they are off by more than this [s] and so many standard deviations, and then until the last
@@ -60,11 +61,10 @@ class TwistTeam:
     @classmethod
     def _fitted(cls, log: TeamLog, clocks: bool, edit: Edit) -> TwistTeam:
         """Return the fit of recordings after an edit."""
-        reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
         for left in reversed(range(CLOCK_ROUNDS)):
             parts = _changed(twist_stretches(log, late), edit)
-            fit = fit_twists(TwistScatter.of(parts), reference, log.names, _level_pairs(parts, reference))
+            fit = _joint_fit(parts, log)
             enough = (SETTLED if any(late.values()) else 1.0) * np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)
             settled = bool((np.abs(fit.delays) < enough).all())
             # What is told of clocks is what the rows and the fit were made with.
@@ -90,8 +90,8 @@ class TwistTeam:
             np.sqrt(((self._against(was, now) / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
         ]
 
-    def slip(self) -> SlipAt | None:
-        """Return the clearest slip within a recording; none where a hinge is the cause."""
+    def slip(self, log: TeamLog) -> SlipAt | None:
+        """Return the clearest slip, within a recording or else between two; none where a hinge is the cause."""
         if self.split is not None and self.split.sure:
             return None
         J, W, best = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), None
@@ -101,10 +101,14 @@ class TwistTeam:
             slip = find_slip(apart, part.seen, part.rows.rate, noise, drifts=True)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.rows.time[slip.row]), slip)
-        return best
+        if best is not None:
+            return best
+        return slip_between(self.parts, log.names.index(log.reference), lambda parts: _joint_fit(parts, log))
 
     def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""
+        if found.between:
+            return found
         raw, robot = twist_stretches(log, self.late)[found.recording], found.slip.robot
         J, W = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1)
         apart = np.cumsum(self._against(raw, self.parts[found.recording])[:, robot], axis=0) / raw.rows.rate
@@ -188,12 +192,18 @@ class TwistTeam:
         return out, into @ covariance @ into.T
 
 
+def _joint_fit(parts: Sequence[TwistStretch], log: TeamLog) -> TwistFit:
+    """Return the joint fit of recordings."""
+    reference = log.names.index(log.reference)
+    return fit_twists(TwistScatter.of(tuple(parts)), reference, log.names, _level_pairs(parts, reference))
+
+
 def _changed(parts: tuple[TwistStretch, ...], edit: Edit) -> tuple[TwistStretch, ...]:
     """Return recordings after an edit of their rows."""
     return tuple(p.changed(used) for p, used in zip(parts, edit(tuple(p.used for p in parts)), strict=True))
 
 
-def _level_pairs(parts: tuple[TwistStretch, ...], reference: int) -> Array:
+def _level_pairs(parts: Sequence[TwistStretch], reference: int) -> Array:
     """Return sums (N, 3, 3) of the direction of gravity in the reference grasp times that in each."""
     out = np.zeros((parts[0].level.shape[1], 3, 3))
     for part in parts:
