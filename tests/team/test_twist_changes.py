@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from steelyard.errors import CannotAnswer
+from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, Presence, Slip, TeamNoise, TeamScene
 from steelyard.team.estimate import TeamEstimate
@@ -130,3 +132,31 @@ def test_who_slipped_tells_where_down_is_only_where_nobody_else_does() -> None:
     assert left.level[900:, [0, 2]].all()
     alone = replace(part, level=part.level & [False, True, False])
     assert alone.changed(replace(part.used, seen=seen)).level[:, 1].all()
+
+
+def with_gains(made: TeamTrial, gains: dict[str, float]) -> TeamLog:
+    """The log with angular velocities too large by a factor."""
+    recordings = []
+    for one in made.log.recordings:
+        tracks = {
+            n: replace(
+                t, channels=t.channels | {"angular_velocity": gains.get(n, 1.0) * t.channels["angular_velocity"]}
+            )
+            for n, t in one.tracks.items()
+        }
+        recordings.append(replace(one, tracks=tracks))
+    return made.log.with_recordings(*recordings)
+
+
+def test_gyros_of_unlike_gains_are_named_and_in_the_bars() -> None:
+    made = simulate_team(SCENE, 0)
+    found = JointTeam().identify(with_gains(made, {"robot1": 1.02}))
+    (message,) = messages(found, "turning-gains")
+    first, second, third = (float(share) for share in re.findall(r"' ([+-][\d.]+) %", message))
+    assert second - first == pytest.approx(2.0, abs=0.21)
+    assert third == pytest.approx(first, abs=0.21)
+    bars = 1e3 * np.linalg.norm([found.grasps[name].std_m for name in made.log.names], axis=1)
+    assert bars[1:].min() > 8
+    assert (placed(made, found) <= 2 * bars).all()
+    alike = JointTeam().identify(with_gains(made, dict.fromkeys(made.log.names, 1.02)))
+    assert not messages(alike, "turning-gains")

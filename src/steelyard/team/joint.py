@@ -58,6 +58,7 @@ from steelyard.team.team_findings import (
     vertical,
 )
 from steelyard.team.twists.team import TwistTeam
+from steelyard.team.twists.turning_gains import TurningGains
 from steelyard.team.unexplained import unexplained
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
@@ -103,8 +104,10 @@ class JointTeam:
                 raise CannotAnswer(" ".join(finding.message for finding in apart))
             grasps, noise, late, left = moving.fit.grasps, moving.fit.noise, moving.late, moving.fit.left
             spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
+            turning = TurningGains.of(moving.parts, grasps, noise)
+            spread = turning.widened(spread, grasps)
             made, path = moving.rows(self.highest_hz)
-            found = [*moving.findings, *apart]
+            found = [*moving.findings, *apart, *turning.findings(log.names)]
             down, order = moving.down(), 1
         else:
             log, standing, begun, yields = self._standing(log)
