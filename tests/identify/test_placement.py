@@ -8,6 +8,7 @@ import pytest
 from steelyard.identify.effective import Effective
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.placement import misplaced
+from steelyard.identify.shape_error import ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log
@@ -56,6 +57,22 @@ def test_a_centre_of_mass_outside_the_object_can_only_be_a_wrong_pose() -> None:
 
 def test_a_gap_within_its_error_is_no_gap() -> None:
     assert misplaced(seen(CLUB, CLUB.whole(MASSES), std=2e-3), moved((0.006, 0, 0))) == ""
+
+
+SCANNED = ShapeError(com_m=3e-4, inertia_share=3e-3, stretch=0.03)
+
+
+@pytest.mark.parametrize("noise", ["low", "high"])
+@pytest.mark.parametrize(("shift", "said"), [((0, 0, 0), False), ((0.001, 0, 0), False), ((0.02, 0, 0), True)])
+def test_a_scan_that_lies_elsewhere_is_named_however_much_less_it_is_trusted(
+    shift: tuple[float, float, float], said: bool, noise: str
+) -> None:
+    log = handling_log(CLUB.whole(MASSES), "paper", noise=noise, seed=0)
+    found = PartMasses(moved(shift), shape_error=SCANNED).identify(log)
+    assert any("standard deviations apart" in note for note in found.notes) or not said
+    named = [f for f in found.findings if f.code == "part-not-homogeneous"]
+    assert bool(named) == said
+    assert not said or "pose_in_sensor is wrong by at least that much. Shape and log see" in named[0].message
 
 
 @pytest.mark.parametrize(("masses", "named"), [((0.4, 0.0), True), ((0.4, 0.004), False)])

@@ -12,7 +12,9 @@ from steelyard.findings import Finding
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.material_choice import Choices
+from steelyard.identify.misdrawn import DRAWN
 from steelyard.identify.placement import misplaced
+from steelyard.identify.shape_error import ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
@@ -27,6 +29,8 @@ FLAT_SHARE = 0.01
 FEWEST_FOR_PLANE = 4
 # A right shape is called wrong this often.
 MISFIT_CHANCE = 1e-5
+# A scan's centre of mass that lies off by so many times what its parts usually do lies elsewhere.
+FAR = 3.0
 
 
 def part_findings(
@@ -65,6 +69,18 @@ def part_findings(
 def misfit_limit(data: Effective, parts: int, chance: float = MISFIT_CHANCE) -> float:
     """Return the chi-square that a right shape exceeds with that chance: once in 100 000 logs."""
     return float(2 * gammaincinv(max(data.rank - min(parts, data.rank - 1), 1) / 2, 1 - chance))
+
+
+def elsewhere(data: Effective, body: InertialParameters, parts: Parts, error: ShapeError) -> str:
+    """Return a sentence where the log contradicts a scan, or its place, by more than scans are wrong; else "".
+
+    body   what the scan makes of the masses
+    error  of the scan and its place, as they say themselves
+    """
+    seen = data.blurred(error.at_least(DRAWN, 0.0).with_grasp(body))
+    if seen.misfit(body.vector) <= misfit_limit(seen, len(parts)):
+        return ""
+    return misplaced(data.blurred(error.with_grasp(body)), parts, FAR * DRAWN)
 
 
 def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:

@@ -22,9 +22,9 @@ from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.linear import reweighted
-from steelyard.identify.misdrawn import DRAWN, misdrawn
+from steelyard.identify.misdrawn import misdrawn
 from steelyard.identify.nearest_body import nearest_body
-from steelyard.identify.part_findings import misfit_limit, named_materials, part_findings
+from steelyard.identify.part_findings import elsewhere, misfit_limit, named_materials, part_findings
 from steelyard.identify.part_models import (
     Masses,
     averaged_masses,
@@ -148,22 +148,26 @@ class PartMasses:
             mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
             body = _with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
-        times = self._apart(data, body)
-        if times <= 1:
-            return self._answered(problem, data, body)
-        found = replace(self, shape_error=self.shape_error.scaled(times))._answered(problem, data, body)
-        words = f"shape and log see the centre of mass {times:.1f} standard deviations apart"
-        return found.noted(f"{words}: the shape was trusted as much less than it says")
+        return self._of_scan(problem, data, body) if self._doubtful else self._answered(problem, data, body)
 
-    def _apart(self, data: Effective, body: InertialParameters) -> float:
-        """Return by how much a scan is worse than it says, by where the log sees the centre of mass; 1 = it is not.
+    def _of_scan(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
+        """Return the Estimate with a scan that is as much worse than it says as the log's centre of mass lies off it.
 
         What is wrong with the centre is wrong with the inertia. Source: scale factor of the Particle Data Group.
         """
-        if not self._doubtful:
-            return 1.0
-        body = self.parts.whole(self._masses(data, body, self.parts).mean)
-        return max(1.0, apart(data, body, self.shape_error.covariance(body)))
+        drawn = self.parts.whole(self._masses(data, body, self.parts).mean)
+        times = apart(data, drawn, self.shape_error.covariance(drawn))
+        if times <= 1:
+            return self._answered(problem, data, body)
+        found = replace(self, shape_error=self.shape_error.scaled(times))._answered(problem, data, body)
+        words = f"hape and log see the centre of mass {times:.1f} standard deviations apart"
+        found = found.noted(f"s{words}: the shape was trusted as much less than it says")
+        # Judged by what the scan says of itself: trusted less, it would hide that it lies elsewhere.
+        where = elsewhere(data, drawn, self.parts, self.shape_error)
+        if not where:
+            return found
+        text = f"{where} S{words}: an inertia that leans on the shape is then wrong, too."
+        return replace(found, findings=(Finding.of("part-not-homogeneous", text), *found.findings))
 
     def _answered(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
         masses = self._masses(data, body, self.parts)
@@ -182,8 +186,8 @@ class PartMasses:
                 uneven_part = Finding.of("part-not-homogeneous", text)
                 return self._with_freed(problem, data, found).with_findings(*others, uneven_part)
         contradicted = any(f.code == "part-not-homogeneous" for f in findings)
-        if self._doubtful and not contradicted and self._off(data, self.parts.whole(masses.mean)):
-            words = misplaced(seen, self.parts, 3 * DRAWN)
+        if self._doubtful and not contradicted:
+            words = elsewhere(data, self.parts.whole(masses.mean), self.parts, self.shape_error)
             findings += [Finding.of("part-not-homogeneous", words)] if words else []
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
@@ -281,12 +285,6 @@ class PartMasses:
             spread = placed.left_of(data, spread)
             masses = misdrawn(data, self.parts, masses, self.shape_error)
         return self._built(problem, data, masses, body, spread + error, follows)
-
-    def _off(self, data: Effective, body: InertialParameters) -> bool:
-        """Whether the log contradicts the shape by more than a scan is wrong."""
-        error = replace(self.shape_error, com_m=max(self.shape_error.com_m, DRAWN))
-        seen = data.blurred(error.with_grasp(body))
-        return seen.misfit(body.vector) > misfit_limit(seen, len(self.parts))
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
