@@ -110,6 +110,20 @@ def test_only_the_shape_where_nothing_says_where_it_sits(capsys: pytest.CaptureF
     assert err.startswith("Where the object sits in the sensor is not known: only its shape is drawn.")
 
 
+@pytest.mark.parametrize(("x", "said", "placed"), [(0.0, False, True), (0.2, True, False)])
+def test_a_pose_that_is_not_the_results_is_passed_over(
+    capsys: pytest.CaptureFixture[str], folder: Path, x: float, said: bool, placed: bool
+) -> None:
+    X = hammer.recording(0).tool.X_OS.inverse()
+    turn = ", ".join(map(str, X.rotation.matrix.ravel()))
+    p = X.position + np.array([x, 0, 0])
+    pose = f'{{ position = [{p[0]}, {p[1]}, {p[2]}], unit = "m", rotation = [{turn}], form = "matrix" }}'
+    arguments = ("@result.json", "--parts", "@hammer.ply", "--pose-in-sensor", pose, "-o", "@out.html", "--json")
+    status, out, err = run(capsys, folder, *arguments)
+    assert (status, json.loads(out)["placed"]) == (0, placed)
+    assert ("put the parts up to 200 mm from where the result has them, and were passed over" in err) == said
+
+
 def test_truth_names_only_parts_that_are_the_same(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     changed = json.loads((folder / "result.json").read_text())
     changed["parts"][0]["volume_m3"] *= 1.5

@@ -26,6 +26,8 @@ if TYPE_CHECKING:
 
 _FILE = click.Path(path_type=Path)
 _SAME_VOLUME = 0.02
+# [m] Centroids of the same parts in the same place agree to rounding; a page does not show less.
+_SAME_PLACE = 1e-3
 
 
 @click.command(context_settings=HELP)
@@ -172,20 +174,20 @@ def _from_log(
 def _scene(
     parts: Path | None, scan: Path | None, placed: Pose | None, estimate: Estimate
 ) -> tuple[Scene, Mapping[int, str]]:
-    """Return what is drawn, and the names of its parts; their centroids say where it sits if nothing else does."""
+    """Return what is drawn, and the names of its parts; `placed` is where the object is said to sit (X_SO)."""
     from steelyard.io.ply_files import read_mesh
     from steelyard.report import scene_of_mesh, scene_of_solid
 
     if parts is not None and parts.suffix.lower() == ".ply":
         mesh, cloud = read_mesh(parts), None if scan is None else _cloud(scan)
-        return scene_of_mesh(mesh, cloud, placed or _matched(_enclosed(parts, mesh, estimate), estimate)), {}
+        return scene_of_mesh(mesh, cloud, _where(placed, _enclosed(parts, mesh, estimate), estimate)), {}
     saved, cloud = _saved(parts, scan)
     if estimate.parts:
         try:
             saved = saved.recut([part.volume for part in estimate.parts])
         except BadValue as error:
             raise BadValue(f"{parts or scan}: {error}") from None
-    placed = placed or _matched(saved.parts, estimate)
+    placed = _where(placed, saved.parts, estimate)
     return scene_of_solid(saved.solid, saved.labels, cloud, saved.rgb, placed), dict(enumerate(saved.names))
 
 
@@ -226,13 +228,27 @@ def _cloud(scan: Path) -> Cloud:
     return read_cloud(scan)
 
 
-def _matched(parts: Parts | None, estimate: Estimate) -> Pose | None:
-    """Return where the parts sit in the sensor by their centroids there, None where those do not say."""
+def _where(said: Pose | None, parts: Parts | None, estimate: Estimate) -> Pose | None:
+    """Return X_SO: where the object is `said` to sit, or where the result has its parts if that is elsewhere.
+
+    None where nothing fits: drawn beside its centre of mass, a shape would be worse than alone.
+    """
     import numpy as np
 
     from steelyard.report.scene import pose_from_centroids
 
     told = {part.label: part.centroid for part in estimate.parts}
     if parts is None or not told or set(parts.label.tolist()) != set(told):
-        return None
-    return pose_from_centroids(np.stack([told[label] for label in parts.label.tolist()]), parts.centroid)
+        return said
+    centroids = np.stack([told[label] for label in parts.label.tolist()])
+    own = pose_from_centroids(centroids, parts.centroid)
+    if said is None:
+        return own
+    off = float(np.linalg.norm(said.apply(parts.centroid) - centroids, axis=1).max())
+    if off < _SAME_PLACE:
+        return said
+    say(
+        f"Log, pose or truth put the parts up to {1e3 * off:.3g} mm from where the result has them, and were passed "
+        "over. Give the --log or --pose-in-sensor that the result was made with."
+    )
+    return own
