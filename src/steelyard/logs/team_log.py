@@ -16,6 +16,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
+from steelyard.logs.team_clock_units import require_one_clock_unit
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose
 
@@ -47,6 +48,7 @@ class TeamRecording:
             raise BadDescription(f"'{self.name}' holds no robot's data; give at least one stream.")
         object.__setattr__(self, "tracks", MappingProxyType(dict(self.tracks)))
         object.__setattr__(self, "away", frozenset(self.away))
+        require_one_clock_unit(self.name, self.tracks)
         begin, end = self.span
         if len(self.tracks) > 1 and begin > end:
             ranges = "; ".join(f"{n} {t.time[0]:.6g} to {t.time[-1]:.6g} s" for n, t in self.tracks.items())

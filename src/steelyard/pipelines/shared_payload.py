@@ -16,7 +16,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.fit import within_numbers
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -54,7 +54,16 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_own_numbers(log)
     found = ESTIMATORS[method].identify(log)
     before = (*stuck_forces(log), *_missing_rows(log), *_missing_wrenches(log, method))
-    return replace(found, findings=(*before, *found.findings))
+    return _weighed(replace(found, findings=(*before, *found.findings)))
+
+
+def _weighed(found: TeamEstimate) -> TeamEstimate:
+    """Return the estimate; raise CannotAnswer, with what was noticed first, where its mass is less than its bar."""
+    if found.mass >= found.std[0]:
+        return found
+    noticed = "".join(f" Noticed: {finding.message} {finding.remedy}" for finding in found.findings[:1])
+    weighed = f"{found.mass:.2g} kg, with a standard deviation of {found.std[0]:.2g} kg"
+    raise CannotAnswer(f"the data do not tell the mass: {weighed}.{noticed}")
 
 
 def _missing_rows(log: TeamLog) -> Iterator[Finding]:

@@ -1,0 +1,45 @@
+"""Whether robots tell time in one unit: in another, rows lie hundreds of times as far apart, and last as much longer.
+
+A slow logger writes fewer rows, and one that runs on writes more: neither does both.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from steelyard.errors import BadValue
+from steelyard.findings import about
+from steelyard.logs.team_track import Track
+
+# Stamps with so many times the step and the span of another robot's are milliseconds, or less, beside seconds.
+MANY = 100.0
+
+
+def require_one_clock_unit(recording: str, tracks: Mapping[str, Track]) -> None:
+    """Raise BadValue where the stamps of a robot in a recording are in another unit than those of the others."""
+    spans = {name: float(track.time[-1] - track.time[0]) for name, track in tracks.items() if len(track) > 1}
+    if len(spans) < 2:
+        return
+    short, long = min(spans, key=spans.__getitem__), max(spans, key=spans.__getitem__)
+    span = spans[long] / spans[short]
+    if span < MANY or (step := _step(tracks[long]) / _step(tracks[short])) < MANY:
+        return
+    raise BadValue(
+        f"in '{recording}' the rows of '{long}' lie {about(step)} times as far apart as those of '{short}', and last "
+        f"{about(span)} times as long: the time of {_odd(spans, short, long)} is not in the unit that was said. Set "
+        'the unit ("s", "ms", "us" or "ns") that its "time" has.'
+    )
+
+
+def _step(track: Track) -> float:
+    return float(np.median(np.diff(track.time)))
+
+
+def _odd(spans: Mapping[str, float], short: str, long: str) -> str:
+    """Return which of two robots the others do not go with: "one of them" where there are no others."""
+    if len(spans) < 3:
+        return "one of them"
+    middle = float(np.median(list(spans.values())))
+    return f"'{long if spans[long] / middle > middle / spans[short] else short}'"
