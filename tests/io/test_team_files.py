@@ -389,6 +389,9 @@ def test_results_come_back(tmp_path: Path) -> None:
     assert values["principal_moments_kgm2"] == pytest.approx([2, 3, 4])
     assert set(values["principal_frame"]["right"]) == {"rotation", "position_m"}
     np.testing.assert_allclose(values["grasps"]["right"]["std_deg"], made.grasps["right"].std_deg)
+    for entry in (values, values["std"]):  # every robot has biases of its own
+        assert entry["force_bias_N"] is entry["torque_bias_Nm"] is None
+    assert values["bias_covariance"] is values["cross_covariance"] is None
     write_result(replace(made, identified=np.arange(10) < 4), tmp_path / "open.json")
     values = json.loads((tmp_path / "open.json").read_text())
     assert values["principal_moments_kgm2"] is None

@@ -16,6 +16,10 @@ from steelyard.io.team_results import team_entries
 from steelyard.team.estimate import TeamEstimate
 from steelyard.whole_files import write_text
 
+_BIASES = ("force_bias_N", "torque_bias_Nm")
+# A team has a sensor for every robot, and often a bias for every recording: these have no one answer.
+_OF_ONE_SENSOR = (*_BIASES, "bias_covariance", "cross_covariance")
+
 
 def result_dict(estimate: Estimate) -> dict[str, Any]:
     """Return the result as plain values for JSON; numbers that are not finite become None.
@@ -23,12 +27,12 @@ def result_dict(estimate: Estimate) -> dict[str, Any]:
     `inertia_com_kgm2` is about the centre of mass in the axes of `frame`, None where the data do not fix it;
     `parameters` (10,) and `covariance` (10, 10) are m, h, I about the origin of `frame`; `bias_covariance` (6, 6) and
     `cross_covariance` (10, 6), torque first, let a later run share the bias. A team's result adds grasps, clock offsets
-    and principal frames.
+    and principal frames, and has None for the biases: every robot has its own.
     """
     torque_bias, force_bias = np.split(estimate.wrench_bias, 2)
     torque_std, force_std = np.split(estimate.wrench_bias_std, 2)
     identified = [bool(flag) for flag in estimate.identified]
-    values = {
+    values: dict[str, Any] = {
         "mass_kg": estimate.mass,
         "com_m": estimate.com,
         "inertia_com_kgm2": estimate.inertia_com,
@@ -50,7 +54,8 @@ def result_dict(estimate: Estimate) -> dict[str, Any]:
         "notes": list(estimate.notes),
     }
     if isinstance(estimate, TeamEstimate):
-        values |= team_entries(estimate)
+        values |= team_entries(estimate) | dict.fromkeys(_OF_ONE_SENSOR)
+        values["std"] |= dict.fromkeys(_BIASES)
     return {key: _plain(value) for key, value in values.items()}
 
 
