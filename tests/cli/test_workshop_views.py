@@ -13,8 +13,9 @@ from steelyard.cli.main import cli
 from steelyard.io.object_pose import read_object_pose
 from steelyard.io.view_folders import read_views
 from steelyard.simulate import workshop
+from steelyard.simulate.handling import motion_arrays
 from steelyard.simulate.scanning import scan_mesh
-from steelyard.simulate.workshop import known_object, scan_of
+from steelyard.simulate.workshop import known_object, scan_of, sensed
 from steelyard.workshop.catalogue import build
 
 
@@ -52,3 +53,14 @@ def test_the_log_has_noise_and_the_motion_none(tmp_path: Path) -> None:
     truth = build("hammer").truth_in_sensor
     assert found.codes() == set()
     assert abs(found.mass - float(truth.mass)) < 3 * found.std[0]
+
+
+def test_every_tool_has_noise_of_its_own_the_same_each_time() -> None:
+    columns = motion_arrays("static", build("hammer").truth_in_sensor)
+
+    def noise(name: str, seed: int = 0) -> np.ndarray:
+        return sensed(columns, "high", seed, name)[0]["force_sensor"] - columns["force_sensor"]
+
+    np.testing.assert_array_equal(noise("hammer"), noise("hammer"))
+    for other in (noise("ruler"), noise("hammer", 1)):
+        assert abs(np.corrcoef(noise("hammer").ravel(), other.ravel())[0, 1]) < 0.1

@@ -29,7 +29,9 @@ def workshop() -> None:
     show_default=True,
     help="Random variants of each family (sizes, materials, colours) instead of the nominal tools.",
 )
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of variants and clouds.")
+@click.option(
+    "--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of variants, clouds and noise."
+)
 @click.option("--tools", multiple=True, help="Only these families, such as hammer (repeat the option).")
 @click.option("--graded", is_flag=True, help="The graded families: tools with parts that are not homogeneous.")
 @click.option(
@@ -87,7 +89,7 @@ def build(
         tool = build_tool(name, (seed, k) if variants else None)
         known = known_object(tool, seed, motion)
         known = replace(known, name=f"{tool.name}-s{seed}-{k}" if variants else tool.name)
-        log = () if noise == "none" or known.track is None else sensed(known.track.columns(), noise, seed)
+        log = () if noise == "none" or known.track is None else sensed(known.track.columns(), noise, seed, known.name)
         write_object(known, folder / known.name, *log)
         if views:
             write_object_views(*scan_of(known, seed), folder / known.name / "views")

@@ -50,13 +50,14 @@ def known_object(tool: Tool, seed: int = 0, variant: str = "paper") -> KnownObje
     )
 
 
-def sensed(columns: Mapping[str, Array], noise: str, seed: int) -> tuple[dict[str, Array], str]:
+def sensed(columns: Mapping[str, Array], noise: str, seed: int, name: str) -> tuple[dict[str, Array], str]:
     """Return the columns of a motion as a robot and its wrist sensor would show them, and in a line what that is.
 
     columns  those of `motion_arrays` with a body; noise: a scenario of `handling.NOISE`, whose forces and torques are
              taken: accelerations come from the poses
+    name     of the object: noise of its own for each, so that means over objects average noise, too
     """
-    rng = np.random.default_rng(seed)
+    rng = np.random.default_rng([seed, *name.encode()])
     _, _, force, torque = noise_std(noise)
     out = {name: np.array(columns[name]) for name in _SENSED}
     rows = len(out["time"])
