@@ -123,6 +123,14 @@ def test_the_page_loads_nothing(full: Report) -> None:
         assert attributes.get("href") in (None, "data:,"), name
 
 
+def test_parts_without_a_drawing_stay_whole(full: Report) -> None:
+    """In columns a part broke between its name and its bar, and their edges scrolled."""
+    style = render(replace(full, scene=None)).split("<style>")[1].split("</style>")[0]
+    (alone,) = re.findall(r"\.parts\.alone \.legend{(.*?)}", style)
+    assert alone.startswith("display:grid;")
+    assert "overflow:visible" in style.split(".parts.alone aside{")[1].split("}")[0]
+
+
 def test_only_the_pages_own_script_and_style_may_run(full: Report) -> None:
     text_of_page = render(full)
     page = Page(text_of_page)
