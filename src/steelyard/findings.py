@@ -5,6 +5,7 @@ One table gives every code its remedy; `docs/findings.md` has an entry for each.
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
@@ -119,3 +120,9 @@ def percent(share: float) -> str:
 def about(value: float) -> str:
     """Return a factor as a message says it: two figures, without a power of ten."""
     return f"{float(f'{value:.2g}'):g}"
+
+
+def with_bar(value: float, std: float) -> str:
+    """Return "value ± std" as a message says it: two figures of the standard deviation, and the value to the same."""
+    places = min(max(1 - math.floor(math.log10(std)), 0), 9) if std > 0 else 1
+    return f"{value:.{places}f} ± {std:.{places}f}"

@@ -15,6 +15,7 @@ from steelyard.team.clocks.errors import NOTHING
 from steelyard.team.clocks.search import far_lags, searched
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
+from steelyard.team.team_findings import late_clocks
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
 
@@ -39,7 +40,8 @@ def test_a_clock_far_beyond_what_a_fit_finds_is_found_and_put_right(sensing: str
     assert found.clock_offsets_s["robot1"] == pytest.approx(seconds, abs=2e-3)
     assert found.codes() == {"clock-offset"}
     (said,) = found.findings
-    assert f"'robot1' are {abs(1e3 * seconds):.0f}" in said.message
+    told = said.message.removeprefix("The stamps of 'robot1' are ").split(" ± ")[0]
+    assert float(told) == pytest.approx(abs(1e3 * seconds), abs=2)
     assert found.mass == pytest.approx(right.mass, abs=0.05)
 
 
@@ -100,3 +102,8 @@ def test_clocks_of_noisy_twists_are_found_to_within_their_bars(loud: float) -> N
         for name, seconds in (("robot1", 0.0476), ("robot2", -0.0217)):
             off.append((found.clock_offsets_s[name] - seconds) / found.clock_offset_std_s[name])
     assert np.sqrt(np.mean(np.square(off))) < 1.7
+
+
+def test_a_small_bar_has_its_digits() -> None:
+    (said,) = late_clocks({"a": 0.0, "b": -0.01998765}, {"b": 3.97e-5})
+    assert "The stamps of 'b' are 19.988 ± 0.040 ms early" in said.message

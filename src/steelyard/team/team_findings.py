@@ -7,7 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, with_bar
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, unit_vectors
@@ -90,7 +90,7 @@ def late_clocks(late: Mapping[str, float], std: Mapping[str, float]) -> Iterator
         doubt = std.get(name, 0.0)
         if abs(seconds) > max(LATE_S, LATE_STD * doubt):
             way = "late" if seconds > 0 else "early"
-            text = f"The stamps of '{name}' are {1e3 * abs(seconds):.1f} ± {1e3 * doubt:.1f} ms {way}"
+            text = f"The stamps of '{name}' are {with_bar(1e3 * abs(seconds), 1e3 * doubt)} ms {way}"
             yield Finding.of("clock-offset", f"{text} against the reference; they were put right.")
 
 
