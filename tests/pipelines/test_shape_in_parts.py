@@ -9,6 +9,7 @@ import pytest
 
 import steelyard as sy
 from steelyard.errors import BadValue
+from steelyard.findings import Finding
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.held_object import Options
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
@@ -69,6 +70,14 @@ def test_the_scan_gives_the_inertia_that_slow_motion_does_not(made: hammer.Examp
 
 def test_a_known_number_of_parts_is_kept(cloud: Cloud) -> None:
     assert len(shape_of(cloud, parts=2).parts) == 2
+
+
+def test_what_a_log_decided_is_not_asked_of_one(made: hammer.Example, shape: Shape) -> None:
+    unsure = Finding.of("parts-unsure", "The number of parts is in doubt.")
+    assert "let a log" in unsure.remedy
+    doubted = replace(shape, segmentation=replace(shape.segmentation, findings=(unsure,)))
+    (said,) = [f for f in sy.identify(made.recording, scan=doubted).findings if f.code == "parts-unsure"]
+    assert said.remedy.startswith("Nothing to do: the forces of the log chose among the cuts.")
 
 
 def test_parts_and_scan_are_not_both_given(made: hammer.Example, shape: Shape) -> None:

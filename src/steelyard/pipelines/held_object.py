@@ -16,7 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import AT_REST, UNEXPLAINED, UNMEASURED, Finding
+from steelyard.findings import AT_REST, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
 from steelyard.identify.geodesic import Geodesic
@@ -139,7 +139,8 @@ def identify(
     if aligned.acceleration_from in ENCODERS and parts is None:
         estimate = allow_softness(log, estimate)
     aligned = replace(aligned, notes=()) if unmeasured else aligned
-    before = before if parts is None or isinstance(parts, Parts) else (*before, *parts.findings)
+    if not (parts is None or isinstance(parts, Parts)):
+        before = (*before, *(finding.instead(WEIGHED) for finding in parts.findings))
     # What is wrong with the log stands before what follows from it.
     own, estimate = estimate.findings, replace(_with_gain(estimate, aligned), findings=())
     estimate = estimate.with_findings(*before, *late, *of_sensor, *own, *aligned.findings, *touched)
