@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadInput, BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording, read_result
 from steelyard.io.object_pose import ObjectPose, read_object_pose
@@ -109,7 +109,7 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
     parts  how many, where that is known; chosen by shape and colour where not
     cells  "delaunay", or a mesher that is installed, "ftetwild" or "tetgen", to fill the same volume anew
 
-    Raises BadInput where nothing closed can be made of it.
+    Raises BadInput or CannotAnswer, with the file's name, where nothing closed can be made of it.
     """
     from steelyard.io.foreign_cells import in_cells_of
     from steelyard.pipelines.shape_in_parts import Shape, shape_of
@@ -117,7 +117,13 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
     if isinstance(scan, Shape):
         return scan
     refill = None if cells == "delaunay" else partial(in_cells_of, cells)
-    return shape_of(_seen(Path(scan)) if isinstance(scan, str | Path) else scan, parts, refill)
+    if not isinstance(scan, str | Path):
+        return shape_of(scan, parts, refill)
+    seen = _seen(Path(scan))
+    try:
+        return shape_of(seen, parts, refill)
+    except (BadInput, CannotAnswer) as error:
+        raise type(error)(f"{scan}: {error}") from None
 
 
 def save_parts(shape: Shape, path: str | Path) -> None:

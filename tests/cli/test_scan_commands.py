@@ -65,6 +65,15 @@ def test_tables_for_people_say_what_was_written(capsys: pytest.CaptureFixture[st
     assert "in 2 parts" in out
 
 
+def test_a_cloud_that_encloses_nothing_is_named(capsys: pytest.CaptureFixture[str], tmp_path: Path) -> None:
+    flat = np.random.default_rng(0).uniform(0, 0.2, (2000, 3)) * [1, 1, 0]
+    np.savez(tmp_path / "flat.npz", xyz=flat)
+    status, _, err = run(capsys, "segment", tmp_path / "flat.npz")
+    assert status == 2
+    assert err.endswith(f"steelyard: {tmp_path}/flat.npz: all 2000 points lie in a plane, which encloses nothing. "
+                        "Scan the object from more sides.\n")  # fmt: skip
+
+
 @pytest.mark.parametrize(
     ("arguments", "message"),
     [

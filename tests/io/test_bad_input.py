@@ -133,7 +133,7 @@ TABLES: list[tuple[str, str | bytes, type[BadInput], str]] = [
     ("no header", CSV.removeprefix(HEADER), BadDescription, f'{STREAM}, time: there is no column "t", because the file has no header. Give column numbers from 0 to 10.'),
     ("name twice", swap(CSV, "fy", "fx"), BadDescription, f'{STREAM}, force: the name "fx" stands over 2 columns. Rename all but one, or give column numbers.'),
     ("NaN", third("2,1,nan,3,1,1,1,1,0,0,0\n"), BadValue, f"{STREAM}, force: 1 of 4 rows are NaN, infinite or empty: row 3. Delete those rows, or record again."),
-    ("many NaN", HEADER + "0,nan,inf,0,1,1,1,1,0,0,0\n" * 9, BadValue, f"{STREAM}, force: 9 of 9 rows are NaN, infinite or empty: rows 1, 2, 3, 4, 5, ... Delete those rows, or record again."),
+    ("many NaN", HEADER + "0,nan,inf,0,1,1,1,1,0,0,0\n" * 9, BadValue, f"{STREAM}, force: all 9 rows are NaN, infinite or empty: there are no data. Check the driver and the columns, or record again."),
     ("NaN time", third(ROW.format("nan")), BadValue, f"{STREAM}, time: 1 of 4 rows are NaN, infinite or empty: row 3. Delete those rows, or record again."),
     ("time goes back", third(ROW.format(0)), BadValue, f"{STREAM}, time: time must not go back; it does once, from 1 in row 2 to 0 in row 3. Sort the rows, or cut the log there."),
     ("time goes back often", CSV + CSV.removeprefix(HEADER) * 2, BadValue, f"{STREAM}, time: time must not go back; it does 2 times, first from 3 in row 4 to 0 in row 5. Sort the rows, or cut the log there."),

@@ -107,6 +107,14 @@ def test_holes_of_an_organised_cloud_are_left_out(tmp_path: Path) -> None:
         read_cloud(tmp_path / "b.npz")
 
 
+@pytest.mark.parametrize(("points", "what"), [(0, "the file holds no points"), (40, "all 40 points are NaN")])
+def test_a_cloud_without_points_is_refused_with_what_to_do(tmp_path: Path, points: int, what: str) -> None:
+    np.savez(tmp_path / "a.npz", xyz=np.full((points, 3), np.nan))
+    with pytest.raises(BadFile) as error:
+        read_cloud(tmp_path / "a.npz")
+    assert str(error.value) == f"{tmp_path}/a.npz: {what}. Write the cloud again, or scan the object again."
+
+
 def written(path: Path, rgb: np.ndarray, kind: str, names: tuple[str, ...] = ("red", "green", "blue")) -> Path:
     """Write CLOUD's points with other colours; `kind` is that of a PLY property."""
     if path.suffix == ".npz":

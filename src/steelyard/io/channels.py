@@ -66,6 +66,11 @@ def require_finite(values: Array, where: str) -> None:
 
 def unfit_text(rows: np.ndarray[Any, np.dtype[np.int64]], count: int, where: str) -> str:
     """Return the error for `rows`, of `count`, that hold no number."""
+    if len(rows) == count:
+        return (
+            f"{where}: all {count} rows are NaN, infinite or empty: there are no data. Check the driver and the "
+            "columns, or record again."
+        )
     return (
         f"{where}: {len(rows)} of {count} rows are NaN, infinite or empty: {rows_text(rows)}. "
         "Delete those rows, or record again."

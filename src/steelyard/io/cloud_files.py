@@ -104,10 +104,13 @@ def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
     holes = np.isnan(xyz).all(1)
+    if holes.all():
+        what = f"all {len(xyz)} points are NaN" if len(xyz) else "the file holds no points"
+        raise BadFile(f"{path}: {what}. Write the cloud again, or scan the object again.")
     _require_finite(path, xyz, holes)
     try:
         whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
-        if holes.any() and not holes.all():
+        if holes.any():
             xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
         return Cloud(xyz, *whole)
     except BadValue as error:
