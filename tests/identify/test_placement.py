@@ -75,6 +75,12 @@ def test_a_scan_that_lies_elsewhere_is_named_however_much_less_it_is_trusted(
     assert not said or "pose_in_sensor is wrong by at least that much. Shape and log see" in named[0].message
 
 
+def test_where_a_scan_lies_is_said_once() -> None:
+    log = handling_log(CLUB.whole(MASSES), "paper", noise="low", seed=0)
+    far = PartMasses(moved((0.6, 0, 0)), shape_error=SCANNED).identify(log)
+    assert sum("outside the object" in f.message for f in far.findings) == 1
+
+
 @pytest.mark.parametrize(("masses", "named"), [((0.4, 0.0), True), ((0.4, 0.004), False)])
 def test_a_part_without_mass_is_named_and_a_light_one_is_not(masses: tuple[float, float], named: bool) -> None:
     log = handling_log(CLUB.whole(np.array(masses)), noise="low", seed=0)

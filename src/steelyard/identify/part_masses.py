@@ -164,7 +164,7 @@ class PartMasses:
         found = found.noted(f"s{words}: the shape was trusted as much less than it says")
         # Judged by what the scan says of itself: trusted less, it would hide that it lies elsewhere.
         where = elsewhere(data, drawn, self.parts, self.shape_error)
-        if not where:
+        if not where or any(where in finding.message for finding in found.findings):
             return found
         text = f"{where} S{words}: an inertia that leans on the shape is then wrong, too."
         return replace(found, findings=(Finding.of("part-not-homogeneous", text), *found.findings))
