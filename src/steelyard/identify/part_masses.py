@@ -160,13 +160,13 @@ class PartMasses:
         if times <= 1:
             return self._answered(problem, data, body)
         found = replace(self, shape_error=self.shape_error.scaled(times))._answered(problem, data, body)
-        words = f"hape and log see the centre of mass {times:.1f} standard deviations apart"
-        found = found.noted(f"s{words}: the shape was trusted as much less than it says")
+        words = f"and log see the centre of mass {times:.1f} standard deviations apart"
+        found = found.noted(f"shape {words}: the shape was trusted as much less than it says")
         # Judged by what the scan says of itself: trusted less, it would hide that it lies elsewhere.
         where = elsewhere(data, drawn, self.parts, self.shape_error)
         if not where or any(where in finding.message for finding in found.findings):
             return found
-        text = f"{where} S{words}: an inertia that leans on the shape is then wrong, too."
+        text = f"{where} Shape {words}: an inertia that leans on the shape is then wrong, too."
         return replace(found, findings=(Finding.of("part-not-homogeneous", text), *found.findings))
 
     def _answered(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
