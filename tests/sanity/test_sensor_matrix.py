@@ -44,6 +44,14 @@ def misread(recording: Recording, turn: np.ndarray, gains: tuple[float, ...] = (
     return replace(recording, streams=tuple(streams))
 
 
+def in_one_stream(recording: Recording) -> Recording:
+    """Return the recording as one file would hold it: a wrench in S beside poses in W, of one clock."""
+    wrench, poses = recording.streams
+    felt = {q: v[:: len(wrench) // len(poses)] for q, v in wrench.channels.items()}
+    both = Stream("log.csv", {**felt, **poses.channels}, poses.time, frames={"position": "W"})
+    return replace(recording, streams=(both,))
+
+
 def off(found: Estimate, right: Estimate) -> float:
     """Return how many standard deviations mass and centre of mass are off at most."""
     gap = np.append(found.mass - right.mass, found.com - right.com)
@@ -99,6 +107,16 @@ def test_a_turned_sensor_is_told_with_the_mount_that_mends_it(
     mended = identify(replace(wrong, streams=tuple(mounted)))
     assert mended.codes() == answer.codes()
     assert off(mended, answer) < 4
+
+
+def test_poses_beside_the_wrench_in_one_file_hide_nothing(recording: Recording) -> None:
+    one = in_one_stream(recording)
+    right = identify(one)
+    assert not right.codes() & {"sensor-turned", "gains-differ"}
+    for turn, gains, code in ((np.zeros(3), (1.05, 1, 1), "gains-differ"), (TURN, (1, 1, 1), "sensor-turned")):
+        found = identify(misread(one, turn, gains))
+        assert code in found.codes()
+        assert off(found, right) < 3
 
 
 def test_a_drift_hides_nothing(recording: Recording, answer: Estimate) -> None:

@@ -115,7 +115,7 @@ def examine_sensor(
     drift     whether the bias was taken to grow with time
     """
     stream = next((s for s in recording.streams if "force" in s.channels), None)
-    if stream is None or "W" in stream.frames.values() or {f.code for f in known} & ELSEWHERE:
+    if stream is None or "W" in _axes(stream) or {f.code for f in known} & ELSEWHERE:
         return estimate, ()
     found = sensor_matrix(log, drift)
     if found is None:
@@ -124,6 +124,11 @@ def examine_sensor(
     unlike = _sure(found.stretch, found.stretch_std, UNLIKE, found.left < UNLIKE_LEFT)
     findings = (*_turn(found, stream) * turned, *_gains(found) * unlike)
     return (_widened(estimate, found), findings) if findings else (estimate, ())
+
+
+def _axes(stream: Stream) -> set[str]:
+    """Return in whose axes the wrench is given; poses in the same stream are always in W."""
+    return {stream.frames.get(quantity, "S") for quantity in ("force", "torque")}
 
 
 def _sure(value: Array, std: Array, least: float, better: bool) -> bool:
