@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from steelyard.logs.recording import Recording, Stream
@@ -23,6 +25,13 @@ def recorded(variant: str, seed: int, spectrum: Spectrum = "white") -> Recording
     for part, (name, (column, std)) in zip(np.split(noise, 2, axis=1), FELT.items(), strict=True):
         channels[name] = arrays[column] + std * part
     return Recording((Stream("log", channels, arrays["time"]),), np.array([0, 0, -9.81]))
+
+
+def of_the_tip(recording: Recording, tip: tuple[float, float, float]) -> Recording:
+    """Return the recording whose positions are those of `tip` [m] in S."""
+    (stream,) = recording.streams
+    moved = stream.channels["position"] + stream.channels["rotation"] @ np.array(tip)
+    return replace(recording, streams=(replace(stream, channels={**stream.channels, "position": moved}),))
 
 
 def rows(recording: Recording, which: np.ndarray, restamped: bool = False) -> Recording:

@@ -40,6 +40,7 @@ class AlignOptions:
     estimate_delays   look for delays that were not given; False counts them as none
     leave_out_taps    leave the rows of taps out
     smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
+    place             (3,) [m] in S, the point whose position, velocity or acceleration the poses give
     """
 
     cutoff_hz: float = 40.0
@@ -47,6 +48,7 @@ class AlignOptions:
     estimate_delays: bool = True
     leave_out_taps: bool = True
     smallest_delay_s: float = 0.5e-3
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -142,7 +144,7 @@ def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
     streams = tuple(replace(s, time=_time(s) - lag, delay=0.0) if s is source else s for s in recording.streams)
     wrench_stream = next(s for s in streams if s.name == source.name and "force" in s.channels)
     cutoff = _cutoff(streams, wrench_stream, options)
-    moving = kinematics(streams, recording.gravity, cutoff)
+    moving = replace(kinematics(streams, recording.gravity, cutoff), place=np.array(options.place))
     feeling = next((s for s in streams if "specific_force" in s.channels), None)
     sensor = None
     if feeling is not None and "linear_acceleration" not in moving.channels:

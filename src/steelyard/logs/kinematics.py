@@ -13,7 +13,7 @@ from steelyard.errors import BadDescription
 from steelyard.logs.conditioning import Signal, noise_std, signal
 from steelyard.logs.recording import Stream
 from steelyard.logs.smoothing import Smooth, SmoothRotation, smooth, smooth_rotations
-from steelyard.spatial import Rotation
+from steelyard.spatial import Rotation, lever_acceleration
 
 Delays = Mapping[str, float]
 _UNKNOWN_LEVER = 0.5  # [m] how far from a turning axis S may be when nothing measures its acceleration
@@ -58,11 +58,13 @@ class Kinematics:
 
     channels  quantity -> Channel
     gravity_world  (3,) [m/s^2]
+    place     (3,) [m] in S, the point that the position and its derivatives are of
     """
 
     channels: Mapping[str, Channel]
     gravity_world: Array
     spans: Mapping[str, tuple[float, float]] = field(default_factory=dict)
+    place: Array = field(default_factory=lambda: np.zeros(3))
 
     @property
     def streams(self) -> tuple[str, ...]:
@@ -95,6 +97,9 @@ class Kinematics:
             acceleration = np.zeros_like(omega)
             guess = _UNKNOWN_LEVER * ((omega**2).sum(1) + np.linalg.norm(alpha, axis=1))
             variance = guess**2 / 3
+        elif self.place.any():
+            acceleration = acceleration - lever_acceleration(omega, alpha, self.place)
+            variance = variance + float(self.place @ self.place) * alpha_variance
         return Motion(gravity, turn, omega, alpha, velocity, acceleration, alpha_variance, variance, measured)
 
     def _smooth(self, quantity: str, time: Array, delays: Delays) -> tuple[Array, Array]:

@@ -14,23 +14,18 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
-from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import AT_REST, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
-from steelyard.identify.geodesic import Geodesic
-from steelyard.identify.least_squares import LeastSquares
-from steelyard.identify.noise_aware import NoiseAware
-from steelyard.identify.noise_levels import with_declared, without_dead
-from steelyard.identify.part_cuts import PartCuts
-from steelyard.identify.shape_error import MEASURED, ShapeError
+from steelyard.identify.shape_error import MEASURED
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
-from steelyard.logs.alignment import Aligned, align
+from steelyard.logs.alignment import Aligned
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
-from steelyard.pipelines.known_motion import with_known_acceleration
+from steelyard.pipelines.choice import Placed, estimator_for
+from steelyard.pipelines.rows import rows_to_fit
 from steelyard.sanity import (
     after,
     allow_softness,
@@ -40,11 +35,8 @@ from steelyard.sanity import (
     examine_masses,
     examine_sensor,
     examine_wrench_unit,
-    fitted_gravity,
     impossible_density,
-    levelled,
     maybe_hollow,
-    untouched,
 )
 from steelyard.spatial import Pose
 
@@ -52,14 +44,10 @@ if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
-# Cuts of the object into parts, seen from S, the log weight of each beforehand, and how wrong they may be.
-Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
 # [m] No robot holds a part that fills a cube of this edge; one of a centimetre in millimetres does.
 LARGEST = 2.0
-# A ball's radius of gyration per axis is its diameter times this.
-BALL = 0.5 / np.sqrt(5)
-# How the notes begin that say which direction of gravity was used, and that the bias may drift.
-GRAVITY_FOUND, DRIFT_ALLOWED = "gravity was estimated", "the bias may drift in a line"
+# How the note begins that says that the bias may drift.
+DRIFT_ALLOWED = "the bias may drift in a line"
 # Findings after which motion or wrench are no body's.
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Where an acceleration comes from that does not see the arm's structure bend.
@@ -110,13 +98,9 @@ def identify(
     known = identify(tool, options) if isinstance(tool, Recording) else tool
     known = None if known is None else _in_log_sign(known, recording)
     recording, before = examine(recording)
-    aligned, level = levelled_as(options.gravity, align(recording), recording)
-    mistimed = any(f.code == "motion-mismatch" for f in before)
-    log, unmeasured = with_known_acceleration(aligned.log, aligned, mistimed)
-    keep, touched = (slice(None), ()) if unmeasured else untouched(log, options.bias == "free")
-    if mistimed or any(f.code == "weight-compensated" for f in before):
-        touched = ()  # moving rows carry another mass, and only look touched
-    log = without_dead(with_declared(log.rows(keep), recording.noise))
+    rows = rows_to_fit(recording, before, options)
+    log, aligned, touched, unmeasured = rows.log, rows.aligned, rows.touched, rows.unmeasured
+    before = before if rows.place is None else (*before, rows.place.finding)
     shape = None if parts is None else _shape(parts, recording.object_pose, recording.object_pose_std)
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
     with _beside(before):
@@ -132,7 +116,10 @@ def identify(
         late = examine_wrench_unit(log, estimate, lambda rows: replace(load, log=rows).estimate(), before, late)
     if any(f.code == "force-unit" for f in (*before, *late)):
         touched = ()  # it only seems so in a wrong unit
-    estimate = load.without_tool(estimate).noted(*level, *unmeasured, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift)
+    estimate = load.without_tool(estimate).noted(
+        *rows.level, *unmeasured, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift
+    )
+    estimate = estimate if rows.place is None else rows.place.widened(estimate)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if parts is None:
         of_sensor = (*of_sensor, *examine_body(estimate, (*before, *late, *of_sensor)))
@@ -150,7 +137,7 @@ def identify(
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     if "weight-compensated" in estimate.codes():
         estimate = estimate.without_inertia("What a controller leaves of a weight has no inertia of its own.")
-    if estimate.codes() & MISREAD:
+    if estimate.codes() & (MISREAD if rows.place is None else MISREAD - {"motion-mismatch"}):
         estimate = estimate.with_remedies(UNEXPLAINED)
     elif unmeasured or log.still.all():
         estimate = estimate.with_remedies(UNMEASURED if unmeasured else AT_REST)
@@ -204,7 +191,7 @@ class _Load:
 
     def estimate(self) -> Estimate:
         """Return what was held: the tool still in it unless there is a shape."""
-        estimator, notes = _estimator(self.options, self.log, self.bias, self.shape, self.tool)
+        estimator, notes = estimator_for(self.options, self.log, self.bias, self.shape, self.tool)
         estimate = estimator.identify(self.log)
         if self.shape is not None and not estimate.evidence.rank:
             raise CannotAnswer(
@@ -239,22 +226,6 @@ def _looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed) -> Estim
     """Return the estimate with what its densities give away, first of all findings."""
     dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts)
     return replace(estimate, findings=(*dense, *estimate.findings))
-
-
-def levelled_as(
-    gravity: Literal["given", "unknown"], aligned: Aligned, recording: Recording
-) -> tuple[Aligned, tuple[str, ...]]:
-    """Return the log for the direction of gravity that it shows itself, and a note, where that was asked for."""
-    if gravity == "given":
-        return aligned, ()
-    if aligned.rotation is None:
-        raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
-    rotation = aligned.rotation.matrix
-    found = fitted_gravity(aligned.log, rotation, recording.gravity, aligned.acceleration_from)
-    if found is None:
-        raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
-    log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
-    return replace(aligned, log=log), (f"{GRAVITY_FOUND} {found.words} off the direction given",)
 
 
 def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
@@ -299,46 +270,6 @@ def _require_metres(parts: Parts) -> None:
             f"the largest part has a volume of {parts.volume.max():.3g} m^3, a cube of {size:.3g} m; a held object's "
             f"must be below {LARGEST:g} m. The mesh is probably in millimetres: scale it by 0.001."
         )
-
-
-def _estimator(
-    options: Options,
-    log: MotionLog,
-    bias: Bias,
-    shape: Placed | None,
-    tool: Estimate | None,
-) -> tuple[NoiseAware | LeastSquares | Geodesic | PartCuts, tuple[str, ...]]:
-    """Return the estimator and what there is to say about the choice."""
-    if shape is not None and options.method != "auto":
-        raise BadValue(f'method "{options.method}" knows no shape: leave it "auto", or leave parts and scan out.')
-    if shape is not None:
-        cuts, weights, error = shape
-        given = f"was scanned, in {len(cuts)} cuts" if len(cuts) > 1 else f"is given in {_counted(len(cuts[0]))}"
-        why = f"method: auto chose part-masses, because the shape {given}"
-        return PartCuts(cuts, weights, bias, shape_error=error, tool=tool), (why,)
-    if options.method == "least-squares":
-        return LeastSquares(bias=bias), ()
-    if options.method == "geodesic":
-        return Geodesic(bias=bias), ("geodesic: the prior is a ball of 5 cm at the centre that least squares found",)
-    size = 0.1 if options.object_size is None else options.object_size
-    estimator = NoiseAware(bias=bias, size=float(BALL * size))
-    prior = f"the weak prior is a ball about {100 * size:.0f} cm across, " + (
-        "the default" if options.object_size is None else "as given"
-    )
-    if options.method == "noise-aware":
-        return estimator, (prior,)
-    moving = not bool(log.still.all())
-    why = (
-        "noise in the acceleration of the moving rows would bias least squares"
-        if moving
-        else "all rows used are at rest, where it is weighted least squares kept physically consistent"
-    )
-    return estimator, (f"method: auto chose noise-aware, because {why}", prior)
-
-
-def _counted(parts: int) -> str:
-    """Return how many parts, in words that say what one part means."""
-    return f"{parts} parts" if parts > 1 else "one part, taken to be of one density"
 
 
 def _in_recording_sign(estimate: Estimate, recording: Recording) -> Estimate:

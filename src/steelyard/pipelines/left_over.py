@@ -7,10 +7,10 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import scaled_time
-from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
-from steelyard.pipelines.held_object import DRIFT_ALLOWED, GRAVITY_FOUND, levelled_as
+from steelyard.pipelines.held_object import DRIFT_ALLOWED, Options
+from steelyard.pipelines.rows import GRAVITY_FOUND, rows_to_fit
 from steelyard.sanity import examine
 
 # Residuals this many times those of the answer are not what it was made from.
@@ -26,10 +26,9 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
 
     tool  what was taken away from the answer, and is in the log
     """
-    recording, _ = examine(recording)
+    recording, before = examine(recording)
     found = any(note.startswith(GRAVITY_FOUND) for note in estimate.notes)
-    aligned, _ = levelled_as("unknown" if found else "given", align(recording), recording)
-    log = aligned.log
+    log = rows_to_fit(recording, before, Options(gravity="unknown" if found else "given")).aligned.log
     vector = estimate.parameters.vector + (0.0 if tool is None else tool.parameters.vector)
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
     if any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) and log.time is not None:

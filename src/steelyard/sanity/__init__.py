@@ -2,10 +2,11 @@
 
 from steelyard.sanity.after import after, drift_of
 from steelyard.sanity.before import examine
-from steelyard.sanity.contact import untouched
 from steelyard.sanity.density import impossible_density, maybe_hollow
 from steelyard.sanity.gravity import fitted_gravity, levelled
+from steelyard.sanity.misplaced import examine_place
 from steelyard.sanity.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.one_body import one_body
 from steelyard.sanity.rows import dead_channels
 from steelyard.sanity.sensor_matrix import examine_sensor
 from steelyard.sanity.soft_arm import allow_softness
@@ -19,11 +20,12 @@ __all__ = [
     "examine",
     "examine_body",
     "examine_masses",
+    "examine_place",
     "examine_sensor",
     "examine_wrench_unit",
     "fitted_gravity",
     "impossible_density",
     "levelled",
     "maybe_hollow",
-    "untouched",
+    "one_body",
 ]

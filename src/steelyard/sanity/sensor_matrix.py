@@ -48,6 +48,22 @@ class SensorMatrix:
     left: float
     moved: Array
 
+    @property
+    def turned(self) -> bool:
+        """Whether the wrench is turned beyond doubt."""
+        return self.left < TURN_LEFT and _sure(self.turn, self.turn_std, TURN)
+
+    @property
+    def unlike(self) -> bool:
+        """Whether gains differ beyond doubt."""
+        return self.left < UNLIKE_LEFT and _sure(self.stretch, self.stretch_std, UNLIKE)
+
+    def put_right(self, log: MotionLog) -> MotionLog:
+        """Return the log as a sensor would have felt it that neither is turned nor has unlike gains."""
+        wrench = _rotated(Rotation.exp(-self.turn), log.wrench)
+        force = np.linalg.solve(np.eye(3) + self.stretch, wrench[:, 3:].T).T
+        return replace(log, wrench=np.concatenate([wrench[:, :3], force], 1))
+
 
 # Symmetric matrices (5, 3, 3) without a trace, which add up to any.
 _STRETCHES = np.array(
@@ -114,26 +130,26 @@ def examine_sensor(
     known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
     drift     whether the bias was taken to grow with time
     """
-    stream = next((s for s in recording.streams if "force" in s.channels), None)
-    if stream is None or "W" in _axes(stream) or {f.code for f in known} & ELSEWHERE:
+    stream = felt_in_sensor(recording)
+    if stream is None or {f.code for f in known} & ELSEWHERE:
         return estimate, ()
     found = sensor_matrix(log, drift)
     if found is None:
         return estimate, ()
-    turned = _sure(found.turn, found.turn_std, TURN, found.left < TURN_LEFT)
-    unlike = _sure(found.stretch, found.stretch_std, UNLIKE, found.left < UNLIKE_LEFT)
-    findings = (*_turn(found, stream) * turned, *_gains(found) * unlike)
+    findings = (*_turn(found, stream) * found.turned, *_gains(found) * found.unlike)
     return (_widened(estimate, found), findings) if findings else (estimate, ())
 
 
-def _axes(stream: Stream) -> set[str]:
-    """Return in whose axes the wrench is given; poses in the same stream are always in W."""
-    return {stream.frames.get(quantity, "S") for quantity in ("force", "torque")}
+def felt_in_sensor(recording: Recording) -> Stream | None:
+    """Return the stream of the wrench, None where it is given in W; poses in the same stream always are."""
+    stream = next((s for s in recording.streams if "force" in s.channels), None)
+    in_world = stream is not None and "W" in {stream.frames.get(q, "S") for q in ("force", "torque")}
+    return None if in_world else stream
 
 
-def _sure(value: Array, std: Array, least: float, better: bool) -> bool:
-    """Whether a number is large and so many standard deviations from none, and the log is fitted better with them."""
-    return better and bool(((np.abs(value) > least) & (np.abs(value) > SURE * std)).any())
+def _sure(value: Array, std: Array, least: float) -> bool:
+    """Whether a number is large and so many standard deviations from none."""
+    return bool(((np.abs(value) > least) & (np.abs(value) > SURE * std)).any())
 
 
 def _turn(found: SensorMatrix, stream: Stream) -> tuple[Finding, ...]:

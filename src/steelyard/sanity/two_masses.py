@@ -67,12 +67,20 @@ def two_masses(log: MotionLog) -> TwoMasses | None:
     rows, _ = Rows.of(log)
     once = rows.solve()
     fit = rows.solve(_weight(rows.log.gravity), jackknife=True)
+    left = fit.left / once.left if once.left else 1.0
+    phi = fit.solution
+    return TwoMasses(float(phi[0]), phi[1:4], phi[16:20], fit.spread[16:20], left, noise_share(log))
+
+
+def noise_share(log: MotionLog) -> float:
+    """Return the share of noise in the squared acceleration of moving rows, linear or angular, the larger one."""
+    moving = ~log.still
+    if log.noise is None or not moving.any():
+        return 0.0
     variance = np.stack([n.acceleration for n in log.noise])[log.noise_class][moving]
     sizes = np.concatenate([log.angular_acceleration, log.acceleration], 1)[moving] ** 2
     shares = [variance[:, part].sum() / max(float(sizes[:, part].sum()), 1e-300) for part in (slice(0, 3), slice(3, 6))]
-    left = fit.left / once.left if once.left else 1.0
-    phi = fit.solution
-    return TwoMasses(float(phi[0]), phi[1:4], phi[16:20], fit.spread[16:20], left, max(shares))
+    return float(max(shares))
 
 
 def _weight(gravity: Array) -> Array:

@@ -1,0 +1,98 @@
+"""From a recording to the rows that are fitted: aligned, those whose motion is known, and that nobody touched.
+
+Where the poses turn out to be of another point than S, all is done anew for that point: delays and contact hang on it.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+
+from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import Finding
+from steelyard.identify.noise_levels import with_declared, without_dead
+from steelyard.logs.alignment import Aligned, AlignOptions, align
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording
+from steelyard.pipelines.known_motion import with_known_acceleration
+from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
+from steelyard.sanity.misplaced import Misplaced, misplaced
+
+if TYPE_CHECKING:
+    from steelyard.pipelines.held_object import Options
+
+# How the note begins that says which direction of gravity was used.
+GRAVITY_FOUND = "gravity was estimated"
+# The point is sought anew with the delays found for it until it moves by less [m].
+ROUNDS, SETTLED = 3, 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class FitRows:
+    """Rows of a recording, ready to be fitted.
+
+    log         the rows
+    aligned     what they were taken from
+    level       note on the direction of gravity, where that was asked for
+    unmeasured  note on rows that were left out since their acceleration is not known
+    touched     findings about time in which a hand or another load spoiled the wrench
+    place       the point whose positions the recording has, where it is not the origin of S
+    """
+
+    log: MotionLog
+    aligned: Aligned
+    level: tuple[str, ...]
+    unmeasured: tuple[str, ...]
+    touched: tuple[Finding, ...]
+    place: Misplaced | None = None
+
+    @property
+    def notes(self) -> tuple[str, ...]:
+        """What there is to say about gravity and about rows whose acceleration is not known."""
+        return (*self.level, *self.unmeasured)
+
+
+def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Options) -> FitRows:
+    """Return the rows that are fitted; `before` was found in the recording as it was read."""
+    rows = _rows(recording, before, options, AlignOptions())
+    place = None if rows.unmeasured else examine_place(rows.log, before, options.drift)
+    if place is None:
+        return rows
+    for _ in range(ROUNDS):
+        x, y, z = (float(v) for v in place.place)
+        rows = _rows(recording, before, options, AlignOptions(place=(x, y, z)))
+        rest = misplaced(rows.log, options.drift)
+        if rest is None or np.linalg.norm(rest.place) < SETTLED:
+            break
+        place = replace(place, place=place.place + rest.place, std=rest.std)
+    return replace(rows, place=place)
+
+
+def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
+    """Return the rows to fit, aligned as said."""
+    codes = {f.code for f in before}
+    aligned, level = levelled_as(options.gravity, align(recording, how), recording)
+    log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes)
+    keep, touched = (slice(None), ()) if unmeasured else one_body(log, recording, options.bias == "free", options.drift)
+    if codes & {"motion-mismatch", "weight-compensated"}:
+        touched = ()  # moving rows carry another mass, and only look touched
+    log = without_dead(with_declared(log.rows(keep), recording.noise))
+    return FitRows(log, aligned, level, unmeasured, touched)
+
+
+def levelled_as(
+    gravity: Literal["given", "unknown"], aligned: Aligned, recording: Recording
+) -> tuple[Aligned, tuple[str, ...]]:
+    """Return the log for the direction of gravity that it shows itself, and a note, where that was asked for."""
+    if gravity == "given":
+        return aligned, ()
+    if aligned.rotation is None:
+        raise BadValue('gravity "unknown" needs the rotation of the sensor; the log has none. Add a rotation stream.')
+    rotation = aligned.rotation.matrix
+    found = fitted_gravity(aligned.log, rotation, recording.gravity, aligned.acceleration_from)
+    if found is None:
+        raise CannotAnswer("The log does not show the direction of gravity: turn the sensor about two different axes.")
+    log = levelled(aligned.log, rotation, found.gravity, aligned.acceleration_from)
+    return replace(aligned, log=log), (f"{GRAVITY_FOUND} {found.words} off the direction given",)

@@ -1,0 +1,41 @@
+"""The rows in which the robot alone held one body, where something else may spoil the log as a whole.
+
+A sensor that is turned, gains that differ or positions of another point than S make a wrench that does not fit one body
+in some of the time, as a hand does. Contact is what is left of it once they are put right.
+"""
+
+from __future__ import annotations
+
+from steelyard.check import Mask
+from steelyard.findings import Finding
+from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Recording
+from steelyard.sanity.contact import untouched
+from steelyard.sanity.misplaced import misplaced
+from steelyard.sanity.sensor_matrix import felt_in_sensor, sensor_matrix
+
+
+def one_body(
+    log: MotionLog, recording: Recording, with_bias: bool, drift: bool = False
+) -> tuple[Mask, tuple[Finding, ...]]:
+    """Return the rows (N,) in which the robot alone held one body, and what was found in the others.
+
+    with_bias, drift  whether a wrench bias is free, and whether it may grow with time
+    """
+    kept, touched = untouched(log, with_bias)
+    if not touched:
+        return kept, touched
+    right = _put_right(log, recording, drift)
+    if right is log:
+        return kept, touched
+    more, still_touched = untouched(right, with_bias)
+    return (more, still_touched) if more.sum() > kept.sum() else (kept, touched)
+
+
+def _put_right(log: MotionLog, recording: Recording, drift: bool) -> MotionLog:
+    """Return the log without what spoils all of it beyond doubt; the same log where nothing does."""
+    sensor = None if felt_in_sensor(recording) is None else sensor_matrix(log, drift)
+    if sensor is not None and (sensor.turned or sensor.unlike):
+        log = sensor.put_right(log)
+    place = misplaced(log, drift)
+    return place.put_right(log) if place is not None and place.sure else log
