@@ -97,11 +97,15 @@ UNEXPLAINED: dict[str, str] = {
 
 @dataclass(frozen=True)
 class Finding:
-    """A code of `formats`, one sentence with the numbers, and what to do."""
+    """A code of `formats`, one sentence with the numbers, and what to do.
+
+    left_in  whether the log was read with it, cause as it is: what it makes a log look like is then not told as well
+    """
 
     code: str
     message: str
     remedy: str
+    left_in: bool = False
 
     @classmethod
     def of(cls, code: str, message: str) -> Finding:

@@ -8,6 +8,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from sanity.held_poses import BODY, recorded
+from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import solids
 from steelyard.logs.log import MotionLog
@@ -107,6 +109,25 @@ def test_a_turned_sensor_is_told_with_the_mount_that_mends_it(
     mended = identify(replace(wrong, streams=tuple(mounted)))
     assert mended.codes() == answer.codes()
     assert off(mended, answer) < 4
+
+
+@pytest.mark.parametrize("degrees", [(0, 0, 90), (-90, 0, 0), (0, 0, 180), (100, -100, 50), (20, 10, 0)])
+def test_the_mount_printed_for_a_large_turn_mends_it(degrees: tuple[float, float, float]) -> None:
+    """One paste, and the answer is that of S: no contact, no plane, no other cause on the way."""
+    wrong = misread(recorded("paper", 0), np.radians(degrees))
+    try:
+        found = identify(wrong).findings
+        assert not {f.code for f in found} & {"contact", "nearly-planar", "gravity-frame", "force-unit"}
+        said = next(f.remedy for f in found if f.code == "sensor-turned")
+    except CannotAnswer as refused:
+        said = str(refused)
+        assert said.startswith("Noticed before the fit: The wrench is turned by")
+    pasted = re.search(r"Set mount = \{ rotation = \[(.*?)\], form = 'rotation-vector' \} for 'log'", said)
+    assert pasted is not None
+    mount = Mount(Rotation.exp([float(v) for v in pasted[1].split(",")]))
+    mended = identify(replace(wrong, streams=tuple(replace(s, mount=mount) for s in wrong.streams)))
+    assert mended.codes() == set()
+    assert np.abs((np.append(mended.mass, mended.com) - np.append(BODY.mass, BODY.com)) / mended.std[:4]).max() < 4
 
 
 def test_poses_beside_the_wrench_in_one_file_hide_nothing(recording: Recording) -> None:

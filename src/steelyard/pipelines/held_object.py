@@ -114,13 +114,14 @@ def identify(
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
     if parts is None:
         late = examine_wrench_unit(log, estimate, lambda rows: replace(load, log=rows).estimate(), before, late)
-    if any(f.code == "force-unit" for f in (*before, *late)):
-        touched = ()  # it only seems so in a wrong unit
+    touched, late = _not_following(touched, before, late)
     estimate = load.without_tool(estimate).noted(
         *rows.level, *unmeasured, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift
     )
     estimate = estimate if rows.place is None else rows.place.widened(estimate)
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
+    if any(f.code == "sensor-turned" for f in of_sensor):
+        before = tuple(f for f in before if f.code != "sensor-turned")  # the fit tells it better
     if parts is None:
         of_sensor = (*of_sensor, *examine_body(estimate, (*before, *late, *of_sensor)))
     if aligned.acceleration_from in ENCODERS and parts is None:
@@ -145,6 +146,16 @@ def identify(
     return _in_recording_sign(estimate, recording)
 
 
+def _not_following(
+    touched: tuple[Finding, ...], before: tuple[Finding, ...], late: tuple[Finding, ...]
+) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
+    """Return the findings `touched` and `late` without what only seems so in a wrong unit, or by a cause left in."""
+    left_in = any(f.left_in for f in before)
+    wrong_unit = any(f.code == "force-unit" for f in (*before, *late)) or any(f.code == "length-in-mm" for f in late)
+    seen = tuple(f for f in late if not (left_in and f.code == "nearly-planar"))
+    return () if wrong_unit or left_in else touched, seen
+
+
 @contextmanager
 def _beside(findings: tuple[Finding, ...]) -> Iterator[None]:
     """Say with a refusal what was noticed before: it is the likely cause."""
@@ -154,6 +165,8 @@ def _beside(findings: tuple[Finding, ...]) -> Iterator[None]:
         if not findings:
             raise
         said = " ".join(f"{f.message} {f.remedy}" for f in findings)
+        if any(f.left_in for f in findings):
+            raise CannotAnswer(f"Noticed before the fit: {said} As the log was read: {error}") from None
         raise CannotAnswer(f"{error} Noticed before the fit: {said}") from None
 
 

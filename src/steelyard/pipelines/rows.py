@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
+from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.noise_levels import with_declared, without_dead
@@ -75,7 +76,11 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     codes = {f.code for f in before}
     aligned, level = levelled_as(options.gravity, align(recording, how), recording)
     log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes)
-    keep, touched = (slice(None), ()) if unmeasured else one_body(log, recording, options.bias == "free", options.drift)
+    keep: slice | Mask = slice(None)
+    touched: tuple[Finding, ...] = ()
+    turned = any(f.left_in and f.code == "sensor-turned" for f in before)  # then nothing fits one body
+    if not unmeasured and not turned:
+        keep, touched = one_body(log, recording, options.bias == "free", options.drift)
     if codes & {"motion-mismatch", "weight-compensated"}:
         touched = ()  # moving rows carry another mass, and only look touched
     log = without_dead(with_declared(log.rows(keep), recording.noise))

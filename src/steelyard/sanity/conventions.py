@@ -26,6 +26,7 @@ from steelyard.sanity.blind_tilt import blind_tilt
 from steelyard.sanity.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.glance import Glance, glance, in_other_axes
 from steelyard.sanity.mirrored import Mirror, mirrored
+from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.swapped import examine_swapped
 from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
@@ -156,7 +157,11 @@ def _best_rival(recording: Recording, view: Glance, given: Reading) -> Reading |
         and (r.view is None or r.fit.torque_share < TORQUES_TOO)
     ]
     # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
-    return min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
+    best = min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
+    if best is None or best.fit.force_share < LEVEL:
+        return best
+    turned = turned_sensor(view, given.gravity, 1)
+    return None if turned is not None and turned.force_share < MUCH_BETTER * best.fit.force_share else best
 
 
 def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
@@ -201,9 +206,10 @@ def _as_read(recording: Recording, best: Reading) -> Recording:
 
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with the wrench or gravity turned round where the mass comes out negative, or with both."""
-    if reading.fit.sign == 0 or view.sign_free:
+    sign = _sign(view, reading)
+    if sign == 0 or view.sign_free:
         return recording, ()
-    if reading.fit.sign > 0:
+    if sign > 0:
         return _both_signs(recording, view, reading)
     mass = f"The mass comes out as {reading.fit.mass:.3g} ± {reading.fit.mass_std:.2g} kg"
     moved = _moved_sign(view, reading)
@@ -218,6 +224,14 @@ def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     was, now = ("on-object", "on-sensor") if recording.wrench_sign > 0 else ("on-sensor", "on-object")
     message = f'{mass}, so the wrench has the other sign; it was taken as "{now}" instead of "{was}"{doubt}.'
     return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
+
+
+def _sign(view: Glance, reading: Reading) -> int:
+    """Return the sign of the mass, 0 where it is not sure or half a turn of S explains a negative one much better."""
+    if reading.fit.sign >= 0:
+        return reading.fit.sign
+    turned = turned_sensor(view, reading.gravity, 1)
+    return 0 if turned is not None and turned.force_share < MUCH_BETTER * reading.fit.force_share else -1
 
 
 def _both_signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
@@ -271,15 +285,18 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     if reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
         return recording, ()
     tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
-    turned = turned_sensor(view, reading.gravity, reading.fit.mass)
+    turned = turned_sensor(view, reading.gravity, _sign(view, reading))
+    stream = next(s for s in recording.streams if "force" in s.channels)
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):
         message = (
-            f"S seems turned by {np.degrees(turned.angle):.0f} degrees about ({_shown(turned.axis)}) of S against the "
-            f"frame whose rotation is given: so read, {percent(turned.force_share)} of the force variance is left "
-            f"unexplained instead of {percent(reading.fit.force_share)}; the answer does not assume this."
+            f"The wrench is turned by {np.degrees(turned.rotation.angle()):.0f} degrees against the frame whose "
+            f"rotation is given: '{stream.name}' looks mounted by the rotation vector "
+            f"({vector(mount_of(stream, turned.rotation))}) rad in S. So read, {percent(turned.force_share)} of the "
+            f"force variance is left unexplained instead of {percent(reading.fit.force_share)}; the answer does not "
+            "assume this."
         )
-        return recording, (Finding.of("gravity-frame", message),)
-    mirror = mirrored(view, reading.gravity, reading.fit.mass)
+        return recording, (Finding("sensor-turned", message, mount_remedy(stream, turned.rotation), left_in=True),)
+    mirror = mirrored(view, reading.gravity, _sign(view, reading))
     if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
         message = (
             f"The forces fit one body if they are read as {mirror.words}: so, {percent(mirror.force_share)} of their "
@@ -287,7 +304,7 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
             "this."
         )
         remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
-        return recording, (Finding("force-unit", message, remedy),)
+        return recording, (Finding("force-unit", message, remedy, left_in=True),)
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
@@ -302,7 +319,7 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
 def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> bool:
     """Tell whether a constant turn of S explains what neither the given nor a tilted gravity does."""
     return (
-        turned.angle > SENSOR_TURN
+        turned.rotation.angle() > SENSOR_TURN
         and turned.force_share < min(MUCH_BETTER * given.force_share, 0.3)
         and (tilt is None or turned.force_share < 0.5 * tilt.force_share)
     )

@@ -31,11 +31,11 @@ def _reflections() -> Array:
 REFLECTIONS = _reflections()
 
 
-def mirrored(view: Glance, gravity: Array, mass: float) -> Mirror | None:
+def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
     """Return the exchange of axes and signs that explains the force best; None without rotations or all forces."""
     if view.rotation is None or any(view.dead[3:]):
         return None
-    seen, force, down = force_and_weight(view, gravity, mass)
+    seen, force, down = force_and_weight(view, gravity, sign)
     # force = X m down: the trace with X is largest for the right one.
     X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
     _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)

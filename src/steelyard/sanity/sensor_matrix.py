@@ -18,6 +18,7 @@ from steelyard.identify.people import parameter_jacobian
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.full_fit import Rows
+from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.spatial import Rotation, cross_matrix
 
 # A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many
@@ -78,19 +79,21 @@ _STRETCHES = np.array(
 )
 
 
-def sensor_matrix(log: MotionLog, drift: bool = False) -> SensorMatrix | None:
+def sensor_matrix(log: MotionLog, drift: bool = False, turn: Rotation | None = None) -> SensorMatrix | None:
     """Return what the wrench says of the sensor; None for too short a log or channels that do not measure.
 
     drift  whether the bias may grow with time
+    turn   by how much the wrench seems turned; needed where that is much
     """
     if len(log) < _FEWEST_ROWS or log.dead.any():
         return None
     rows, _ = Rows.of(log, drift)
     if rows.block.max() + 1 < _FEWEST_BLOCKS:
         return None
-    plain, turn = rows.solve(), Rotation.identity()
+    plain, turn = rows.solve(), turn or Rotation.identity()
     turns, stretches = (slice(len(plain.solution) + k, len(plain.solution) + n) for k, n in ((0, 3), (3, 8)))
-    phi, values = plain.solution[:10], rows.values
+    values = rows.values
+    phi = replace(rows, values=_rotated(turn.inverse(), values)).solve().solution[:10]
     for _ in range(ROUNDS):
         felt = rows.columns[:, :, :10] @ phi
         right = replace(rows, values=_rotated(turn.inverse(), values))
@@ -133,11 +136,18 @@ def examine_sensor(
     stream = felt_in_sensor(recording)
     if stream is None or {f.code for f in known} & ELSEWHERE:
         return estimate, ()
-    found = sensor_matrix(log, drift)
+    told = any(f.code == "sensor-turned" for f in known)
+    found = sensor_matrix(log, drift, _first_turn(log) if told else None)
     if found is None:
         return estimate, ()
     findings = (*_turn(found, stream) * found.turned, *_gains(found) * found.unlike)
     return (_widened(estimate, found), findings) if findings else (estimate, ())
+
+
+def _first_turn(log: MotionLog) -> Rotation:
+    """Return the turn of the force that follows what accelerates and holds the load best (Wahba)."""
+    force, own = log.wrench[:, 3:], log.acceleration - log.gravity
+    return Rotation.aligning((force - force.mean(0)).T @ (own - own.mean(0)))
 
 
 def felt_in_sensor(recording: Recording) -> Stream | None:
@@ -153,15 +163,14 @@ def _sure(value: Array, std: Array, least: float) -> bool:
 
 
 def _turn(found: SensorMatrix, stream: Stream) -> tuple[Finding, ...]:
-    right = Rotation.exp(-found.turn) if stream.turn is None else Rotation.exp(-found.turn) @ stream.turn
-    numbers = ", ".join(f"{v:.4f}" for v in right.log() + 0.0)
+    turn = Rotation.exp(found.turn)
     size, spread = np.linalg.norm(found.turn), np.linalg.norm(found.turn_std)
     message = (
         f"The wrench is turned by {np.degrees(size):.2g} ± {np.degrees(spread):.1g} degrees against what a body gives "
-        f"in these poses: '{stream.name}' looks mounted by the rotation vector ({numbers}) rad in S. The answer takes "
-        "S as it was given; its bars hold what that changes."
+        f"in these poses: '{stream.name}' looks mounted by the rotation vector ({vector(mount_of(stream, turn))}) rad "
+        "in S. The answer takes S as it was given; its bars hold what that changes."
     )
-    return (Finding.of("sensor-turned", message),)
+    return (Finding("sensor-turned", message, mount_remedy(stream, turn)),)
 
 
 def _gains(found: SensorMatrix) -> tuple[Finding, ...]:

@@ -12,10 +12,12 @@ import numpy as np
 from steelyard.check import Array, Integers
 from steelyard.sanity.glance import Glance, Seen
 from steelyard.sanity.static_fit import beside, fit, leave_out, solve
-from steelyard.spatial import Rotation, axial_vector
+from steelyard.spatial import Rotation, cross_matrix
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
+# A turn is refined so many times.
+_ROUNDS = 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,10 +45,9 @@ class GlanceTilt:
 
 @dataclass(frozen=True, eq=False)
 class Turn:
-    """A constant turn between S and the frame whose rotation is given: angle [rad], axis (3,) in S, what it leaves."""
+    """A constant turn of the wrench against the frame whose rotation is given, and what it leaves of the force."""
 
-    angle: float
-    axis: Array
+    rotation: Rotation
     force_share: float
 
 
@@ -113,23 +114,45 @@ def angle_between(a: Array, b: Array) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
-def force_and_weight(view: Glance, gravity: Array, mass: float) -> tuple[Seen, Array, Array]:
-    """Return what is seen, and about their means the force (N, 3) and what it should follow, of the sign of `mass`."""
+def force_and_weight(view: Glance, gravity: Array, sign: float) -> tuple[Seen, Array, Array]:
+    """Return what is seen, and about their means the force (N, 3) and what it should follow, by the sign of the mass.
+
+    One that is not known (0) is taken to be right: turned by more than 120 degrees, forces look like a negative mass.
+    """
     seen = replace(view, acceleration=None).seen(gravity, view.rotation)
     force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
-    return seen, force, -pull * (np.sign(mass) or 1.0)
+    return seen, force, -pull * (np.sign(sign) or 1.0)
 
 
-def turned_sensor(view: Glance, gravity: Array, mass: float) -> Turn | None:
-    """Return the constant turn of S that explains the force best (Wahba); None without rotations or all forces."""
+def turned_sensor(view: Glance, gravity: Array, sign: float) -> Turn | None:
+    """Return the constant turn of S that explains the force best; None without rotations or all forces.
+
+    Where the sensor turns tells it (Wahba); then what the acceleration adds to the force puts it right.
+    """
     if view.rotation is None or any(view.dead[3:]):
         return None
-    seen, force, down = force_and_weight(view, gravity, mass)
-    X = Rotation.aligning(force.T @ down).matrix
-    axis = axial_vector(X) / 2
-    angle = float(np.arctan2(np.linalg.norm(axis), (np.trace(X) - 1) / 2))
-    _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
-    return Turn(angle, axis / max(float(np.linalg.norm(axis)), 1e-12), share)
+    _, force, down = force_and_weight(view, gravity, sign)
+    turn = Rotation.aligning(force.T @ down)
+    force = view.seen(gravity, view.rotation).wrench[:, 3:]
+    still = replace(view, acceleration=None)
+    return min((_refined(v.seen(gravity, v.rotation), force, turn, view.block) for v in (view, still)), key=_left)
+
+
+def _refined(seen: Seen, force: Array, turn: Rotation, block: Integers) -> Turn:
+    """Return the turn of forces (N, 3) near the one given with which a body felt as `seen` explains most of them."""
+    body = beside(-seen.pull[:, :, None], seen.lever)
+    share = 1.0
+    for _ in range(_ROUNDS):
+        right = turn.inverse().apply(force)
+        held, _, share = solve(body, right, block)
+        felt, size = body @ held, len(held)
+        more, _, _ = solve(beside(body, -cross_matrix(felt - felt.mean(0))), right, block)
+        turn = turn @ Rotation.exp(more[size:])
+    return Turn(turn, share)
+
+
+def _left(turn: Turn) -> float:
+    return turn.force_share
 
 
 def blind_axis(view: Glance, rotation: Array) -> Array | None:

@@ -68,7 +68,7 @@ def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array)
         f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {_percent(left)} of "
         f"their variance is left unexplained instead of {_percent(share)}; the answer does not assume this."
     )
-    return (Finding("force-unit", text, REMEDY),)
+    return (Finding("force-unit", text, REMEDY, left_in=True),)
 
 
 def _compared(felt: Array, spread: float, moment: Array) -> tuple[Finding, ...]:
@@ -84,7 +84,7 @@ def _compared(felt: Array, spread: float, moment: Array) -> tuple[Finding, ...]:
             "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
             "other side of S. The answer does not assume this."
         )
-        return (Finding("force-unit", text, REMEDY),)
+        return (Finding("force-unit", text, REMEDY, left_in=True),)
     for factor, words in UNITS:
         if abs(ratio / factor - 1) < NEAR + 3 * std / abs(ratio) and abs(ratio - 1) > 5 * std:
             much, way = ((ratio, std), "large") if ratio > 1 else ((1 / ratio, std / ratio**2), "small")

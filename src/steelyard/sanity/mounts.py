@@ -1,0 +1,25 @@
+"""The mount that puts a turned wrench right, as a description has it."""
+
+from __future__ import annotations
+
+from steelyard.logs.recording import Stream
+from steelyard.spatial import Rotation
+
+
+def mount_of(stream: Stream, turn: Rotation) -> Rotation:
+    """Return how the frame of a stream lies in S, whose wrench is turned by `turn` against what S would feel."""
+    return turn.inverse() if stream.turn is None else turn.inverse() @ stream.turn
+
+
+def mount_remedy(stream: Stream, turn: Rotation) -> str:
+    """Return what to write into the description."""
+    beside = ""
+    if stream.arm is not None:
+        beside = f", position = [{', '.join(f'{v:.6g}' for v in stream.arm)}], unit = 'm'"
+    rotation = f"rotation = [{vector(mount_of(stream, turn))}], form = 'rotation-vector'"
+    return f"Set mount = {{ {rotation}{beside} }} for '{stream.name}', or correct the poses."
+
+
+def vector(rotation: Rotation) -> str:
+    """Return the rotation vector [rad] in words."""
+    return ", ".join(f"{v:.4f}" for v in rotation.log() + 0.0)
