@@ -58,6 +58,13 @@ def test_forces_in_another_unit(made: Recording, factor: float, words: str) -> N
     assert words in named(edited(made, force=lambda v: factor * v))
 
 
+def test_newton_metres_declared_as_newton_millimetres(made: Recording) -> None:
+    read, (found,) = examine(edited(made, torque=lambda v: v / 1000))
+    assert found.code == "length-in-mm"
+    (was,), (now,) = ([s.channels["torque"] for s in r.streams if "torque" in s.channels] for r in (made, read))
+    np.testing.assert_allclose(now, was)
+
+
 def still(order: list[int]) -> Recording:
     """Return twelve still poses whose torque columns stand in this order."""
     rng = np.random.default_rng(3)

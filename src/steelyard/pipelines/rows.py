@@ -19,6 +19,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
+from steelyard.sanity.contact import untouched
 from steelyard.sanity.misplaced import Misplaced, misplaced
 
 if TYPE_CHECKING:
@@ -78,8 +79,12 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes)
     keep: slice | Mask = slice(None)
     touched: tuple[Finding, ...] = ()
-    turned = any(f.left_in and f.code == "sensor-turned" for f in before)  # then nothing fits one body
-    if not unmeasured and not turned:
+    left_in = {f.code for f in before if f.left_in}
+    if unmeasured or "sensor-turned" in left_in:
+        pass  # nothing of it would fit one body
+    elif left_in:
+        keep, touched = untouched(log, options.bias == "free")
+    else:
         keep, touched = one_body(log, recording, options.bias == "free", options.drift)
     if codes & {"motion-mismatch", "weight-compensated"}:
         touched = ()  # moving rows carry another mass, and only look touched

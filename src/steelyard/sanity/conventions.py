@@ -89,8 +89,9 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
         reading = _reading(view, "", flipped.gravity, reading.rotation)
     recording = flipped
     found.extend(findings)
-    findings = () if found else examine_torques(view, recording.gravity, reading.rotation)
-    if not findings:
+    if not found:
+        recording, findings = examine_torques(recording, view, recording.gravity, reading.rotation)
+    if found or not findings:
         recording, findings = _lengths(recording, reading.fit)
     found.extend(findings)
     if best is None and reading.rotation is not None:

@@ -10,9 +10,11 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.recording import Recording
 from steelyard.sanity.glance import Glance, Seen
 from steelyard.sanity.mirrored import REFLECTIONS, in_words
 from steelyard.sanity.static_fit import columns, solve
+from steelyard.sanity.units import scaled
 
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
 # second share, and fit well where they leave less than the third.
@@ -38,22 +40,41 @@ UNITS = (
 REMEDY = "Check order and signs of the torque columns in the description."
 
 
-def examine_torques(view: Glance, gravity: Array, rotation: Array | None) -> tuple[Finding, ...]:
-    """Return `force-unit` where torques, read otherwise, belong to the forces, and as given do not."""
+def examine_torques(
+    recording: Recording, view: Glance, gravity: Array, rotation: Array | None
+) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return `force-unit` where torques, read otherwise, belong to the forces, and as given do not.
+
+    Torques a thousand times too small are no other unit's: the recording is returned with them put right.
+    """
     if any(view.dead) or len(view) < _FEWEST_ROWS:
-        return ()
+        return recording, ()
     seen = view.seen(gravity, rotation)
     turned, forced = columns(seen)
     force, force_std, force_share = solve(forced, seen.wrench[:, 3:], view.block)
     moment, _, share = solve(turned, seen.wrench[:, :3], view.block)
     if force_share > FORCE:
-        return ()
+        return recording, ()
     felt = force[1:4] if seen.lever is not None else np.zeros(3)
     ordered = _ordered(view, seen, turned, share, felt) if share > BAD else ()
-    if ordered:
-        return ordered
-    spread = float(np.linalg.norm(force_std[1:4])) if seen.lever is not None else np.inf
-    return _compared(felt, spread, moment[:3]) if share < WELL else ()
+    if ordered or share >= WELL or seen.lever is None:
+        return recording, ordered
+    compared = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
+    if compared is None:
+        return recording, ()
+    if abs(compared[0] / 1000 - 1) < NEAR + 3 * compared[1] / 1000:
+        return _in_newton_metres(recording, *compared)
+    return recording, _compared(*compared)
+
+
+def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with torques a thousand times larger, and what is said of it."""
+    stream = next(s for s in recording.streams if "torque" in s.channels)
+    text = (
+        f"What turns shows the centre of mass {ratio:.0f} ± {std:.1g} times as far from S as the torques do: they are "
+        "in N m, not in N mm, and were multiplied by 1000."
+    )
+    return scaled(recording, stream, ("torque",), 1e3), (Finding.of("length-in-mm", text),)
 
 
 def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array) -> tuple[Finding, ...]:
@@ -71,14 +92,21 @@ def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array)
     return (Finding("force-unit", text, REMEDY, left_in=True),)
 
 
-def _compared(felt: Array, spread: float, moment: Array) -> tuple[Finding, ...]:
-    """Return what first moments (3,) by force and by torque say of each other's sign and unit."""
+def _ratio(felt: Array, spread: float, moment: Array) -> tuple[float, float] | None:
+    """Return how many times a first moment by force (3,) is that by torque, with its standard deviation.
+
+    None where it is not known well, or where they do not lie along one line.
+    """
     size = float(np.linalg.norm(moment))
     if spread > SURE * float(np.linalg.norm(felt)) or size == 0:
-        return ()
-    ratio, std = float(felt @ moment) / size**2, spread / size
-    if np.linalg.norm(felt - ratio * moment) > ALONG * np.linalg.norm(felt):
-        return ()
+        return None
+    ratio = float(felt @ moment) / size**2
+    along = np.linalg.norm(felt - ratio * moment) <= ALONG * np.linalg.norm(felt)
+    return (ratio, spread / size) if along else None
+
+
+def _compared(ratio: float, std: float) -> tuple[Finding, ...]:
+    """Return what the ratio of first moments by force and by torque says of each other's sign and unit."""
     if abs(ratio + 1) < 0.1 + 3 * std:
         text = (
             "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
