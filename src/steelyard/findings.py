@@ -18,6 +18,7 @@ REMEDIES: dict[str, str] = {
     "wrench-unexplained": "Check order and signs of columns, angles, clocks, and a payload set in the controller.",
     "force-unit": "Check the force and torque units of the wrench stream.",
     "length-in-mm": 'Set the unit that the numbers have: "mm" (or "m") for positions, "N*mm" (or "N*m") for torques.',
+    "time-unit": 'Set the unit that the stamps have: "s", "ms", "us" or "ns".',
     "quaternion-order": "Swap form between quaternion-wxyz and quaternion-xyzw.",
     "sensor-turned": "Set mount = { rotation = [..], form = 'rotation-vector' } of the wrench, or correct the poses.",
     "gains-differ": "Calibrate the sensor, or weigh a known mass in several poses.",

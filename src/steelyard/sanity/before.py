@@ -7,6 +7,7 @@ from dataclasses import replace
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
+from steelyard.sanity.clock_unit import examine_clock
 from steelyard.sanity.conventions import examine_conventions
 from steelyard.sanity.leaps import examine_leaps, examine_sparse
 from steelyard.sanity.memory import examine_memory
@@ -24,6 +25,7 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     Rows that are no measurements are left out; units, signs and frames are put right where the numbers leave no
     doubt, so that the answer is right all the same. Each finding says what was assumed.
     """
+    recording, clock = examine_clock(recording)
     recording = examine_sparse(recording)
     _require_rows(recording)
     read, recording = recording.findings, replace(recording, findings=())
@@ -34,7 +36,7 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     recording, conventions = examine_conventions(recording)
     # Misread rotations leave a channel unexplained, too.
     recording, silent = (recording, ()) if conventions else without_silent(recording)
-    return recording, (*read, *rows, *units, *conventions, *silent)
+    return recording, (*read, *clock, *rows, *units, *conventions, *silent)
 
 
 def _require_rows(recording: Recording) -> None:

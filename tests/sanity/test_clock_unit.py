@@ -1,0 +1,44 @@
+"""Stamps in another unit than seconds are found by the motion that they make, and nothing else is."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sanity.held_poses import recorded
+from steelyard.logs.recording import Recording
+from steelyard.pipelines.held_object import identify
+from steelyard.sanity import examine
+
+
+def stamped(recording: Recording, times: float) -> Recording:
+    """Return the recording with stamps so many times as large."""
+    streams = tuple(replace(s, time=None if s.time is None else s.time * times) for s in recording.streams)
+    return replace(recording, streams=streams)
+
+
+@pytest.mark.parametrize(("times", "unit"), [(1e3, "ms"), (1e6, "us"), (1e9, "ns")])
+def test_stamps_in_a_smaller_unit_are_read_in_it(times: float, unit: str) -> None:
+    recording = recorded("paper", 0)
+    read, (found,) = examine(stamped(recording, times))
+    assert found.code == "time-unit"
+    assert f'unit = "{unit}"' in found.remedy
+    np.testing.assert_allclose(read.streams[0].time, recording.streams[0].time, rtol=1e-12)
+
+
+def test_the_answer_is_that_of_seconds() -> None:
+    recording = recorded("paper", 0)
+    right, found = identify(recording), identify(stamped(recording, 1e3))
+    np.testing.assert_allclose(found.parameters.vector, right.parameters.vector, rtol=1e-6, atol=1e-12)
+    assert found.codes() == {"time-unit"}
+
+
+def test_a_log_too_slow_to_show_a_motion_is_left_alone() -> None:
+    """Poses a second apart stand still: at any speed they would show no acceleration that the force knows."""
+    recording = recorded("static", 0)
+    (stream,) = recording.streams
+    few = replace(stream, channels={q: v[::100] for q, v in stream.channels.items()}, time=stream.time[::100])
+    codes = {f.code for f in examine(replace(recording, streams=(few,)))[1]}
+    assert "time-unit" not in codes
