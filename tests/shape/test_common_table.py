@@ -4,11 +4,13 @@ from __future__ import annotations
 
 from functools import cache
 
+import manifold3d
 import numpy as np
 import pytest
 
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled, slid
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.scene import Scene, scene_of
 from steelyard.shape.views import Views
@@ -67,6 +69,25 @@ def test_right_poses_are_left_alone() -> None:
     assert levelled(scene) == 0.0
     np.testing.assert_array_equal(scene.R, R)
     np.testing.assert_array_equal(scene.p, p)
+
+
+def plate(size: tuple[float, float, float]) -> Scanned:
+    cube = manifold3d.Manifold.cube(np.array(size)).translate(np.array([-size[0] / 2, -size[1] / 2, 0])).to_mesh64()
+    mesh = TriangleMesh(cube.vert_properties[:, :3], cube.tri_verts, np.zeros(len(cube.tri_verts)))
+    return scan_mesh(mesh, 0, count=36, X_WO=Pose.identity())
+
+
+@pytest.mark.parametrize("size", [(0.2, 0.15, 0.01), (0.24, 0.17, 0.012)], ids=["wide", "wider-than-the-table-in-view"])
+def test_a_wide_low_object_is_not_taken_for_the_table(size: tuple[float, float, float]) -> None:
+    seen = plate(size)
+    found = fuse(seen.views)
+    assert (found.findings, found.moved_m) == ((), None)
+    assert volume(found) == pytest.approx(np.prod(size), rel=0.05)
+    scene = scene_of(wrong_by(seen.views, "each"))
+    assert 3e-3 < levelled(scene) < 8e-3
+    _, over, tilt = apart(scene, seen.views.X_WC)
+    assert over < 1e-4
+    assert tilt < np.radians(0.05)
 
 
 def test_a_view_without_a_table_is_left_out_where_others_are_moved() -> None:

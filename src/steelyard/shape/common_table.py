@@ -14,12 +14,18 @@ from scipy import ndimage
 
 from steelyard.check import Array
 from steelyard.shape import depth_images as images
-from steelyard.shape.scene import Scene
-from steelyard.shape.table_plane import table_planes
+from steelyard.shape.scene import Scene, noise_of
+from steelyard.shape.table_plane import lowest_planes, table_frame, table_planes
+from steelyard.shape.views import TablePlane
 from steelyard.spatial import Rotation
 
 _SAMPLES = (60_000, 600_000)  # pixels that tell the table, and what stands on it
-_NEAR = (0.1, 0.05, 0.05)  # of the camera's distance, round by round: points so near the table may be on it
+_FAR = 0.1  # of the camera's distance: so far from where all views together have the table one may have it
+_TRIES = 200  # planes of a view
+_CLEAR = 3.0  # times the depth noise: what is further off a plane is not on it
+_THIN = 0.005  # of the camera's distance: nor is this, since noise may have been taken from tables that lie askew
+_ON = 1.5  # of those: points that a plane is fitted to
+_ROUNDS = 2  # the second with the noise that the first found
 ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judged by what it lifts
 _LEVEL = 0.25  # of the depth noise: tables that are less off are level
 _STEEPEST = np.tan(np.radians(8.0))  # tilt of a view's table that no arm's error explains
@@ -35,41 +41,73 @@ _SEEN = 0.05  # pixels in a cell, blurred, from which on its height counts as kn
 def levelled(scene: Scene) -> float:
     """Turn and lift views until the table is level in each; return how far off they had it, rms [m].
 
-    Zero, and nothing moved, where that is far less than the depth noise, or where too few views show a table. Where
-    something is moved, views without a table are left out: nobody knows where they are.
+    Zero, and no camera moved, where that is far less than the depth noise, or where too few views show a table. Where
+    something is moved, views without a table are left out: nobody knows where they are. Depth is then found less noisy
+    than the table as all views together had it seemed to say.
     """
-    before = _off(scene, _NEAR[0])
-    if _off(scene, _NEAR[-1]) < _LEVEL * scene.sigma or np.isinf(before):
+    planes = _tables(scene)
+    if _is_level(scene, planes):
         return 0.0
-    for near in _NEAR:
-        planes = _tables(scene, near)
-        view, (height, *slope) = planes[:, 0].astype(int), planes[:, 1:4].T
-        normal = np.stack([-slope[0], -slope[1], np.ones(len(view))], axis=1)
-        long = np.linalg.norm(normal, axis=1)
-        turned = np.cross(normal / long[:, None], [0.0, 0.0, 1.0])
-        over = scene.p[view, 2] - height - slope[0] * scene.p[view, 0] - slope[1] * scene.p[view, 1]
-        # About the camera itself: so a wrong orientation, the worst of the errors at the object, is undone whole.
-        scene.R[view] = Rotation.exp(turned).matrix @ scene.R[view]
-        scene.p[view, 2] = over / long
-    scene.keep(view)
-    return before
+    # What all have alike is no view's error: a wide object passed for the table.
+    _lay(scene, np.median(planes[:, 1:4], axis=0))
+    planes = _tables(scene)
+    if _is_level(scene, planes):
+        return 0.0
+    off = _off(scene, planes)
+    for _ in range(_ROUNDS):
+        _level(scene, planes)
+        scene.noise = min(scene.noise, noise_of(planes, scene.views.depth_unit, scene.distance))
+        planes = _tables(scene)
+    scene.keep(planes[:, 0].astype(int))
+    return off
 
 
-def _off(scene: Scene, near: float) -> float:
-    """Return by how much the views have the table off the level, `ACROSS` the middle on both sides: rms [m].
+def _is_level(scene: Scene, planes: Array) -> bool:
+    """Whether there is nothing to mend, or nothing to go by."""
+    return len(planes) < _MOST * len(scene.R) or _off(scene, planes) < _LEVEL * scene.sigma
 
-    Infinite where too few of them show one.
-    """
-    planes = _tables(scene, near)
-    if len(planes) < _MOST * len(scene.R):
-        return np.inf
+
+def _lay(scene: Scene, plane: Array) -> None:
+    """Take the plane of height a + b x + c y (3,) for the table: the cameras stay where they are in W."""
+    normal = np.array([-plane[1], -plane[2], 1.0]) / np.sqrt(1 + plane[1:] @ plane[1:])
+    laid = table_frame(TablePlane(normal, float(plane[0] * normal[2])), np.zeros(3))
+    back = laid.inverse()
+    scene.X_WT = scene.X_WT @ laid
+    scene.R, scene.p = np.ascontiguousarray(back.rotation.matrix @ scene.R), back.apply(scene.p)
+
+
+def _off(scene: Scene, planes: Array) -> float:
+    """Return by how much planes (K, 5) are off the level, `ACROSS` the middle on both sides: rms [m]."""
     return float(np.sqrt((planes[:, 1:4] ** 2 @ [1.0, *[(ACROSS * scene.distance) ** 2] * 2]).mean()))
 
 
-def _tables(scene: Scene, near: float) -> Array:
-    """Return the table as the views have it, those left out that have it too steep; see `table_planes`."""
+def _level(scene: Scene, planes: Array) -> None:
+    """Turn and lift the views that have the table as planes (K, 5) until it is level."""
+    view, (height, *slope) = planes[:, 0].astype(int), planes[:, 1:4].T
+    normal = np.stack([-slope[0], -slope[1], np.ones(len(view))], axis=1)
+    long = np.linalg.norm(normal, axis=1)
+    turned = np.cross(normal / long[:, None], [0.0, 0.0, 1.0])
+    over = scene.p[view, 2] - height - slope[0] * scene.p[view, 0] - slope[1] * scene.p[view, 1]
+    # About the camera itself: so a wrong orientation, the worst of the errors at the object, is undone whole.
+    scene.R[view] = Rotation.exp(turned).matrix @ scene.R[view]
+    scene.p[view, 2] = over / long
+
+
+def _tables(scene: Scene) -> Array:
+    """Return the table as the views have it (K, 5), see `table_planes`; views without one are left out.
+
+    The lowest plane of each, fitted to the points on it: so an object as wide as the table in view does not lift it.
+    """
     sampled = images.sampled(*scene.images(), _stride(scene, _SAMPLES[0]))
-    planes = table_planes(sampled, sampled[:, :3].copy(), near * scene.distance)
+    clear = min(_CLEAR * scene.sigma, _THIN * scene.distance)
+    drawn = np.random.default_rng(0).random((_TRIES, 3))
+    lowest = lowest_planes(sampled, _FAR * scene.distance, clear, _STEEPEST, drawn)
+    rough = np.tile([np.inf, 0.0, 0.0], (len(scene.R), 1))
+    rough[lowest[:, 0].astype(int)] = lowest[:, 1:]
+    xyz, own = sampled[:, :3].copy(), rough[sampled[:, 4].astype(int)]
+    xyz[:, 2] -= own[:, 0] + (own[:, 1:] * xyz[:, :2]).sum(1)
+    planes = table_planes(sampled, xyz, _ON * clear)
+    planes[:, 1:4] += rough[planes[:, 0].astype(int)]
     return np.asarray(planes[np.hypot(planes[:, 2], planes[:, 3]) < _STEEPEST])
 
 

@@ -93,17 +93,20 @@ def scene_of(views: Views) -> Scene:
     except CannotAnswer as error:
         raise CannotAnswer(f"{error} {advice(views)}") from None
     X_WT = table_frame(table, looks)
-    noise = _depth_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), views.depth_unit, distance)
+    planes = table_planes(sampled, X_WT.inverse().apply(sampled[:, :3]), 0.03 * distance)
+    noise = noise_of(planes, views.depth_unit, distance)
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
     return Scene(views, X_WT, R.copy(), p.copy(), distance, noise)
 
 
-def _depth_noise(sampled: Array, xyz: Array, unit: float, distance: float) -> float:
-    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points."""
-    spreads = table_planes(sampled, xyz, 0.03 * distance)[:, 4]
+def noise_of(planes: Array, unit: float, distance: float) -> float:
+    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points.
+
+    planes  (K, 5) of the views, see `table_planes`      unit  of depth [m]      distance  of the table [m]
+    """
     # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
-    found = float(np.median(spreads)) / 0.7 if len(spreads) else 0.0
+    found = float(np.median(planes[:, 4])) / 0.7 if len(planes) else 0.0
     return max(found, float(unit / np.sqrt(12) / distance**2))
 
 

@@ -18,6 +18,8 @@ NEAR = 0.012  # of the distance: a point this near a plane counts as on it
 _LEAST = 0.2  # share of the points that must lie on the table
 _ROUNDS = 8
 _FEW = 30  # points of one view that its noise is not told from
+_JUDGING = 300  # of its points judge a plane
+_UNDER = 4.0  # points on a plane that one under it outweighs: the table may be a fifth of what a view shows
 
 
 def find_table(points: Array, cameras: Array, distance: float, start: TablePlane | None = None) -> TablePlane:
@@ -145,3 +147,54 @@ def _plane(A: Any, b: Any, before: Any, most: float) -> Any:
                 for c in range(3):
                     H[r, c] += A[j, r] * A[j, c]
     return np.linalg.solve(H, g)
+
+
+@numba.njit(cache=True, nogil=True)
+def lowest_planes(sampled: Array, reach: float, clear: float, steepest: float, drawn: Array) -> Array:
+    """Return the table as each view for itself has it (K, 4), roughly: number of the view, height a + b x + c y.
+
+    sampled   (N, 5) points in the table's frame, depth [m] and the number of the view, view by view
+    reach     height within which the table is sought [m]
+    clear     height from which on a point is not on a plane [m]
+    steepest  slope that none has
+    drawn     (T, 3) numbers in [0, 1) that choose the points of T planes to try
+
+    The plane with most points on it, those under it counted as so many that a wide object does not pass for the
+    table: nothing lies under that. Views of few points have none.
+    """
+    out, count, end = np.empty((len(sampled) // _FEW + 1, 4)), 0, 0
+    near = np.empty(len(sampled), np.int64)
+    while end < len(sampled):
+        view, n = sampled[end, 4], 0
+        while end < len(sampled) and sampled[end, 4] == view:
+            if abs(sampled[end, 2]) < reach:
+                near[n] = end
+                n += 1
+            end += 1
+        if n < _FEW:
+            continue
+        step, best, plane = max(1, n // _JUDGING), -np.inf, np.zeros(3)
+        for t in range(-1, len(drawn)):  # the first is the level one
+            tried = np.zeros(3) if t < 0 else _through(sampled, near[(n * drawn[t]).astype(np.int64)])
+            if abs(tried[0]) > reach or np.hypot(tried[1], tried[2]) > steepest:
+                continue
+            score = 0.0
+            for i in near[:n:step]:
+                height = sampled[i, 2] - tried[0] - tried[1] * sampled[i, 0] - tried[2] * sampled[i, 1]
+                score += 1.0 if abs(height) < clear else -_UNDER if height < 0 else 0.0
+            if score > best:
+                best, plane = score, tried
+        out[count, 0], out[count, 1:] = view, plane
+        count += 1
+    return out[:count]
+
+
+@numba.njit(cache=True, nogil=True)
+def _through(xyz: Any, rows: Any) -> Any:
+    """Return the height a + b x + c y (3,) of the plane through three points; one that is far off where none is."""
+    A, b = np.ones((3, 3)), np.empty(3)
+    for r in range(3):
+        A[r, 1], A[r, 2], b[r] = xyz[rows[r], 0], xyz[rows[r], 1], xyz[rows[r], 2]
+    if abs(np.linalg.det(A)) < 1e-12:
+        return np.full(3, np.inf)
+    return np.linalg.solve(A, b)
