@@ -10,12 +10,12 @@ import pytest
 
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled
-from steelyard.shape.lens_error import lens_by_table
+from steelyard.shape.lens_error import Tables, lens_by_table
 from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.scene import scene_of
 from steelyard.shape.views import Intrinsics, Views
 from steelyard.shape.volume import enclose
-from steelyard.simulate.camera import disturbed
+from steelyard.simulate.camera import disturbed, wrist_arc
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.catalogue import build
@@ -69,6 +69,19 @@ def test_errors_of_the_arm_blur_the_focal_length_and_do_not_hide_it() -> None:
     lens = told(read.posed(disturbed(read.X_WC, 1.0, 0.2, np.random.default_rng(1))))
     assert lens is not None
     assert lens.fx == pytest.approx(615, rel=0.015)
+
+
+def test_the_standard_error_of_a_focal_length_is_that_of_its_errors() -> None:
+    off, std = [], []
+    for seed in range(30):
+        rng = np.random.default_rng(seed)
+        true = wrist_arc(np.zeros(3), 0.35, 36, start=rng.uniform(0, 360))
+        given = disturbed(true, 4.0, 1.0, rng)
+        tables = Tables(given, true.rotation.matrix[:, 2], true.position[:, 2], 0.25 * 0.35)
+        found, _, errors = tables.explained(np.ones(12, bool))
+        off.append(found[0])
+        std.append(errors[0])
+    assert np.median(std) > 0.9 * np.sqrt(np.mean(np.square(off)))
 
 
 def test_a_turned_camera_is_no_wrong_lens() -> None:

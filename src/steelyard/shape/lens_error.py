@@ -17,7 +17,7 @@ from steelyard.shape.scene import Scene
 from steelyard.shape.views import Intrinsics
 from steelyard.spatial import Pose, Rotation
 
-_SURE = 6.0  # standard errors of a focal length that is believed
+_SURE = 5.0  # standard errors of a focal length that is believed
 _PASSES = 3.0  # of the tilts that are left: so much may errors of an arm that go with its posture pass for
 _LEAST = 0.01  # of the focal length: a lens that errs less is as good
 _ROUGH = 1e-3  # of heights [m]: beyond it a view counts less
@@ -35,7 +35,7 @@ def lens_by_table(scene: Scene) -> Intrinsics | None:
     if len(scene.R) < _FEW:
         return None
     given = scene.X_WT.inverse() @ scene.views.X_WC
-    seen = _Tables(given, scene.R[:, 2], scene.p[:, 2], ACROSS * scene.distance)
+    seen = Tables(given, scene.R[:, 2], scene.p[:, 2], ACROSS * scene.distance)
     free = np.ones(len(_STD), bool)
     for _ in range(2):  # the second time with what the first found of the lens, and nothing else
         found, left, std = seen.explained(free)
@@ -52,7 +52,7 @@ def _corrected(lens: Intrinsics, log_focal: float, x: float, y: float) -> Intrin
 
 
 @dataclass(frozen=True, eq=False)
-class _Tables:
+class Tables:
     """The table as V views have it.
 
     given   their poses in the table's frame, as reported
@@ -103,7 +103,8 @@ def _jackknifed(J: Array, rest: Array) -> Array:
 
     J  Jacobian, weighed as the rows were, of all `rest` and of what was known before
     """
-    weigh = (1 + (rest / _ROUGH) ** 2) ** -0.25
+    # SciPy's rows of a soft loss are scaled by this to the power of -0.75, a gradient has -0.5.
+    weigh = (1 + (rest / _ROUGH) ** 2) ** 0.25
     block = np.arange(len(rest)) * _BLOCKS // len(rest)
     rows, H = J[: rest.size].reshape(len(rest), 4, -1), J.T @ J
     without = []
