@@ -153,7 +153,7 @@ def _surface(scene: Scene, points: int, off: bool, clock: _Clock) -> _Surface:
     shift = float(np.sqrt((moved**2).sum(1).mean())) if np.abs(moved).max() > _STILL else None
     clock.lap("registration")
     xyz, normal = surface_of(scene, seen.patches, seen.region, points)
-    lost = lost_share(scene, xyz, seen.region)
+    lost = lost_share(xyz, seen.region)
     clock.lap("surface")
     return _Surface(xyz, normal, seen.region.others, seen.spread, shift, lost)
 

@@ -34,7 +34,13 @@ _MARGIN = 0.008  # of table kept around the object [m]
 
 @dataclass(eq=False)
 class Scene:
-    """The images with their poses in the table's frame."""
+    """The images with their poses in the frame of the table T: z up, the origin under where the cameras look.
+
+    X_WT      the table in W
+    R, p      rotations (V, 3, 3) and positions (V, 3) [m] of the cameras in T; they start where they were reported
+    distance  typical one from a camera to where the cameras look [m]
+    noise     standard deviation of depth at 1 m; it grows with the square of depth [1/m]
+    """
 
     views: Views
     X_WT: Pose
@@ -42,8 +48,6 @@ class Scene:
     p: Array
     distance: float
     noise: float
-    highest: float = np.inf  # point measured over the object [m]
-    stands: Any = None  # cells (I, J) of the map of heights in which the object stands out of the table
 
     @property
     def table(self) -> TablePlane:
@@ -72,12 +76,21 @@ class Scene:
 
 
 class Region(NamedTuple):
-    """Where on the table the object lies, with a margin: mask (I, J) of cells, corner (2,) and cell [m], and how many
-    other objects stand there."""
+    """Where on the table the object lies.
+
+    mask     (I, J) cells of the map of heights, with a margin around the object
+    low      (2,) corner of the map [m]
+    pitch    edge of a cell [m]
+    stands   (I, J) cells in which the object stands out of the table
+    highest  over the table that anything is measured there, noise added [m]
+    others   objects that stand beside it
+    """
 
     mask: Any
     low: Array
     pitch: float
+    stands: Any
+    highest: float
     others: int
 
 
@@ -135,25 +148,24 @@ def object_on_table(scene: Scene) -> Region:
         (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(area > 25)), np.ones((3, 3))
     )
     mine &= ~stranger
-    scene.stands = label == largest
-    scene.highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
-    return Region(mine, low, pitch, others)
+    highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
+    return Region(mine, low, pitch, label == largest, highest, others)
 
 
-def lost_share(scene: Scene, xyz: Array, region: Region) -> float:
+def lost_share(xyz: Array, region: Region) -> float:
     """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
-    covered = np.zeros_like(scene.stands)
+    covered = np.zeros_like(region.stands)
     i, j = np.floor((xyz[:, :2] - region.low) / region.pitch).astype(int).T
     covered[i.clip(0, len(covered) - 1), j.clip(0, covered.shape[1] - 1)] = True
     covered = ndimage.binary_dilation(covered, np.ones((3, 3)), iterations=_NEAR)
-    return float((scene.stands & ~covered).sum() / scene.stands.sum())
+    return float((region.stands & ~covered).sum() / region.stands.sum())
 
 
 def surfels(scene: Scene, region: Region) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
     cell = _CELL * scene.pixel
     floor = -4 * scene.sigma - 2 * cell
-    layers = int((min(scene.highest, _REACH * scene.distance) - floor) / cell) + 2
+    layers = int((min(region.highest, _REACH * scene.distance) - floor) / cell) + 2
     found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
     if not len(found):
