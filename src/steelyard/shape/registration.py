@@ -79,9 +79,15 @@ def _apart(scene: Scene, seen: Seen, window: float) -> float:
     """Return how far one fit to the surface would move apart what the views see of the object, rms [m]."""
     R, p, xyz = _fit(scene, seen, window)
     high = xyz[:, 2] > _STANDS_OUT * scene.sigma
-    middle = (xyz[high] if high.any() else xyz).mean(0)
-    moved = p + np.einsum("vij,vj->vi", R @ np.swapaxes(scene.R, 1, 2), middle - scene.p) - middle
-    return float(np.sqrt(moved.var(0).sum()))
+    xyz = xyz[high] if high.any() else xyz
+    turn = R @ np.swapaxes(scene.R, 1, 2)
+    shift = p - np.einsum("vij,vj->vi", turn, scene.p)
+    middle = xyz.mean(0)
+    # Over all points: the mean of squares is that of the middle and of what turns about it do.
+    about = (xyz - middle).T @ (xyz - middle) / len(xyz)
+    turns = turn - turn.mean(0)
+    by_turns = np.einsum("vij,jk,vik->v", turns, about, turns).mean()
+    return float(np.sqrt((turn @ middle + shift).var(0).sum() + by_turns))
 
 
 def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
