@@ -7,10 +7,16 @@ from functools import cache
 import numpy as np
 import pytest
 
+from steelyard.errors import CannotAnswer
+from steelyard.shape import registration
 from steelyard.shape.carving import carved
+from steelyard.shape.common_table import levelled
+from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scene import object_on_table, scene_of
+from steelyard.shape.scene import Scene, object_on_table, scene_of
+from steelyard.shape.views import Views
 from steelyard.shape.volume import enclose
+from steelyard.simulate.camera import disturbed
 from steelyard.simulate.scanning import Scanned, scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.catalogue import build
@@ -20,6 +26,16 @@ from steelyard.workshop.finish import painted
 @cache
 def scanned(tool: str = "pliers") -> Scanned:
     return scan_mesh(painted(build(tool)), 0, count=36)
+
+
+def wrong_by(views: Views, mm: float, deg: float) -> Views:
+    return views.posed(disturbed(views.X_WC, mm, deg, np.random.default_rng(1)))
+
+
+def apart(scene: Scene, true: Pose) -> float:
+    """Return how far the views have what lies under the cameras apart, rms [m]."""
+    error = Pose(Rotation.nearest(scene.R), scene.p) @ (scene.X_WT.inverse() @ true).inverse()
+    return float(np.sqrt(error.apply(np.zeros(3)).var(0).sum()))
 
 
 def volume(scan: Scan) -> float:
@@ -46,3 +62,42 @@ def test_views_that_are_turned_about_the_object_are_turned_back(deg: float) -> N
     found = fuse(views.posed(turned))
     assert found.moved_m is not None
     assert volume(found) == pytest.approx(volume(fuse(views)), rel=0.04)
+
+
+def test_a_low_object_is_found_from_where_what_stands_on_the_table_brings_the_views() -> None:
+    """From where they were reported no fit finds it; the level of the table tells that they are far off."""
+    right = volume(fuse(scanned("ruler").views))
+    for mm, deg in ((4.0, 1.0), (6.0, 1.5)):
+        assert volume(fuse(wrong_by(scanned("ruler").views, mm, deg))) == pytest.approx(right, rel=0.25)
+
+
+def test_a_surface_that_shows_less_is_not_taken_for_being_crossed_less() -> None:
+    scene = scene_of(wrong_by(scanned("screwdriver").views, 6.0, 1.5))
+    off = levelled(scene)
+    agreed(scene, Seen.by(scene), off)
+    assert apart(scene, scanned("screwdriver").views.X_WC) < 1e-3
+
+
+def test_a_try_that_loses_the_object_is_none(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = scene_of(wrong_by(scanned().views, 4.0, 1.0))
+    off, first = levelled(scene), Seen.by(scene)
+    R = scene.R
+
+    def lost(*_: object) -> Seen:
+        raise CannotAnswer("no object was found.")
+
+    monkeypatch.setattr(registration, "_fit_far", lost)
+    agreed(scene, first, off)
+    assert scene.R is not R  # brought by the other try
+    monkeypatch.setattr(registration, "_fit_slid", lost)
+    scene.R = R
+    assert agreed(scene, first, off) is first
+    assert scene.R is R
+
+
+@pytest.mark.parametrize("count", [1, 2])
+def test_the_spread_of_few_views_is_a_number(count: int) -> None:
+    """Whoever prints it as JSON needs one."""
+    views = scanned().views
+    seen = Seen.by(scene_of(views.chosen(np.arange(count))))
+    assert np.isfinite(seen.spread)

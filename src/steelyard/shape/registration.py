@@ -2,16 +2,20 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from dataclasses import dataclass
 from typing import Any
 
 import numba
 import numpy as np
+from scipy.spatial import cKDTree
 
 from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import slid
 from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Region, Scene, object_on_table, settled, surfels
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Region, Scene, no_surface, object_on_table, settled, surfels
 from steelyard.shape.thinning import spread_to
 
 _STEPS = 3
@@ -24,6 +28,8 @@ _FAR = (0.02, 0.02, 0.02, *_WINDOWS)
 _MODEL = 2500  # points that views are fitted to
 _NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
 _STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
+_ON = 3.0  # times the depth noise: so near the surface a pixel lies on it
+_SAMPLES = 200_000  # pixels that are asked whether they do
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,13 +38,11 @@ class Seen:
 
     region   where it lies      patches  (N, 8) of its surface and of the table around it
     spread   median spread of the views about the surface, in standard deviations of depth
-    crossed  share of what views say of its surface that is to have seen past it
     """
 
     region: Region
     patches: Array
     spread: float
-    crossed: float
 
     @classmethod
     def by(cls, scene: Scene) -> Seen:
@@ -47,32 +51,84 @@ class Seen:
         patches = surfels(scene, region)
         xyz, normal = _model(scene, patches, _NEAR)
         support = settled(scene, xyz, normal, _NEAR, 1)
-        good = support[:, 0] >= LEAST_VIEWS
-        spread = float(np.median(support[good, 2])) / (0.7 * scene.sigma) if good.any() else np.inf
+        good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+        if not good.any():
+            raise no_surface()
+        return cls(region, patches, float(np.median(support[good, 2])) / (0.7 * scene.sigma))
+
+
+@dataclass(frozen=True, eq=False)
+class _Try:
+    """What the views see from cameras at R (V, 3, 3), p (V, 3), and how far they contradict it.
+
+    crossed  share of what they say of its surface that is to have seen past it
+    shown    pixels clear of the table that lie on the surface, of those looked at
+    """
+
+    seen: Seen
+    R: Array
+    p: Array
+    crossed: float
+    shown: int
+
+    @classmethod
+    def of(cls, scene: Scene, seen: Seen) -> _Try:
+        """Return the judgement of what is seen from where the cameras now are."""
+        xyz, normal = _model(scene, seen.patches, _NEAR)
         on, past = settled(scene, xyz, normal, WINDOW, 0)[xyz[:, 2] > _STANDS_OUT * scene.sigma, :2].sum(0)
-        return cls(region, patches, spread, float(past / max(on + past, 1.0)))
+        pixels = images.sampled(*scene.images(), max(1, int(np.sqrt(scene.views.depth.size / _SAMPLES))))[:, :3]
+        pixels = pixels[(pixels[:, 2] > _STANDS_OUT * scene.sigma) & seen.region.holds(pixels)]
+        away, row = cKDTree(xyz).query(pixels)
+        off = np.abs(((pixels - xyz[row]) * normal[row]).sum(1))
+        shown = int(((off < _ON * scene.sigma) & (away < _NEAR)).sum())
+        return cls(seen, scene.R, scene.p, float(past / max(on + past, 1.0)), shown)
 
 
-def agreed(scene: Scene, first: Seen, off: bool) -> Seen:
+def agreed(scene: Scene, first: Seen, off: float) -> Seen:
     """Return what the views see, their cameras moved until they agree where that makes it better.
 
     first  from the poses as they are
-    off    whether those are known to be wrong, since views had to be levelled
+    off    how far off views had the table before they were levelled, rms [m]; 0 where they were not
 
     Views and the surface that they give together are fitted to each other in turn. One such fit tells whether it is
     worth while: how far it would move the views apart. Where poses are off by more than a little, it is tried from
-    where they are and from where `slid` brings them: the less views then cross the surface, the better.
+    where they are and from where `slid` brings them. A try that loses the object is none.
     """
     if len(scene.R) < 2 or _apart(scene, first, _FINE[-1]) < _APART * scene.sigma:
         return first
-    given, near = (scene.R, scene.p), _apart(scene, first, _FAR[0]) < _NEARBY
-    tries = [(first, *given), (_fitted(scene, first, _FINE if near else _FAR), scene.R, scene.p)]
-    if off and not near:
+    given, tries = (scene.R, scene.p), [_Try.of(scene, first)]
+    near = off < _NEARBY and _apart(scene, first, _FAR[0]) < _NEARBY
+    for fit in [_fit_fine] if near else [_fit_far, _fit_slid] if off else [_fit_far]:
         scene.R, scene.p = given
-        slid(scene)
-        tries.append((_fitted(scene, Seen.by(scene), _WINDOWS), scene.R, scene.p))
-    best, scene.R, scene.p = min(tries, key=lambda each: each[0].crossed)
-    return best
+        with suppress(CannotAnswer):
+            tries.append(_Try.of(scene, fit(scene, first)))
+    best = _least_wrong(tries)
+    scene.R, scene.p = best.R, best.p
+    return best.seen
+
+
+def _fit_fine(scene: Scene, first: Seen) -> Seen:
+    return _fitted(scene, first, _FINE)
+
+
+def _fit_far(scene: Scene, first: Seen) -> Seen:
+    return _fitted(scene, first, _FAR)
+
+
+def _fit_slid(scene: Scene, _: Seen) -> Seen:
+    slid(scene)
+    return _fitted(scene, Seen.by(scene), _WINDOWS)
+
+
+def _least_wrong(tries: list[_Try]) -> _Try:
+    """Return the try that the views contradict least.
+
+    Three shares are added: of what they say of its surface, to have seen past it; of pixels clear of the table, more
+    than in the best not to lie on it; and of the spread about it, more than in the best. Of a low object, which
+    hardly stands out and cannot be crossed, the last one tells.
+    """
+    most, least = max(1, *(each.shown for each in tries)), min(each.seen.spread for each in tries)
+    return min(tries, key=lambda each: each.crossed - each.shown / most + each.seen.spread / least)
 
 
 def _apart(scene: Scene, seen: Seen, window: float) -> float:
@@ -106,12 +162,17 @@ def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array]:
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
-    """Return well-spread points (N, 3) of the surface that all views give together, and their normals."""
+    """Return well-spread points (N, 3) of the surface that all views give together, and their normals.
+
+    CannotAnswer where they give none.
+    """
     order = np.argsort(-patches[:, 6], kind="stable")
     rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _MODEL, 2 * scene.pixel)
     xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
     support = settled(scene, xyz, normal, window, 1)
     good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+    if not good.any():
+        raise no_surface()
     return xyz[good], normal[good]
 
 

@@ -85,7 +85,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
             scene = scene_of(replace(scene.views, intrinsics=level.lens))
         off = levelled(scene) if level.lens else level.off
         clock.lap("table")
-        found = _surface(scene, points, off > 0, clock)
+        found = _surface(scene, points, off, clock)
     except CannotAnswer as error:
         raise CannotAnswer(" ".join(filter(None, (str(error), likely_mistake(views))))) from None
     xyz, normal, seen, spacing, bottom = _closed(scene, found.xyz, found.normal, points)
@@ -145,7 +145,7 @@ def _levelled(scene: Scene) -> _Level:
     return _Level(off, given, lens_by_table(scene) if off else None)
 
 
-def _surface(scene: Scene, points: int, off: bool, clock: _Clock) -> _Surface:
+def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> _Surface:
     seen = Seen.by(scene)
     clock.lap("object")
     seen = agreed(scene, seen, off)

@@ -93,6 +93,12 @@ class Region(NamedTuple):
     highest: float
     others: int
 
+    def holds(self, points: Array) -> Any:
+        """Whether points (N, 3) lie over its cells."""
+        i, j = np.floor((points[:, :2] - self.low) / self.pitch).astype(int).T
+        within = (i >= 0) & (j >= 0) & (i < self.mask.shape[0]) & (j < self.mask.shape[1])
+        return within & self.mask[i.clip(0, self.mask.shape[0] - 1), j.clip(0, self.mask.shape[1] - 1)]
+
 
 def scene_of(views: Views) -> Scene:
     """Return the images in the table's frame."""
@@ -169,8 +175,13 @@ def surfels(scene: Scene, region: Region) -> Array:
     found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
     if not len(found):
-        raise CannotAnswer("no object was found on the table: the views agree on no surface there.")
+        raise no_surface()
     return found
+
+
+def no_surface() -> CannotAnswer:
+    """Return the error of views that agree on nothing."""
+    return CannotAnswer("no object was found on the table: the views agree on no surface there.")
 
 
 def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int) -> Array:
