@@ -49,6 +49,31 @@ def test_without_an_error_the_doubt_costs_little(parts: Parts) -> None:
     assert doubted.parameters.validity().consistent
 
 
+def test_a_shape_that_is_turned_as_a_whole_errs_as_turns_make_it() -> None:
+    error, turns = ShapeError(turn_rad=0.02), np.random.default_rng(0).normal(0, 0.02, (20_000, 3))
+    R = Rotation.exp(turns).matrix
+    drawn = R @ BODY.inertia_com @ R.swapaxes(1, 2)
+    jacobian = people_jacobian(BODY.vector)
+    std = np.sqrt(np.diag(jacobian @ error.covariance(BODY) @ jacobian.T))
+    assert std[:4] == pytest.approx(0, abs=1e-12)  # about its centre
+    np.testing.assert_allclose(std[4:], drawn[:, *np.triu_indices(3)].std(0), rtol=0.05)
+
+
+def test_where_a_scan_lies_widens_bars_and_leaves_the_rule_as_it_is(parts: Parts) -> None:
+    """Inertia still goes as the log says, which it does not where a grasp is declared to be unsure."""
+    truth = parts.whole(np.array([0.14, 1.5]))
+    log = handling_log(truth, noise="low", seed=3)
+    scan = ShapeError(com_m=2e-4, stretch=0.1)
+    sure, hardly, unsure, grasped = (
+        PartMasses(parts, bias="none", shape_error=error).identify(log)
+        for error in (scan, scan.laid(1e-5, 1e-5), scan.laid(1e-3, 0.05), scan.placed(1e-5, 1e-5))
+    )
+    off = np.abs(hardly.parameters.vector - sure.parameters.vector) / sure.std
+    assert off.max() < 0.01
+    assert (np.abs(grasped.parameters.vector - sure.parameters.vector) / sure.std).max() > 0.1
+    assert (unsure.std[4:] > 1.1 * sure.std[4:]).any()
+
+
 def test_a_stretch_errs_alike_in_every_frame() -> None:
     X = Pose(Rotation.exp(np.array([0.4, -1.1, 0.7])), np.array([0.3, 0.0, -0.2]))
     error, change = ShapeError(stretch=0.1), frame_change(X)

@@ -14,7 +14,10 @@ from steelyard.parts.parts import Parts
 from steelyard.pipelines.held_object import Options
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.placement import Placement
+from steelyard.shape.scan import fuse
 from steelyard.simulate import hammer
+from steelyard.spatial import Pose
 from steelyard.workshop.sampling import surface_cloud
 
 
@@ -66,6 +69,17 @@ def test_the_scan_gives_the_inertia_that_slow_motion_does_not(made: hammer.Examp
     assert off.max() < 0.1 * np.trace(true)
     assert np.linalg.norm(seen.std[4:]) < 0.7 * np.linalg.norm(blind.std[4:])
     assert any("part" in note for note in seen.notes)
+
+
+def test_where_a_scan_lies_is_in_the_error_of_its_shape_and_not_in_the_grasp(shape: Shape) -> None:
+    views = hammer.scanned(0, views=24).views
+    scan = fuse(views)
+    placed = replace(scan, placement=Placement(Pose.identity(), 1e-3, 0.01, None))
+    exact, unsure = replace(shape, scan=scan).error, replace(shape, scan=placed).error
+    assert exact == shape.error
+    assert unsure.com_m == pytest.approx(np.hypot(exact.com_m, 1e-3))
+    assert (unsure.turn_rad, unsure.grasp_m, unsure.grasp_rad) == (0.01, 0.0, 0.0)
+    assert replace(shape, scan=placed).parts.com_std == unsure.com_m
 
 
 def test_a_known_number_of_parts_is_kept(cloud: Cloud) -> None:

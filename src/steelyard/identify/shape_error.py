@@ -27,17 +27,19 @@ class ShapeError:
     inertia_share   of every entry of the inertia alike, as a share of half its trace: that of a measured mesh
     stretch         of the second moments, each as a share of itself: that of a scan, in place of the former. Such a
                     shape leans, too, by a share of that along each axis, in radii of gyration
+    turn_rad        of the whole shape about its centre of mass, per axis [rad]
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     """
 
     com_m: float = 0.0
     inertia_share: float = 0.0
     stretch: float = 0.0
+    turn_rad: float = 0.0
     grasp_m: float = 0.0
     grasp_rad: float = 0.0
 
     def __post_init__(self) -> None:
-        values = (self.com_m, self.inertia_share, self.stretch, self.grasp_m, self.grasp_rad)
+        values = (self.com_m, self.inertia_share, self.stretch, self.turn_rad, self.grasp_m, self.grasp_rad)
         if not all(np.isfinite(v) and v >= 0 for v in values):
             raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
 
@@ -48,7 +50,12 @@ class ShapeError:
     def scaled(self, factor: float) -> ShapeError:
         """Return the error with its shape part `factor` times as large, not below that of a measured shape."""
         com, share = max(self.com_m, MEASURED.com_m), max(self.inertia_share, MEASURED.inertia_share)
-        return replace(self, com_m=factor * com, inertia_share=factor * share, stretch=factor * self.stretch)
+        stretch, turn = factor * self.stretch, factor * self.turn_rad
+        return replace(self, com_m=factor * com, inertia_share=factor * share, stretch=stretch, turn_rad=turn)
+
+    def laid(self, std_m: float, std_rad: float) -> ShapeError:
+        """Return the error of a shape that is shifted and turned as a whole by these standard deviations, too."""
+        return replace(self, com_m=float(np.hypot(self.com_m, std_m)), turn_rad=float(np.hypot(self.turn_rad, std_rad)))
 
     def placed(self, std_m: float, std_rad: float) -> ShapeError:
         """Return the error with a place in the sensor that is less sure by these standard deviations."""
@@ -74,6 +81,9 @@ class ShapeError:
             inner[4:, 4:] = self.stretch**2 * slope @ slope.T
         else:
             inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
+        if self.turn_rad:
+            slope = _turned(body.inertia_com)
+            inner[4:, 4:] += self.turn_rad**2 * slope @ slope.T
         back = parameter_jacobian(phi)
         return np.asarray(back @ inner @ back.T)
 
@@ -89,6 +99,13 @@ class ShapeError:
 def _second_moments(inertia: Array) -> Array:
     """Return the second moments (3, 3) of a body with this inertia, about the same point."""
     return np.asarray(0.5 * np.trace(inertia) * np.eye(3) - inertia)
+
+
+def _turned(inertia: Array) -> Array:
+    """Return what small turns about each axis do to the inertia about the centre of mass (6, 3), per radian."""
+    cross = np.cross(np.eye(3), np.eye(3)[:, None])  # (3, 3, 3): cross[k] @ v = e_k x v
+    change = cross @ inertia - inertia @ cross
+    return np.asarray(change[:, *np.triu_indices(3)].T)
 
 
 def _stretched(inertia: Array) -> Array:

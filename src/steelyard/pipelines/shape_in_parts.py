@@ -50,9 +50,7 @@ class Shape:
     def parts(self) -> Parts:
         """The parts as shape and colour alone say, with how wrong the solid may be."""
         error = self.error
-        return replace(
-            self.segmentation.parts, com_std=float(np.hypot(error.com_m, error.grasp_m)), stretch=error.stretch
-        )
+        return replace(self.segmentation.parts, com_std=error.com_m, stretch=error.stretch)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
@@ -65,7 +63,7 @@ class Shape:
         """How wrong the shape may be: no less than a measured mesh, more as far as solid and cameras are unsure."""
         error = MEASURED.at_least(self.solid.surface_m, STRETCH * self.solid.volume_std)
         placed = None if self.scan is None else self.scan.placement
-        return error.placed(placed.std_m, placed.std_rad) if placed else error
+        return error.laid(placed.std_m, placed.std_rad) if placed else error
 
     def cuts(self) -> Cuts:
         """Return the cuts that a log may choose from: about the number shape and colour chose, and half of it.
