@@ -7,7 +7,7 @@ them by how it turns with the camera.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -17,8 +17,9 @@ from steelyard.spatial import Pose, Rotation
 _ROUNDS = 50  # of the variances
 _WRIST = 0.3  # of what views are off by, each by itself: an error at the wrist is believed to be no less, rms
 _BENT = 0.03  # of an error at the wrist: moves are put together as vectors, which they are not quite
-_FEW = 12  # views that can tell such an error from a wrong lens
+_FEW = 12  # views that can tell such an error from a wrong lens, and how theirs hang together
 _LEAST = 1e-12  # share of the moves that is no variance
+_BLOCKS = 10  # of views one after the other, whose errors may hang together
 
 
 @dataclass(frozen=True, eq=False)
@@ -73,6 +74,21 @@ class _Moves:
     @classmethod
     def of(cls, moves: Array, R: Array) -> _Moves:
         """Return the parts of moves (V, 3) of cameras with axes R (V, 3, 3).
+
+        Those of an arm go with its posture: its errors hang together from view to view, and what is common is then
+        less sure than if each view had its own. By how much it would be other without a tenth of the way says so.
+        """
+        found = cls._if_each_its_own(moves, R)
+        if len(R) < _FEW:
+            return found
+        block = np.arange(len(R)) * _BLOCKS // len(R)
+        others = [cls._if_each_its_own(moves[block != b], R[block != b]).common for b in range(_BLOCKS)]
+        std = np.sqrt((1 - 1 / _BLOCKS) * np.square(np.asarray(others) - found.common).sum(0).mean())
+        return replace(found, std=max(found.std, float(std)))
+
+    @classmethod
+    def _if_each_its_own(cls, moves: Array, R: Array) -> _Moves:
+        """Return the parts of moves (V, 3) of cameras with axes R (V, 3, 3) whose errors have nothing in common.
 
         How large h and e are is found with them, by expectation and maximisation: without an error at the wrist h goes
         to nothing, and g is the mean.

@@ -1,0 +1,91 @@
+"""Where a scan lies once its cameras were moved: errors of an arm average out, one at the wrist is found."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from scipy.spatial import cKDTree
+
+from steelyard.shape.placement import placement
+from steelyard.shape.scan import fuse
+from steelyard.simulate.camera import disturbed, wrist_arc
+from steelyard.simulate.scanning import scan_mesh
+from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.catalogue import build
+from steelyard.workshop.finish import painted
+
+HAND_EYE = Pose(Rotation.exp(np.radians([0.6, -0.8, 0.3])), np.array([0.003, -0.002, 0.003]))
+MIDDLE = np.array([0.01, -0.02, 0.03])
+Given = Callable[[Pose, np.random.Generator], Pose]
+
+
+def each(X: Pose, rng: np.random.Generator) -> Pose:
+    return disturbed(X, 4.0, 1.0, rng)
+
+
+def swayed(X: Pose, rng: np.random.Generator) -> Pose:
+    """Return poses of an arm whose errors change slowly along its way."""
+    way = 2 * np.pi * np.linspace(0, 1, len(X.position))[:, None]
+    waves = [rng.normal(size=6) * np.sin(n * way + rng.uniform(0, 2 * np.pi, 6)) for n in (1, 2, 3)]
+    wave = np.sum(waves, axis=0) / np.sqrt(4.5)
+    return X @ Pose(Rotation.exp(np.radians(1.0) * wave[:, :3]), 4e-3 * wave[:, 3:])
+
+
+def both(X: Pose, rng: np.random.Generator) -> Pose:
+    return disturbed(X @ HAND_EYE, 1.0, 0.3, rng)
+
+
+def moved_by(rng: np.random.Generator) -> Pose:
+    """Return a motion of the whole scan, which its views cannot tell."""
+    return Pose(Rotation.exp(0.01 * rng.normal(size=3)), 0.002 * rng.normal(size=3))
+
+
+def test_an_error_at_the_wrist_is_found_and_the_place_is_right() -> None:
+    true, whole = wrist_arc(np.zeros(3), 0.35, 36), moved_by(np.random.default_rng(0))
+    placed = placement(true @ HAND_EYE, whole @ true, whole.apply(MIDDLE))
+    left = placed.common.inverse() @ whole
+    assert np.linalg.norm(left.apply(MIDDLE) - MIDDLE) < 2e-4
+    assert np.linalg.norm(left.rotation.log()) < np.radians(0.02)
+    assert placed.at_wrist is not None
+    assert placed.at_wrist[0] == pytest.approx(np.linalg.norm(HAND_EYE.position), rel=0.05)
+    assert placed.at_wrist[1] == pytest.approx(np.linalg.norm(HAND_EYE.rotation.log()), rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "views", "least"), [(each, 36, 0.92), (both, 36, 0.88), (swayed, 36, 0.85), (swayed, 127, 0.85)]
+)
+def test_bars_of_the_place_hold_it(wrong: Given, views: int, least: float) -> None:
+    z = []
+    for seed in range(40):
+        rng = np.random.default_rng(seed)
+        true, whole = wrist_arc(np.zeros(3), 0.35, views, start=rng.uniform(0, 360)), moved_by(rng)
+        placed = placement(wrong(true, rng), whole @ true, whole.apply(MIDDLE))
+        left = placed.common.inverse() @ whole
+        z.append([(left.apply(MIDDLE) - MIDDLE) / placed.std_m, left.rotation.log() / placed.std_rad])
+    held = (np.abs(z) < 1.96).mean((0, 2))
+    assert (held > least).all()
+    assert np.sqrt(np.square(z).mean()) > 1 / 2.6
+
+
+@pytest.mark.parametrize("views", [1, 2, 3])
+def test_few_views_have_bars(views: int) -> None:
+    rng = np.random.default_rng(0)
+    true = wrist_arc(np.zeros(3), 0.35, 36)[np.arange(views)]
+    placed = placement(each(true, rng), true, MIDDLE)
+    assert placed.at_wrist is None
+    assert 1e-3 < placed.std_m < 0.1
+    assert np.radians(0.1) < placed.std_rad < 0.5
+
+
+def test_a_scan_with_an_error_at_the_wrist_lies_where_it_is_in_the_world() -> None:
+    seen = scan_mesh(painted(build("pliers")), 0, count=36)
+    right = fuse(seen.views)
+    found = fuse(seen.views.posed(seen.views.X_WC @ HAND_EYE))
+    assert found.placement is not None
+    assert found.placement.at_wrist is not None
+    nearest = cKDTree(right.cloud.xyz).query(found.cloud.xyz)[1]
+    off = np.linalg.norm((found.cloud.xyz - right.cloud.xyz[nearest]).mean(0))
+    assert off < 4 * np.hypot(found.placement.std_m, 1e-4)
+    assert found.table.normal == pytest.approx(right.table.normal, abs=2e-3)
