@@ -12,6 +12,7 @@ from sanity.held_poses import BODY, recorded
 from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import solids
+from steelyard.logs.alignment import AlignOptions, align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
@@ -128,6 +129,13 @@ def test_the_mount_printed_for_a_large_turn_mends_it(degrees: tuple[float, float
     mended = identify(replace(wrong, streams=tuple(replace(s, mount=mount) for s in wrong.streams)))
     assert mended.codes() == set()
     assert np.abs((np.append(mended.mass, mended.com) - np.append(BODY.mass, BODY.com)) / mended.std[:4]).max() < 4
+
+
+def test_a_turned_sensor_is_no_delay(recording: Recording) -> None:
+    turn = (0.0, float(np.radians(8.0)), 0.0)
+    wrong = misread(recording, np.array(turn))
+    assert any(align(wrong).delays_s.values())
+    assert not any(align(wrong, AlignOptions(turn=turn)).delays_s.values())
 
 
 def test_poses_beside_the_wrench_in_one_file_hide_nothing(recording: Recording) -> None:

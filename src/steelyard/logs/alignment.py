@@ -41,6 +41,7 @@ class AlignOptions:
     leave_out_taps    leave the rows of taps out
     smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
     place             (3,) [m] in S, the point whose position, velocity or acceleration the poses give
+    turn              (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
     """
 
     cutoff_hz: float = 40.0
@@ -49,6 +50,7 @@ class AlignOptions:
     leave_out_taps: bool = True
     smallest_delay_s: float = 0.5e-3
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -193,7 +195,8 @@ def _align_timed(given: _Prepared) -> Aligned:
     taps = _taps(given) if given.options.leave_out_taps else np.zeros((0, 2))
     time, felt = _rows(given)
     touched = inside(time, taps)
-    clocks, delayed = _clocks(given, time[~touched], felt.rows(~touched))
+    straight = felt.rows(~touched).turned_back(given.options.turn)
+    clocks, delayed = _clocks(given, time[~touched], straight)
     rigid = _rigid(given, time[~touched], felt.rows(~touched), clocks)
     if rigid is not None:
         lower = _align_timed(_prepare(given.recording, replace(given.options, cutoff_hz=rigid)))

@@ -48,6 +48,13 @@ class Felt:
         """Return the wrench at some of the rows."""
         return replace(self, values=self.values[chosen])
 
+    def turned_back(self, turn: tuple[float, float, float]) -> Felt:
+        """Return what would be felt in S were it not turned by a rotation vector [rad]; a wrench in W is as it is."""
+        if self.world or not any(turn):
+            return self
+        back = Rotation.exp(turn).inverse()
+        return replace(self, values=back.apply(self.values.reshape(-1, 3)).reshape(-1, 6))
+
     def in_sensor(self, rotation: Rotation | None) -> Array:
         """Return the wrench (N, 6) about the S origin in S; `rotation` (N,) turns S into W.
 

@@ -1,6 +1,7 @@
 """From a recording to the rows that are fitted: aligned, those whose motion is known, and that nobody touched.
 
 Where the poses turn out to be of another point than S, all is done anew for that point: delays and contact hang on it.
+A sensor that is turned looks like a delay, too: then delays are found anew without the turn.
 """
 
 from __future__ import annotations
@@ -21,6 +22,7 @@ from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
 from steelyard.sanity.contact import untouched
 from steelyard.sanity.misplaced import Misplaced, misplaced
+from steelyard.sanity.sensor_matrix import turn_of
 
 if TYPE_CHECKING:
     from steelyard.pipelines.held_object import Options
@@ -51,6 +53,11 @@ class FitRows:
     place: Misplaced | None = None
 
     @property
+    def delayed(self) -> bool:
+        """Whether a delay was found."""
+        return any(f.code == "stream-delayed" for f in self.aligned.findings)
+
+    @property
     def notes(self) -> tuple[str, ...]:
         """What there is to say about gravity and about rows whose acceleration is not known."""
         return (*self.level, *self.unmeasured)
@@ -58,18 +65,31 @@ class FitRows:
 
 def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Options) -> FitRows:
     """Return the rows that are fitted; `before` was found in the recording as it was read."""
-    rows = _rows(recording, before, options, AlignOptions())
-    place = None if rows.unmeasured else examine_place(rows.log, before, options.drift)
-    if place is None:
+    how = AlignOptions()
+    rows = _rows(recording, before, options, how)
+    if rows.unmeasured:
         return rows
+    place = examine_place(rows.log, before, options.drift)
+    if place is not None:
+        rows, how = _placed(place, recording, before, options)
+    if rows.delayed and (turn := turn_of(rows.log, recording, before, options.drift)) is not None:
+        rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place)
+    return rows
+
+
+def _placed(
+    place: Misplaced, recording: Recording, before: tuple[Finding, ...], options: Options
+) -> tuple[FitRows, AlignOptions]:
+    """Return the rows with accelerations of S, where they were of another point, and how they were aligned."""
     for _ in range(ROUNDS):
         x, y, z = (float(v) for v in place.place)
-        rows = _rows(recording, before, options, AlignOptions(place=(x, y, z)))
+        how = AlignOptions(place=(x, y, z))
+        rows = _rows(recording, before, options, how)
         rest = misplaced(rows.log, options.drift)
         if rest is None or np.linalg.norm(rest.place) < SETTLED:
             break
         place = replace(place, place=place.place + rest.place, std=rest.std)
-    return replace(rows, place=place)
+    return replace(rows, place=place), how
 
 
 def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:

@@ -15,6 +15,7 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.full_fit import Rows
+from steelyard.sanity.sensor_matrix import sensor_matrix
 from steelyard.sanity.torques import UNITS
 from steelyard.sanity.two_masses import ELSEWHERE, noise_share, two_masses
 from steelyard.spatial import cross_matrix
@@ -111,7 +112,9 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
 
 
 def examine_place(log: MotionLog, known: tuple[Finding, ...], drift: bool = False) -> Misplaced | None:
-    """Return the point whose acceleration the log gives where it is not S and explains more than two masses do.
+    """Return the point whose acceleration the log gives where it is not S and is the best cause.
+
+    Two masses, or a turned sensor, must leave more of the residual.
 
     known  what was found before: where the motion or the wrench is no body's, no point is looked for
     """
@@ -120,8 +123,8 @@ def examine_place(log: MotionLog, known: tuple[Finding, ...], drift: bool = Fals
     found = misplaced(log, drift)
     if found is None or not found.sure:
         return None
-    rival = two_masses(log)
-    return found if rival is None or found.left < rival.left else None
+    rivals = (two_masses(log), sensor_matrix(log, drift))
+    return found if all(r is None or found.left < r.left for r in rivals) else None
 
 
 def _lever(log: MotionLog) -> Array:

@@ -136,8 +136,7 @@ def examine_sensor(
     stream = felt_in_sensor(recording)
     if stream is None or {f.code for f in known} & ELSEWHERE:
         return estimate, ()
-    told = any(f.code == "sensor-turned" for f in known)
-    found = sensor_matrix(log, drift, _first_turn(log) if told else None)
+    found = _looked_at(log, known, drift)
     if found is None:
         return estimate, ()
     findings = (*_turn(found, stream) * found.turned, *_gains(found) * found.unlike)
@@ -148,6 +147,25 @@ def _first_turn(log: MotionLog) -> Rotation:
     """Return the turn of the force that follows what accelerates and holds the load best (Wahba)."""
     force, own = log.wrench[:, 3:], log.acceleration - log.gravity
     return Rotation.aligning((force - force.mean(0)).T @ (own - own.mean(0)))
+
+
+def turn_of(
+    log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
+) -> tuple[float, float, float] | None:
+    """Return the rotation vector [rad] by which the wrench is turned beyond doubt, None where it is not."""
+    if felt_in_sensor(recording) is None or {f.code for f in known} & ELSEWHERE:
+        return None
+    found = _looked_at(log, known, drift)
+    if found is None or not found.turned:
+        return None
+    x, y, z = (float(v) for v in found.turn)
+    return x, y, z
+
+
+def _looked_at(log: MotionLog, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
+    """Return what the wrench says of the sensor, from the turn that it shows at once where a large one was told."""
+    told = any(f.code == "sensor-turned" for f in known)
+    return sensor_matrix(log, drift, _first_turn(log) if told else None)
 
 
 def felt_in_sensor(recording: Recording) -> Stream | None:
