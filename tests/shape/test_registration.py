@@ -71,6 +71,15 @@ def test_a_low_object_is_found_from_where_what_stands_on_the_table_brings_the_vi
         assert volume(fuse(wrong_by(scanned("ruler").views, mm, deg))) == pytest.approx(right, rel=0.25)
 
 
+def test_a_wrinkle_of_the_table_is_no_low_object() -> None:
+    """Of an error at the wrist: one fit agrees on the table alone, and better than on the ruler."""
+    seen = scan_mesh(painted(build("ruler")), 0, count=48)
+    axis, shift = np.array([0.607, -0.754, -0.25]), np.array([0.254, 0.788, -0.561])
+    wrong = Pose(Rotation.exp(np.radians(2.0) * axis), 6e-3 * shift)
+    found = fuse(seen.views.posed(seen.views.X_WC @ wrong))
+    assert volume(found) == pytest.approx(volume(fuse(seen.views)), rel=0.1)
+
+
 def test_a_surface_that_shows_less_is_not_taken_for_being_crossed_less() -> None:
     scene = scene_of(wrong_by(scanned("screwdriver").views, 6.0, 1.5))
     off = levelled(scene)

@@ -15,7 +15,17 @@ from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import slid
 from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Region, Scene, no_surface, object_on_table, settled, surfels
+from steelyard.shape.scene import (
+    LEAST_VIEWS,
+    WINDOW,
+    Region,
+    Scene,
+    no_surface,
+    object_on_table,
+    settled,
+    surface_of,
+    surfels,
+)
 from steelyard.shape.thinning import spread_to
 
 _STEPS = 3
@@ -61,8 +71,8 @@ class Seen:
 class _Try:
     """What the views see from cameras at R (V, 3, 3), p (V, 3), and how far they contradict it.
 
-    crossed  share of what they say of its surface that is to have seen past it
-    shown    pixels clear of the table that lie on the surface, of those looked at
+    crossed  share of what they say of the object's surface that is to have seen past it
+    shown    pixels that lie on it, of those looked at
     """
 
     seen: Seen
@@ -73,15 +83,19 @@ class _Try:
 
     @classmethod
     def of(cls, scene: Scene, seen: Seen) -> _Try:
-        """Return the judgement of what is seen from where the cameras now are."""
-        xyz, normal = _model(scene, seen.patches, _NEAR)
+        """Return the judgement of what is seen from where the cameras now are; CannotAnswer where that is nothing."""
+        R, p = scene.R, scene.p
+        scene.p = p.copy()
+        xyz, normal = surface_of(scene, seen.patches, seen.region, _MODEL)
         on, past = settled(scene, xyz, normal, WINDOW, 0)[xyz[:, 2] > _STANDS_OUT * scene.sigma, :2].sum(0)
         pixels = images.sampled(*scene.images(), max(1, int(np.sqrt(scene.views.depth.size / _SAMPLES))))[:, :3]
-        pixels = pixels[(pixels[:, 2] > _STANDS_OUT * scene.sigma) & seen.region.holds(pixels)]
-        away, row = cKDTree(xyz).query(pixels)
+        pixels = pixels[seen.region.holds(pixels)]
+        away, row = cKDTree(xyz).query(pixels, distance_upper_bound=_NEAR)
+        pixels, row = pixels[away < _NEAR], row[away < _NEAR]
         off = np.abs(((pixels - xyz[row]) * normal[row]).sum(1))
-        shown = int(((off < _ON * scene.sigma) & (away < _NEAR)).sum())
-        return cls(seen, scene.R, scene.p, float(past / max(on + past, 1.0)), shown)
+        # Nearer to it than to the table: a blurred rim must not pass the table's pixels for its own.
+        shown = (off < _ON * scene.sigma) & (off < pixels[:, 2])
+        return cls(seen, R, p, float(past / max(on + past, 1.0)), int(shown.sum()))
 
 
 def agreed(scene: Scene, first: Seen, off: float) -> Seen:
@@ -96,15 +110,24 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
     """
     if len(scene.R) < 2 or _apart(scene, first, _FINE[-1]) < _APART * scene.sigma:
         return first
-    given, tries = (scene.R, scene.p), [_Try.of(scene, first)]
+    given, tries = (scene.R, scene.p), []
     near = off < _NEARBY and _apart(scene, first, _FAR[0]) < _NEARBY
-    for fit in [_fit_fine] if near else [_fit_far, _fit_slid] if off else [_fit_far]:
+    for fit in (_left, _fit_fine) if near else (_left, _fit_far, _fit_slid) if off else (_left, _fit_far):
         scene.R, scene.p = given
         with suppress(CannotAnswer):
             tries.append(_Try.of(scene, fit(scene, first)))
-    best = _least_wrong(tries)
+    if not tries:
+        raise no_surface()
+    # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
+    # spread more about it than about the best. Of a low object, which cannot be crossed, the last two tell.
+    most, least = max(each.shown for each in tries), min(each.seen.spread for each in tries)
+    best = min(tries, key=lambda each: each.crossed - each.shown / max(most, 1) + each.seen.spread / least)
     scene.R, scene.p = best.R, best.p
     return best.seen
+
+
+def _left(_: Scene, first: Seen) -> Seen:
+    return first
 
 
 def _fit_fine(scene: Scene, first: Seen) -> Seen:
@@ -118,17 +141,6 @@ def _fit_far(scene: Scene, first: Seen) -> Seen:
 def _fit_slid(scene: Scene, _: Seen) -> Seen:
     slid(scene)
     return _fitted(scene, Seen.by(scene), _WINDOWS)
-
-
-def _least_wrong(tries: list[_Try]) -> _Try:
-    """Return the try that the views contradict least.
-
-    Three shares are added: of what they say of its surface, to have seen past it; of pixels clear of the table, more
-    than in the best not to lie on it; and of the spread about it, more than in the best. Of a low object, which
-    hardly stands out and cannot be crossed, the last one tells.
-    """
-    most, least = max(1, *(each.shown for each in tries)), min(each.seen.spread for each in tries)
-    return min(tries, key=lambda each: each.crossed - each.shown / most + each.seen.spread / least)
 
 
 def _apart(scene: Scene, seen: Seen, window: float) -> float:

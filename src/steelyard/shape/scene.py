@@ -194,7 +194,10 @@ def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int)
 
 
 def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tuple[Array, Array]:
-    """Return points (N, 3) of the object's surface and normals, settled among the views."""
+    """Return points (N, 3) of the object's surface and normals, settled among the views, the table around it level 0.
+
+    CannotAnswer where nothing stands out of that.
+    """
     mask = region.mask
     order = np.argsort(-patches[:, 6], kind="stable")
     rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _SEEDS * points, scene.pixel)
