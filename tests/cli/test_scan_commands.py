@@ -44,6 +44,7 @@ def test_views_become_a_cloud_and_the_cloud_parts(capsys: pytest.CaptureFixture[
     assert told["points"] > told["seen_points"]  # the underside is closed
     assert set(told["stages"])
     assert told["cpu_s"] > 0
+    assert (told["place_std"], told["camera_off_at_wrist"]) == (None, None)
 
     status, out, _ = run(capsys, "segment", cloud, "-o", parts, "--json")
     found = json.loads(out)

@@ -44,6 +44,8 @@ def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
 
 
 def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
+    placed = fused.placement
+    wrist = placed.at_wrist if placed else None
     return {
         "views": fused.views,
         "points": len(fused.cloud),
@@ -53,7 +55,8 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
         "depth_noise_m": fused.noise_std,
         "disagreement": fused.disagree,
         "cameras_moved_m": fused.moved_m,
-        "place_std": None if (placed := fused.placement) is None else {"m": placed.std_m, "rad": placed.std_rad},
+        "place_std": {"m": placed.std_m, "rad": placed.std_rad} if placed else None,
+        "camera_off_at_wrist": {"m": wrist[0], "rad": wrist[1]} if wrist else None,
         "cpu_s": round(seconds, 4),
         "stages": {name: round(value, 4) for name, value in fused.stages.items()},
         "findings": [finding.plain() for finding in fused.findings],

@@ -250,7 +250,7 @@ def _findings(scene: Scene, surface: _Surface, level: _Level, placed: Placement 
                 f"{why}",
             )
         )
-    if far or level.lens:
+    if far or level.lens or (placed and placed.at_wrist):
         found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
     if cut := cut_off(scene, surface.xyz):
         found.append(cut)
@@ -267,8 +267,10 @@ def _findings(scene: Scene, surface: _Surface, level: _Level, placed: Placement 
 
 
 def _said_of(level: _Level, shift: float | None, placed: Placement | None) -> str:
-    """Return what to know of views that had the table too high or too low, after a shift [m] of the cameras."""
-    said = [f"The views have the table {1e3 * level.off:.2g} mm (rms) too high or too low at the object."]
+    """Return what was put right of views that did not agree, `shift` [m] of the cameras by registration."""
+    said = []
+    if level.off:
+        said.append(f"The views have the table {1e3 * level.off:.2g} mm (rms) too high or too low at the object.")
     if lens := level.lens:
         said.append(f"They were read with {_named(lens)} instead of {_named(level.given)}: then they have one table.")
     if shift:
