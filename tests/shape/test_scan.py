@@ -111,6 +111,12 @@ def test_what_is_empty_is_outside(box: Scanned) -> None:
     assert scan.empty(inside - up).all()
 
 
+def test_a_solid_of_which_the_views_leave_nothing_is_refused(box: Scanned) -> None:
+    solid = enclose(fuse(box.views).cloud)
+    with pytest.raises(CannotAnswer, match=r"no volume left: .* check their poses"):
+        carved(solid, lambda points: np.ones(len(points), bool))
+
+
 def test_poses_slightly_off_are_mended(box: Scanned) -> None:
     wrong = box.views.posed(disturbed(box.views.X_WC, 1.5, 0.4, np.random.default_rng(0)))
     scan = fuse(wrong)

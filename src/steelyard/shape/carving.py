@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.shape.islands import without_islands
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import Solid
@@ -28,13 +28,18 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     empty  whether points (N, 3) are known to be outside: `Scan.empty`
 
     With the underside closed, all that no view saw to be empty is the object's; between, the solid's own verdict holds.
-    A surface that looked open is closed by that.
+    A surface that looked open is closed by that. CannotAnswer where the views leave nothing.
     """
     around, known = _cells(solid)
     corners = around.vertices[around.tets]
     asked = np.einsum("pk,tkd->ptd", _PLACES, corners)
     share = np.asarray(empty(asked.reshape(-1, 3)), float).reshape(len(_PLACES), -1).mean(0)
     inside = without_islands(around, ((known >= 0) & (share < _EMPTY)) | (share < _FULL))
+    if not inside.any():
+        raise CannotAnswer(
+            "the object has no volume left: cameras see past all of what its points enclose. The views do not agree: "
+            "check their poses and camera.json, calibrate hand to eye anew, or take more views from all sides."
+        )
     # A cell that only the views put inside is as sure as they are.
     sure = np.where(known >= 0, known, 1 - share / _EMPTY)
     findings = tuple(f for f in solid.findings if f.code != "surface-open")
