@@ -8,9 +8,10 @@ from functools import cache
 import numpy as np
 import pytest
 
+from steelyard.shape import scan
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled
-from steelyard.shape.lens_error import Tables, lens_by_table
+from steelyard.shape.lens_error import Tables, _corrected, lens_by_table
 from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.scene import scene_of
 from steelyard.shape.views import Intrinsics, Views
@@ -94,6 +95,20 @@ def test_errors_of_the_arm_are_no_wrong_lens(seed: int) -> None:
     rng = np.random.default_rng(seed)
     assert told(views().posed(disturbed(views().X_WC, 4.0, 1.0, rng))) is None
     assert told(swayed(views(), 0.5, seed)) is None
+
+
+def test_a_principal_point_outside_the_image_is_no_lens() -> None:
+    lens = views().intrinsics
+    assert _corrected(lens, 0.0, 0.0, 0.1) is not None
+    assert _corrected(lens, 0.0, 0.6, 0.0) is None
+    assert _corrected(lens, 0.0, 0.0, -0.5) is None
+
+
+def test_a_lens_that_does_not_level_the_table_is_not_kept(monkeypatch: pytest.MonkeyPatch) -> None:
+    wrong = replace(views().intrinsics, fx=500.0, fy=500.0)
+    monkeypatch.setattr(scan, "lens_by_table", lambda _: wrong)
+    found = fuse(views().posed(disturbed(views().X_WC, 1.0, 0.2, np.random.default_rng(1))))
+    assert not any("read with" in finding.message for finding in found.findings)
 
 
 def test_a_handful_of_views_tells_nothing() -> None:

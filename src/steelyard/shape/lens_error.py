@@ -45,10 +45,12 @@ def lens_by_table(scene: Scene) -> Intrinsics | None:
     return _corrected(scene.views.intrinsics, *lens) if lens.any() else None
 
 
-def _corrected(lens: Intrinsics, log_focal: float, x: float, y: float) -> Intrinsics:
+def _corrected(lens: Intrinsics, log_focal: float, x: float, y: float) -> Intrinsics | None:
+    """Return the lens put right; None where no camera has its principal point there: then it is something else."""
     k, cx, cy = np.exp(-log_focal), lens.cx + x * lens.fx, lens.cy + y * lens.fy
-    inside = np.clip([cx, cy], 0.0, [lens.width - 1, lens.height - 1])
-    return replace(lens, fx=float(k * lens.fx), fy=float(k * lens.fy), cx=float(inside[0]), cy=float(inside[1]))
+    if not (0 <= cx <= lens.width - 1 and 0 <= cy <= lens.height - 1):
+        return None
+    return replace(lens, fx=float(k * lens.fx), fy=float(k * lens.fy), cx=float(cx), cy=float(cy))
 
 
 @dataclass(frozen=True, eq=False)

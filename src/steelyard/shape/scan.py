@@ -80,10 +80,13 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock = _Clock()
     scene = scene_of(views)
     try:
-        level = _levelled(scene)
+        level, off = _levelled(scene), 0.0
         if level.lens:
-            scene = scene_of(replace(scene.views, intrinsics=level.lens))
-        off = levelled(scene) if level.lens else level.off
+            read = scene_of(replace(scene.views, intrinsics=level.lens))
+            off = levelled(read)
+            # A lens with which the views have the table no more alike explains nothing.
+            scene, level = (read, level) if off < level.off else (scene, replace(level, lens=None))
+        off = off if level.lens else level.off
         clock.lap("table")
         found = _surface(scene, points, off, clock)
     except CannotAnswer as error:
