@@ -124,3 +124,9 @@ def test_a_scan_is_read_with_the_lens_that_its_table_asks_for_and_says_so() -> N
     assert [finding.code for finding in found.findings] == ["views-disagree"]
     assert "read with fx 615, fy 615, cx 320, cy 240 instead of fx 646" in found.findings[0].message
     assert volume(found) == pytest.approx(volume(fuse(views())), rel=0.03)
+
+
+def test_only_what_was_found_is_said() -> None:
+    lens = views().intrinsics
+    said = scan._said_of(scan._Level(0.0, lens, None), 0.025, None)
+    assert said == "The cameras had to be moved by 25 mm (rms) until the views agreed."

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import CannotAnswer
-from steelyard.shape import registration
+from steelyard.shape import registration, scan
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled
 from steelyard.shape.registration import Seen, agreed
@@ -110,3 +110,10 @@ def test_the_spread_of_few_views_is_a_number(count: int) -> None:
     views = scanned().views
     seen = Seen.by(scene_of(views.chosen(np.arange(count))))
     assert np.isfinite(seen.spread)
+
+
+def test_a_mistake_is_looked_for_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[Views] = []
+    monkeypatch.setattr(scan, "likely_mistake", lambda views: asked.append(views) or "")
+    fuse(wrong_by(scanned().views, 4.0, 1.0))
+    assert len(asked) == 1

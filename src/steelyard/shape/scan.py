@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -77,10 +78,10 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
 
     Raises CannotAnswer where no table or no object on it is found.
     """
-    clock = _Clock()
+    clock, mistake = _Clock(), cache(lambda: likely_mistake(views))
     scene = scene_of(views)
     try:
-        level, off = _levelled(scene), 0.0
+        level, off = _levelled(scene, mistake), 0.0
         if level.lens:
             read = scene_of(replace(scene.views, intrinsics=level.lens))
             off = levelled(read)
@@ -90,14 +91,14 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
         clock.lap("table")
         found = _surface(scene, points, off, clock)
     except CannotAnswer as error:
-        raise CannotAnswer(" ".join(filter(None, (str(error), likely_mistake(views))))) from None
+        raise CannotAnswer(" ".join(filter(None, (str(error), mistake())))) from None
     xyz, normal, seen, spacing, bottom = _closed(scene, found.xyz, found.normal, points)
     clock.lap("underside")
     rgb, coloured = _colours(scene, xyz, normal, seen)
     clock.lap("colour")
     placed = None if found.shift is None else _placed(scene, xyz.mean(0))
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, found, level, placed)
+    findings = _findings(scene, found, level, placed, mistake)
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
@@ -141,9 +142,9 @@ class _Level:
     lens: Intrinsics | None
 
 
-def _levelled(scene: Scene) -> _Level:
+def _levelled(scene: Scene, mistake: Callable[[], str]) -> _Level:
     given, off = scene.views.intrinsics, levelled(scene)
-    if off > _TABLE_OFF and likely_mistake(scene.views):
+    if off > _TABLE_OFF and mistake():
         raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
     return _Level(off, given, lens_by_table(scene) if off else None)
 
@@ -233,7 +234,9 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
-def _findings(scene: Scene, surface: _Surface, level: _Level, placed: Placement | None) -> tuple[Finding, ...]:
+def _findings(
+    scene: Scene, surface: _Surface, level: _Level, placed: Placement | None, mistake: Callable[[], str]
+) -> tuple[Finding, ...]:
     found, disagree, shift = [], surface.disagree, surface.shift
     if others := surface.others:
         found.append(
@@ -243,7 +246,7 @@ def _findings(scene: Scene, surface: _Surface, level: _Level, placed: Placement 
             )
         )
     far = shift is not None and (shift > _FAR or level.off > _TABLE_OFF)
-    why = " " + said if (disagree > _WRONG or far) and (said := likely_mistake(scene.views)) else ""
+    why = " " + said if (disagree > _WRONG or far) and (said := mistake()) else ""
     if disagree > _WRONG:
         found.append(
             Finding.of(
