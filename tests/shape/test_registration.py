@@ -52,6 +52,14 @@ def test_to_seek_the_object_changes_nothing() -> None:
     assert np.all(region.mask[region.stands])
 
 
+def test_moves_of_a_ruler_along_itself_are_chance_unless_poses_are_known_to_be_wrong() -> None:
+    scene = scene_of(scanned("ruler").views)
+    seen = Seen.by(scene)
+    plain, shown = (registration._apart(scene, seen, 0.003, wrong) for wrong in (True, False))
+    assert shown < 0.3 * plain
+    assert shown < 0.2 * scene.sigma
+
+
 @pytest.mark.parametrize("deg", [1.0, 2.0])
 def test_views_that_are_turned_about_the_object_are_turned_back(deg: float) -> None:
     views = scanned().views

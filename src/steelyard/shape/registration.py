@@ -108,10 +108,10 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
     worth while: how far it would move the views apart. Where poses are off by more than a little, it is tried from
     where they are and from where `slid` brings them. A try that loses the object is none.
     """
-    if len(scene.R) < 2 or _apart(scene, first, _FINE[-1]) < _APART * scene.sigma:
+    if len(scene.R) < 2 or _apart(scene, first, _FINE[-1], off > 0) < _APART * scene.sigma:
         return first
     given, tries = (scene.R, scene.p), []
-    near = off < _NEARBY and _apart(scene, first, _FAR[0]) < _NEARBY
+    near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < _NEARBY
     for fit in (_left, _fit_fine) if near else (_left, _fit_far, _fit_slid) if off else (_left, _fit_far):
         scene.R, scene.p = given
         with suppress(CannotAnswer):
@@ -143,34 +143,41 @@ def _fit_slid(scene: Scene, _: Seen) -> Seen:
     return _fitted(scene, Seen.by(scene), _WINDOWS)
 
 
-def _apart(scene: Scene, seen: Seen, window: float) -> float:
-    """Return how far one fit to the surface would move apart what the views see of the object, rms [m]."""
-    R, p, xyz = _fit(scene, seen, window)
+def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
+    """Return how far one fit to the surface would move apart what the views see of the object, rms [m].
+
+    wrong  whether poses are known to be: else moves along the surface, such as those of a ruler along itself, are
+           chance, and count as little as they show
+    """
+    R, p, xyz, normal = _fit(scene, seen, window)
     high = xyz[:, 2] > _STANDS_OUT * scene.sigma
-    xyz = xyz[high] if high.any() else xyz
+    xyz, normal = (xyz[high], normal[high]) if high.any() else (xyz, normal)
+    shares, axes = np.linalg.eigh(normal.T @ normal / len(normal))
+    # All of a move where normals point everywhere.
+    shown = np.eye(3) if wrong else (axes * np.sqrt(np.minimum(3 * shares.clip(0), 1))).T
     turn = R @ np.swapaxes(scene.R, 1, 2)
     shift = p - np.einsum("vij,vj->vi", turn, scene.p)
     middle = xyz.mean(0)
     # Over all points: the mean of squares is that of the middle and of what turns about it do.
     about = (xyz - middle).T @ (xyz - middle) / len(xyz)
-    turns = turn - turn.mean(0)
+    turns = shown @ (turn - turn.mean(0))
     by_turns = np.einsum("vij,jk,vik->v", turns, about, turns).mean()
-    return float(np.sqrt((turn @ middle + shift).var(0).sum() + by_turns))
+    return float(np.sqrt(((turn @ middle + shift) @ shown.T).var(0).sum() + by_turns))
 
 
 def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
     """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
     for window in windows:
-        scene.R, scene.p, _ = _fit(scene, seen, window)
+        scene.R, scene.p, *_ = _fit(scene, seen, window)
         seen = Seen.by(scene)
     return seen
 
 
-def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array]:
-    """Return poses (V, 3, 3), (V, 3) that fit the views to their own surface, and the points (N, 3) of it."""
+def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array, Array]:
+    """Return poses (V, 3, 3), (V, 3) that fit the views to their own surface, and its points and normals (N, 3)."""
     xyz, normal = _model(scene, seen.patches, window)
     R, p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
-    return R, p, xyz
+    return R, p, xyz, normal
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
