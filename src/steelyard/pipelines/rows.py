@@ -20,9 +20,11 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
+from steelyard.sanity.after import rotation_of
 from steelyard.sanity.contact import untouched
 from steelyard.sanity.misplaced import Misplaced, misplaced
 from steelyard.sanity.sensor_matrix import turn_of
+from steelyard.sanity.small_slip import small_slip
 
 if TYPE_CHECKING:
     from steelyard.pipelines.held_object import Options
@@ -109,6 +111,11 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     if codes & {"motion-mismatch", "weight-compensated"}:
         touched = ()  # moving rows carry another mass, and only look touched
     log = without_dead(with_declared(log.rows(keep), recording.noise))
+    if not (unmeasured or left_in or touched):
+        slip = small_slip(log, rotation_of(log, aligned), recording.gravity)
+        if slip is not None:
+            keep, finding = slip.longer_side(log)
+            log, touched = log.rows(keep), (finding,)
     return FitRows(log, aligned, level, unmeasured, touched)
 
 

@@ -16,7 +16,15 @@ from steelyard.logs.moments import features
 from steelyard.logs.runs import runs
 from steelyard.sanity import consensus
 from steelyard.sanity.consensus import LEVER, Consensus, Slices
-from steelyard.sanity.load_change import HANDS, LONGEST_LEVER, SHORTEST, LoadChange, find_change
+from steelyard.sanity.load_change import (
+    HANDS,
+    LONGEST_LEVER,
+    SHORTEST,
+    LoadChange,
+    find_change,
+    longer_side,
+    slip_words,
+)
 
 # Slices last this long [s] or hold this many rows; a log of fewer slices is not judged.
 SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
@@ -38,7 +46,6 @@ ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
     "a payload that the controller compensates. If all are right, keep hands and fixtures off the object."
 )
-SLIPPED = "Grip the object tighter, or cut the log where it slipped."
 
 
 @dataclass(frozen=True, eq=False)
@@ -97,22 +104,14 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
 
 def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[Mask, tuple[Finding, ...]]:
     """Return the longer side of a load change, less the time of the hands, searched for contact in its turn."""
+    what = f"the load changed from {change.before:.3g} to {change.after:.3g} kg"
+    what = slip_words(change.slip) if change.slip else what
     time = log.time if log.time is not None else np.zeros(0)
-    early = change.time - time[0] >= time[-1] - change.time
-    side = time < change.time - HANDS / 2 if early else time > change.time + HANDS / 2
+    side, finding = longer_side(time, change.time, what, change.slip > 0)
     kept, more = untouched(log.rows(side), with_bias)
     mask = side.copy()
     mask[side] = kept
-    part = "before" if early else "after"
-    what = f"the load changed from {change.before:.3g} to {change.after:.3g} kg"
-    if change.slip:
-        what = f"the object slipped: its centre of mass moved by {1e3 * change.slip:.2g} mm at the same mass"
-    text = (
-        f"At {change.time:.1f} s {what}; only the time {part} it was used ({100 * (1 - side.mean()):.0f} % of the rows "
-        "were left out)."
-    )
-    finding = Finding.of("load-changed", text)
-    return mask, (replace(finding, remedy=SLIPPED) if change.slip else finding, *more)
+    return mask, (finding, *more)
 
 
 def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers]:

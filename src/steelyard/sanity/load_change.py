@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
+from steelyard.findings import Finding
 from steelyard.sanity.consensus import Slices, solve, sums
 
 # Times tried on a first grid, and the time around a change in which hands may be at work [s].
@@ -19,6 +20,7 @@ SHARE, DEVIATIONS = 0.08, 6.0
 BEYOND_BIAS, LONGEST_LEVER = 40.0, 1.0
 # A body of the same mass has slipped where its centre of mass moved further than this [m].
 SLIP = 0.003
+SLIPPED = "Grip the object tighter, or cut the log where it slipped."
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,6 +58,23 @@ class _Running:
         """Return the least squared residual where `columns` are anew from slice j on."""
         H, g = self.normal(j, columns)
         return self.c - float(g @ solve(H, g))
+
+
+def longer_side(time: Array, at: float, what: str, slipped: bool) -> tuple[Mask, Finding]:
+    """Return the rows (N,) of the longer side of a change at a time [s], away from hands, and what is to be said."""
+    early = at - time[0] >= time[-1] - at
+    side = time < at - HANDS / 2 if early else time > at + HANDS / 2
+    text = (
+        f"At {at:.1f} s {what}; only the time {'before' if early else 'after'} it was used "
+        f"({100 * (1 - side.mean()):.0f} % of the rows were left out)."
+    )
+    finding = Finding.of("load-changed", text)
+    return side, replace(finding, remedy=SLIPPED) if slipped else finding
+
+
+def slip_words(moved: float) -> str:
+    """Say that the object slipped by so much [m]."""
+    return f"the object slipped: its centre of mass moved by {1e3 * moved:.2g} mm at the same mass"
 
 
 def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange | None:
