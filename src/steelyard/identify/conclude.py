@@ -14,7 +14,7 @@ from steelyard.identify import noise_cost
 from steelyard.identify.dense import eigen, product, product_transposed
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
-from steelyard.identify.linear import inverse_scaled, nonnegative, normal_equations, without_bias
+from steelyard.identify.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.people import parameter_jacobian, people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
@@ -50,6 +50,15 @@ def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
     return np.asarray(bread @ score @ bread.T)
 
 
+def _taken(H: Array, problem: Problem, solution: Solution) -> float:
+    """Return how many degrees of freedom the fit took of the residuals, of the information H (p, p)."""
+    J = np.eye(len(H))
+    J[:10, :10] = solution.jacobian
+    prior = problem.plus_bias_prior(np.zeros_like(H))
+    prior[:10, :10] += solution.prior
+    return fitted(J.T @ H @ J, prior)
+
+
 def conclude(
     problem: Problem, solution: Solution, method: str, score: Array | None = None, response: Array | None = None
 ) -> Estimate:
@@ -67,7 +76,7 @@ def conclude(
     H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
     cost, square = noise_cost.value(K, data, *noise)
     H, rows = nonnegative(H, plain), problem.samples
-    chi2 = max(cost / max(int(problem.heard.sum()) * rows - len(solution.linear), 1.0), 0.0)
+    chi2 = max(cost / max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0), 0.0)
     residual_torque, residual_force = problem.rms(square / rows)
     white = max(chi2, 1.0) * (H + extra)
     bread, meat = H, white

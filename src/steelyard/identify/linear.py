@@ -69,10 +69,24 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
     linear = np.zeros(len(T))
     for _ in range(passes):
         H, g = normal_equations(T, scatter, weights_at(linear, T, acceleration, wrench))
-        mass = max(abs(float(linear[0])), LIGHTEST)
-        H[_DIAGONAL, _DIAGONAL] += np.repeat([HEAVIEST, mass * FARTHEST, mass * LOOSEST_RADIUS**2], [1, 3, 6]) ** -2
-        linear = solve_scaled(H, g)
+        linear = solve_scaled(H + loosest(linear), g)
     return linear
+
+
+def loosest(linear: Array) -> Array:
+    """Return the information (p, p) that keeps a body within the sizes that held ones have; it hardly pulls."""
+    mass = max(abs(float(linear[0])), LIGHTEST)
+    out = np.zeros((len(linear), len(linear)))
+    out[_DIAGONAL, _DIAGONAL] = np.repeat([HEAVIEST, mass * FARTHEST, mass * LOOSEST_RADIUS**2], [1, 3, 6]) ** -2
+    return out
+
+
+def fitted(H: Array, prior: Array) -> float:
+    """Return how many numbers data of information H (p, p) fix beside a prior (p, p): the degrees that a fit takes.
+
+    A column that the data leave empty (inertia at rest) takes none, however many poses there are.
+    """
+    return float(np.trace(inverse_scaled(H + prior) @ H))
 
 
 @numba.njit(cache=True)

@@ -8,7 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.linear import reweighted
+from steelyard.identify.linear import inverse_scaled, loosest, normal_equations, reweighted
+from steelyard.identify.noise_cost import weights_at
 from steelyard.identify.regressor import design, residual_map
 from steelyard.identify.rest import RIPPLE
 from steelyard.logs.log import Mask, MotionLog, Noise
@@ -23,6 +24,8 @@ FEWEST_FOR_MEDIAN = 60
 LEAST_SHARE = 0.02
 # No class of rows is quieter than this share of the average over all.
 QUIETEST = 0.25
+# A fit takes no larger share than this of what a channel's residuals tell: three poses and a free bias take so much.
+MOST_LOST = 2 / 3
 # Start of the iteration: force in N and torque in N m of an everyday wrist sensor.
 FIRST_GUESS = np.repeat(np.square([0.02, 0.5]), 3)
 # Of a channel that does not measure.
@@ -161,7 +164,8 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
     linear = reweighted(T, moments.scatter, acceleration, wrench, 4)
     K = residual_map(linear[:10], linear[10:16] if with_bias else np.zeros(6))
     # Parameters that the data fix take their share of the residual degrees of freedom away.
-    lost = min(len(T), 6 * moments.samples / 2) / (6 * moments.samples)
+    lost = _lost(T, moments.scatter, weights_at(linear, T, acceleration, wrench), linear) / (3 * moments.samples)
+    lost = np.minimum(lost, MOST_LOST)
     for group, c in enumerate(moments.noise_class):
         rows = moments.counts[group]
         miss = np.diag(K @ moments.scatter[group] @ K.T) / (rows * (1 - lost))
@@ -180,6 +184,21 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
     quiet = np.min(out[resting], axis=0) if resting else SMALLEST
     # A few rows in one pose can be fitted without any residual; they are not better than the sensor is elsewhere.
     return np.asarray(np.maximum(np.maximum(out, quiet), QUIETEST * shares @ out))
+
+
+def _lost(T: Array, scatter: Array, weights: Array, linear: Array) -> Array:
+    """Return how many numbers the torques and how many the forces fix, per channel (6,) of either.
+
+    At rest one mass is all that forces tell: a few poses leave them more to judge noise by than they leave torques.
+    """
+    H, _ = normal_equations(T, scatter, weights)
+    inverse = inverse_scaled(H + loosest(linear))
+    taken = []
+    for own in (slice(0, 3), slice(3, 6)):
+        part = np.zeros_like(weights)
+        part[:, own, own] = weights[:, own, own]
+        taken.append(float(np.trace(inverse @ normal_equations(T, scatter, part)[0])))
+    return np.repeat(np.maximum(taken, 0.0), 3)
 
 
 def _of_heard(variance: Array, dead: Mask) -> Array:

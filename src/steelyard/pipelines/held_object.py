@@ -50,6 +50,8 @@ LARGEST = 2.0
 DRIFT_ALLOWED = "the bias may drift in a line"
 # Findings after which motion or wrench are no body's.
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
+# Findings of what a load and a bias share: a tared sensor has no bias.
+OF_BIAS = {"nearly-planar"}
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
 
@@ -131,7 +133,8 @@ def identify(
         before = (*before, *(finding.instead(WEIGHED) for finding in parts.findings))
     # What is wrong with the log stands before what follows from it.
     own, estimate = estimate.findings, replace(_with_gain(estimate, aligned), findings=())
-    estimate = estimate.with_findings(*before, *late, *of_sensor, *own, *aligned.findings, *touched)
+    told = (*before, *late, *of_sensor, *own, *aligned.findings, *touched)
+    estimate = estimate.with_findings(*(f for f in told if load.bias.free or f.code not in OF_BIAS))
     if parts is not None and shape is not None:
         estimate = _looked_at(estimate, parts, shape)
         if not any(recording.object_pose_std or ()):
