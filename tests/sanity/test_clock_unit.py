@@ -3,14 +3,29 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from sanity.held_poses import recorded
+from steelyard.io import read_recording
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity import examine
+
+DESCRIPTION = """\
+[log]
+gravity = [0, 0, -9.81]
+wrench = "on-sensor"
+
+[[stream]]
+path = "data.csv"
+time = { columns = ["t"], unit = "ms" }
+force = { columns = ["fx", "fy", "fz"], unit = "N" }
+torque = { columns = ["tx", "ty", "tz"], unit = "N*m" }
+rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }
+"""
 
 
 def stamped(recording: Recording, times: float) -> Recording:
@@ -26,6 +41,30 @@ def test_stamps_in_a_smaller_unit_are_read_in_it(times: float, unit: str) -> Non
     assert found.code == "time-unit"
     assert f'unit = "{unit}"' in found.remedy
     np.testing.assert_allclose(read.streams[0].time, recording.streams[0].time, rtol=1e-12)
+
+
+@pytest.mark.parametrize(("said", "times", "unit"), [("ms", 1e3, "us"), ("ms", 1e6, "ns"), ("us", 1e3, "ns")])
+def test_the_unit_is_told_beside_the_one_that_was_said(said: str, times: float, unit: str) -> None:
+    recording = stamped(recorded("paper", 0), times)
+    streams = tuple(replace(s, said=said) for s in recording.streams)
+    (found,) = examine(replace(recording, streams=streams))[1]
+    assert f"in {unit}, not in {said}" in found.message
+    assert found.remedy == f'Set unit = "{unit}" in time of every stream.'
+
+
+def test_units_smaller_than_any_are_not_proposed() -> None:
+    recording = stamped(recorded("paper", 0), 1e3)
+    streams = tuple(replace(s, said="ns") for s in recording.streams)
+    assert "time-unit" not in {f.code for f in examine(replace(recording, streams=streams))[1]}
+
+
+def test_a_description_says_the_unit(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text(
+        "t,fx,fy,fz,tx,ty,tz,qw,qx,qy,qz\n0,0,0,1,0,0,1,1,0,0,0\n4,0,0,1,0,0,1,1,0,0,0\n"
+    )
+    (tmp_path / "log.toml").write_text(DESCRIPTION)
+    (stream,) = read_recording(tmp_path / "log.toml").streams
+    assert stream.said == "ms"
 
 
 def test_the_answer_is_that_of_seconds() -> None:

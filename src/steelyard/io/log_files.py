@@ -64,6 +64,7 @@ def _recording(
             spec.delay,
             spec.mount,
             spec.poses,
+            "s" if spec.time is None else spec.time.unit,
         )
         for name, spec, values, time in zip(names, specs, channels, times, strict=True)
     )

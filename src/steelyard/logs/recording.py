@@ -51,6 +51,7 @@ class Stream:
     delay     [s] its stamps are late by this much; None = not given, so to be estimated
     mount     pose of the stream's own frame in S; None = S itself (for an accelerometer: to be estimated)
     poses     a table of still poses without time: rows of such streams belong together
+    said      the unit that its stamps were said to be in, before they were read as seconds
     """
 
     name: str
@@ -60,6 +61,7 @@ class Stream:
     delay: float | None = None
     mount: Mount | None = None
     poses: bool = False
+    said: str = "s"
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
