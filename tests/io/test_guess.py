@@ -58,6 +58,26 @@ def test_units_in_names(tmp_path: Path) -> None:
     assert stream.time.tolist() == [0, 0.004]
 
 
+@pytest.mark.parametrize(
+    ("unit", "size"), [("Nm", 1.0), ("N m", 1.0), ("N.m", 1.0), ("N·m", 1.0), ("Nmm", 1e-3), ("N.mm", 1e-3)]
+)
+def test_a_torque_has_many_spellings(tmp_path: Path, unit: str, size: float) -> None:
+    names = ["t", "fx", "fy", "fz", *(f"Torque.{a} [{unit}]" for a in "xyz"), "qw", "qx", "qy", "qz"]
+    stream = bare(tmp_path, names, [0, *W, *Q], [0.01, *W, *Q])
+    np.testing.assert_allclose(stream.channels["torque"][0], np.multiply(W[3:], size))
+
+
+def test_the_example_of_a_description_has_the_position(tmp_path: Path) -> None:
+    names = ["time", "fx", "fy", "fz", "tx", "ty", "tz", "x [mm]", "y [mm]", "z [mm]", "rx", "ry", "rz"]
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, names, [0, *W, 1, 2, 3, 0, 0, 1], [0.01, *W, 1, 2, 3, 0, 0, 1])
+    assert stream_lines(str(caught.value)).splitlines()[-1] == (
+        'position = { columns = ["x [mm]", "y [mm]", "z [mm]"], unit = "mm" }   # of S in W; check the unit'
+    )
+    (tmp_path / "log.toml").write_text("[log]\n[[stream]]\n" + stream_lines(str(caught.value)))
+    assert read_recording(tmp_path / "log.toml").streams[0].channels["position"][0].tolist() == [0.001, 0.002, 0.003]
+
+
 @pytest.mark.parametrize(("stamp", "step"), [(1708857503, 1), (1708857503931, 1e-3), (1708857503931759, 1e-6)])
 def test_unix_stamps(tmp_path: Path, stamp: int, step: float) -> None:
     names = ["timestamp", *["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]]

@@ -45,6 +45,8 @@ def example_of(path: str, lines: Mapping[str, str], numbered: bool = False) -> s
         mark = "put your columns here" + (", or leave the line out" if name == "time" else "")
         usual = _NUMBERED[name] if numbered else f"{_USUAL.get(name)}   # {mark}"
         rows.append((name, lines.get(name, usual)))
+    if "position" in lines:
+        rows.append(("position", lines["position"]))
     return _HEAD + "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows)
 
 

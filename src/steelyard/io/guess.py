@@ -22,7 +22,7 @@ from steelyard.io.example import columns_text, example_of
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.table_header import Header
 from steelyard.io.tables import Table
-from steelyard.io.units import TIME, UNITS
+from steelyard.io.units import TIME, UNITS, spelled
 from steelyard.logs.recording import STANDARD_GRAVITY
 
 Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
@@ -196,11 +196,12 @@ def _own_lines(table: Table, names: _Names) -> dict[str, str]:
     stamps = next(_time_columns(names), None)
     if stamps is not None:
         lines["time"] = f'{{ columns = {_columns(table, (stamps,))}, unit = "{_said_unit(names, stamps) or "s"}" }}'
-    for quantity in ("force", "torque", "specific_force", "gravity"):
+    for quantity in ("force", "torque", "specific_force", "gravity", "position"):
         if found := _vector(names, quantity):
-            said = names.units.get(found[0], "")
+            said = spelled(quantity, names.units.get(found[0], ""))
             unit = said if said in UNITS[quantity] else next(iter(UNITS[quantity]))
-            lines[quantity] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}'
+            mark = "   # of S in W; check the unit" if quantity == "position" else ""
+            lines[quantity] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}{mark}'
     if turn := _rotation(names):
         numbers = [int(n) for n in turn.columns]
         lines["rotation"] = f'{{ columns = {_columns(table, numbers)}, form = "{turn.form}" }}   # S to W'
@@ -220,7 +221,8 @@ def _vector_spec(
     table: Table, names: _Names, quantity: str, numbers: tuple[int, ...], cells: Cells
 ) -> QuantitySpec | None:
     """Return the vector with its unit, None where its size does not tell what it is."""
-    unit = names.units.get(numbers[0])
+    said = names.units.get(numbers[0])
+    unit = None if said is None else spelled(quantity, said)
     if unit is not None and unit not in UNITS[quantity]:
         reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
         raise _cannot_tell(table, reason, _own_lines(table, names))

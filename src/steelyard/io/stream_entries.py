@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry
 from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
-from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS
+from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, spelled
 from steelyard.logs.recording import QUANTITIES, Mount
 from steelyard.spatial import Rotation
 
@@ -128,6 +128,9 @@ def _quantity(stream: Entry, name: str) -> QuantitySpec:
     framed = name in FRAMED
     entry.only("columns", "unit", *(("frame",) if framed else ()))
     units = list(UNITS[name])
+    said = entry.values.get("unit", units[0])
+    if isinstance(said, str):
+        entry = Entry({**entry.values, "unit": spelled(name, said)}, entry.where)
     unit = entry.choice("unit", units, units[0])
     frame = entry.choice("frame", ("S", "W"), "S") if framed else "W" if name == "position" else "S"
     return QuantitySpec(name, _columns(entry, (QUANTITIES | ROBOT)[name]), unit, entry.where, frame=frame)

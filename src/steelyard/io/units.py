@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 
 from steelyard.check import Array
@@ -32,6 +34,8 @@ UNITS: dict[str, dict[str, float]] = {
 }
 
 _EARTH = (9.76, 9.84)
+# What stands between the letters of a unit, or nothing: N*m, N m, N.m, N·m, Nm; m/s^2, m/s2.
+_BETWEEN = re.compile(r"[\s*·⋅.^-]")
 
 
 def local_g(gravity: Array) -> float:
@@ -41,6 +45,16 @@ def local_g(gravity: Array) -> float:
     """
     size = float(np.linalg.norm(gravity))
     return size if _EARTH[0] <= size <= _EARTH[1] else STANDARD_GRAVITY
+
+
+def spelled(quantity: str, unit: str) -> str:
+    """Return the unit of a quantity as it is spelled here: "Nm", "N m" and "N·m" are "N*m". Unknown ones stay."""
+    letters = _letters(unit)
+    return next((known for known in UNITS[quantity] if _letters(known) == letters), unit)
+
+
+def _letters(unit: str) -> str:
+    return _BETWEEN.sub("", unit.replace("²", "2"))
 
 
 def factor(quantity: str, unit: str, gravity: Array) -> float:
