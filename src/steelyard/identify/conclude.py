@@ -78,7 +78,7 @@ def conclude(
     H, rows = nonnegative(H, plain), problem.samples
     chi2 = max(cost / max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0), 0.0)
     residual_torque, residual_force = problem.rms(square / rows)
-    white = max(chi2, 1.0) * (H + extra)
+    white = max(chi2, 1.0) * nonnegative(H + extra, plain)
     bread, meat = H, white
     if solution.weights is not None:
         bread, _ = normal_equations(problem.T, problem.scatter, solution.weights)
