@@ -162,8 +162,8 @@ def test_a_number_in_doubt_is_named_with_what_tells_the_parts_apart():
     assert doubts(clear, np.array([0, 0, 1])) == ()
     (finding,) = doubts(close, np.array([0, 1, 2]))
     assert finding.code == "parts-unsure"
-    assert "by colour alone" in finding.message
-    assert "by shape alone" in doubts(close, np.array([0, 0, 0]))[0].message
+    assert "Only colour tells" in finding.message
+    assert "Only shape tells" in doubts(close, np.array([0, 0, 0]))[0].message
 
 
 def test_scale_changes_nothing():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 from steelyard import check
@@ -37,7 +38,7 @@ def _read(path: Path, data: Path | None) -> Recording:
     if path.suffix.lower() != ".toml":
         table = open_table(path)
         description, cells = guess.describe(table)
-        return _recording(description, [table], [cells], path)
+        return replace(_recording(description, [table], [cells], path), described=False)
     description = read_description(path)
     tables = open_tables(description.streams, path.parent, data)
     return _recording(description, tables, read_cells(description.streams, tables), path, data)

@@ -28,8 +28,8 @@ def doubts(cuts: Cuts, colour: Integers) -> tuple[Finding, ...]:
     coarse, fine = cuts.nodes(fewer), cuts.nodes(more)
     split = [node for node in coarse if node not in fine]
     ways = {_told_apart(cuts.hierarchy, node, set(fine), colour) for node in split}
-    how = "by colour and shape" if len(ways) > 1 else f"by {ways.pop()} alone"
-    text = f"The number of parts is in doubt; by shape and colour: {said}. What makes {more} of {fewer} is told {how}."
+    how = "Colour and shape tell" if len(ways) > 1 else f"Only {ways.pop()} tells"
+    text = f"The number of parts is in doubt; by shape and colour: {said}. {how} {more} parts from {fewer}."
     return (Finding.of("parts-unsure", text),)
 
 

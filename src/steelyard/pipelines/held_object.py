@@ -15,9 +15,10 @@ from typing import TYPE_CHECKING, Literal
 import numpy as np
 
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import AT_REST, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
+from steelyard.findings import AT_REST, BARE, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
+from steelyard.identify.problem import ADD_POSES
 from steelyard.identify.shape_error import MEASURED
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.alignment import Aligned
@@ -100,6 +101,7 @@ def identify(
     known = identify(tool, options) if isinstance(tool, Recording) else tool
     known = None if known is None else _in_log_sign(known, recording)
     recording, before = examine(recording)
+    before = before if recording.described else tuple(finding.instead(BARE) for finding in before)
     rows = rows_to_fit(recording, before, options)
     log, aligned, touched, unmeasured = rows.log, rows.aligned, rows.touched, rows.unmeasured
     before = before if rows.place is None else (*before, rows.place.finding)
@@ -169,7 +171,9 @@ def _beside(findings: tuple[Finding, ...]) -> Iterator[None]:
             raise
         said = " ".join(f"{f.message} {f.remedy}" for f in findings)
         if any(f.left_in for f in findings):
-            raise CannotAnswer(f"Noticed before the fit: {said} As the log was read: {error}") from None
+            # More poses would be as wrong: what was noticed says what to do.
+            lost = str(error).partition(ADD_POSES)[0].rstrip()
+            raise CannotAnswer(f"Noticed before the fit: {said} As the log was read: {lost}") from None
         raise CannotAnswer(f"{error} Noticed before the fit: {said}") from None
 
 
