@@ -14,10 +14,11 @@ from traps import TIMED_TRAPS, TRAPS, delayed, edited, tilted
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording
-from steelyard.logs.recording import Recording
+from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
 from steelyard.sanity import examine
 from steelyard.simulate import scenarios
+from steelyard.spatial import Rotation
 
 REAL = ("kuka_static", "kuka_run1", "kuka_run2")
 KINDS = {
@@ -152,6 +153,23 @@ def test_motion_can(tmp_path: Path) -> None:
     for mistake in ({"sign_flipped": True}, {"gravity": (0, 0, 9.81)}):
         finding = examine(made(tmp_path, KINDS["plain"], **mistake))[1][0]
         assert "cannot tell" not in finding.message
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1.0, 3.0])
+def test_a_flipped_wrench_is_seen_in_turns_about_one_axis(tilt: float) -> None:
+    """Half a turn of S about that axis does as the flip does, and takes a tilt in as well."""
+    time = np.arange(0, 30, 0.01)
+    turns = Rotation.exp(np.outer(1.2 * np.sin(0.5 * time) + 0.3 * np.sin(1.3 * time), [1, 0, 0]))
+    gravity = Rotation.exp(np.radians([tilt, 0, 0])).apply(np.array([0, 0, -9.81]))
+    force = -2.0 * turns.inverse().apply(gravity)
+    torque, rng = np.cross([0.02, 0.01, 0.08], force), np.random.default_rng(0)
+    channels = {
+        "rotation": turns.matrix,
+        "force": -force + 0.05 * rng.normal(size=force.shape),
+        "torque": -torque + 0.0025 * rng.normal(size=force.shape),
+    }
+    _, findings = examine(Recording((Stream("log", channels, time),), np.array([0, 0, -9.81])))
+    assert "wrench-sign-flipped" in codes(findings)
 
 
 def test_the_axes_of_the_wrench_are_said(examples_dir: Path, data_dir: Path) -> None:

@@ -43,6 +43,14 @@ def test_a_slow_logger_and_a_long_recording_pass() -> None:
     TeamRecording("motion", made, "run")
 
 
+@pytest.mark.parametrize(("rows", "step"), [(600, 1e-3), (2, 5e-4)])
+def test_a_short_burst_beside_a_slow_logger_passes(rows: int, step: float) -> None:
+    made = tracks({"a": 1.0, "b": 1.0})
+    made["a"] = Track.of(0.1 * np.arange(600), rotation=np.tile(np.eye(3), (600, 1, 1)))
+    made["b"] = Track.of(30 + step * np.arange(rows), rotation=np.tile(np.eye(3), (rows, 1, 1)))
+    TeamRecording("motion", made, "run")
+
+
 def test_a_mass_that_is_less_than_its_bar_is_no_answer(monkeypatch: pytest.MonkeyPatch) -> None:
     log = simulate_team(TeamScene(CASES["A"], motion_samples=400), 0).log
     found = JointTeam().identify(log)

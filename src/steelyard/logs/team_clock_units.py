@@ -1,6 +1,6 @@
-"""Whether robots tell time in one unit: in another, rows lie hundreds of times as far apart, and last as much longer.
+"""Whether robots tell time in one unit: in another, rows lie a thousand times as far apart, and last as much longer.
 
-A slow logger writes fewer rows, and one that runs on writes more: neither does both.
+A slow logger beside a burst of a fast one does both as well, but hardly by the same factor, and that of a unit.
 """
 
 from __future__ import annotations
@@ -14,17 +14,21 @@ from steelyard.findings import about
 from steelyard.logs.team_track import Track
 
 # Stamps with so many times the step and the span of another robot's are milliseconds, or less, beside seconds.
-MANY = 100.0
+UNITS = np.array([1e3, 1e6, 1e9])
+# Robots record at rates and for times that differ by up to this factor; fewer rows than these tell no rate.
+ALIKE, FEWEST = 8.0, 20
+_LEAST = 1e-12
 
 
 def require_one_clock_unit(recording: str, tracks: Mapping[str, Track]) -> None:
     """Raise BadValue where the stamps of a robot in a recording are in another unit than those of the others."""
-    spans = {name: float(track.time[-1] - track.time[0]) for name, track in tracks.items() if len(track) > 1}
+    spans = {name: float(track.time[-1] - track.time[0]) for name, track in tracks.items() if len(track) >= FEWEST}
     if len(spans) < 2:
         return
     short, long = min(spans, key=spans.__getitem__), max(spans, key=spans.__getitem__)
-    span = spans[long] / spans[short]
-    if span < MANY or (step := _step(tracks[long]) / _step(tracks[short])) < MANY:
+    span, step = spans[long] / max(spans[short], _LEAST), _step(tracks[long]) / _step(tracks[short])
+    off = np.abs(np.log(np.array([span, step])[:, None] / UNITS))
+    if not (off < np.log(ALIKE)).all(0).any():
         return
     raise BadValue(
         f"in '{recording}' the rows of '{long}' lie {about(step)} times as far apart as those of '{short}', and last "
@@ -34,7 +38,7 @@ def require_one_clock_unit(recording: str, tracks: Mapping[str, Track]) -> None:
 
 
 def _step(track: Track) -> float:
-    return float(np.median(np.diff(track.time)))
+    return max(float(np.median(np.diff(track.time))), _LEAST)
 
 
 def _odd(spans: Mapping[str, float], short: str, long: str) -> str:

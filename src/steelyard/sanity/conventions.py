@@ -29,7 +29,7 @@ from steelyard.sanity.mirrored import Mirror, mirrored
 from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.swapped import examine_swapped
-from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
+from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, flat, tilt_of, turned_sensor
 from steelyard.sanity.torques import examine_torques
 from steelyard.sanity.units import scaled
 from steelyard.sanity.weightless import require_weight
@@ -228,8 +228,11 @@ def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
 
 
 def _sign(view: Glance, reading: Reading) -> int:
-    """Return the sign of the mass, 0 where it is not sure or half a turn of S explains a negative one much better."""
-    if reading.fit.sign >= 0:
+    """Return the sign of the mass, 0 where it is not sure or half a turn of S explains a negative one much better.
+
+    A gravity that stays in one plane of S is turned round by half a turn in it: there a turn says nothing.
+    """
+    if reading.fit.sign >= 0 or flat(view, reading.gravity):
         return reading.fit.sign
     turned = turned_sensor(view, reading.gravity, 1)
     return 0 if turned is not None and turned.force_share < MUCH_BETTER * reading.fit.force_share else -1
