@@ -74,6 +74,14 @@ def test_the_answer_is_that_of_seconds() -> None:
     assert found.codes() == {"time-unit"}
 
 
+def test_a_declared_delay_has_a_unit_of_its_own() -> None:
+    recording = recorded("paper", 0)
+    late = replace(recording, streams=tuple(replace(s, delay=0.0075) for s in recording.streams))
+    read, (found,) = examine(stamped(late, 1e3))
+    assert found.code == "time-unit"
+    assert [s.delay for s in read.streams] == [0.0075]
+
+
 def test_a_log_too_slow_to_show_a_motion_is_left_alone() -> None:
     """Poses a second apart stand still: at any speed they would show no acceleration that the force knows."""
     recording = recorded("static", 0)

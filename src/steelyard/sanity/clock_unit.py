@@ -46,14 +46,8 @@ def _finding(said: set[int], steps: int) -> Finding:
 
 
 def _with_stamps(recording: Recording, seconds: float) -> Recording:
-    """Return the recording with stamps and delays of so many seconds each."""
-
-    def shorter(value: float | None) -> float | None:
-        return None if value is None else value * seconds
-
-    streams = (
-        replace(s, time=None if s.time is None else s.time * seconds, delay=shorter(s.delay)) for s in recording.streams
-    )
+    """Return the recording with stamps of so many seconds each; a delay was declared in a unit of its own."""
+    streams = (replace(s, time=None if s.time is None else s.time * seconds) for s in recording.streams)
     return replace(recording, streams=tuple(streams))
 
 
