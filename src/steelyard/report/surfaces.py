@@ -26,7 +26,8 @@ def part_skins(solid: TetMesh, labels: Integers) -> list[tuple[int, Integers]]:
 def evened(vertices: Array, triangles: Integers) -> Array:
     """Return vertices (V, 3) without what triangles (F, 3) of a noisy surface stick out, for drawing only.
 
-    Every vertex goes toward the mean of its neighbours and a little farther back, so that the whole does not shrink.
+    Every vertex goes toward the mean of its neighbours and a little farther back, so that what is
+    large beside a triangle does not shrink; corners of a coarse mesh are rounded.
     Source: Taubin 1995, a signal processing approach to fair surface design.
     """
     ends = np.concatenate([triangles, np.roll(triangles, 1, axis=1)], axis=0).ravel()
