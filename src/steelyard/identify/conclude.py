@@ -76,9 +76,11 @@ def conclude(
     H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
     cost, square = noise_cost.value(K, data, *noise)
     H, rows = nonnegative(H, plain), problem.samples
-    chi2 = max(cost / max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0), 0.0)
+    left = max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0)
+    chi2 = max(cost / left, 0.0)
     residual_torque, residual_force = problem.rms(square / rows)
-    white = max(chi2, 1.0) * nonnegative(H + extra, plain)
+    # Noise that few degrees of freedom told is uncertain itself: the variance of Student's t.
+    white = max(chi2, 1.0) * max(left, 3.0) / (max(left, 3.0) - 2) * nonnegative(H + extra, plain)
     bread, meat = H, white
     if solution.weights is not None:
         bread, _ = normal_equations(problem.T, problem.scatter, solution.weights)
