@@ -1,6 +1,6 @@
 """Whether robots tell time in one unit: in another, rows lie a thousand times as far apart, and last as much longer.
 
-A slow logger beside a burst of a fast one does both as well, but hardly by the same factor, and that of a unit.
+A slow logger beside a burst of a fast one does both as well, but hardly by the factor of a unit.
 """
 
 from __future__ import annotations

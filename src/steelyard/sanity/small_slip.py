@@ -1,8 +1,8 @@
 """A small slip: from some time on the same body sits a few millimetres elsewhere in the gripper.
 
-It is too small to stand out of the tolerance for hands, but rows that were fitted as one body show it: from one time on
-a first moment of its own takes nearly all of the residual away. Errors of calibration hang on the orientation and not
-on the time; a step in time takes little of theirs, and not the same where stretches are left out.
+It is too small to stand out of the tolerance for hands (`load_change`), but rows that were fitted as one body show it:
+from one time on a first moment of its own takes much of the residual away. Errors of calibration hang on orientation
+and not on time; a step in time takes little of theirs, and not the same where stretches are left out.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ class Slip:
 
 
 def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | None = None) -> Slip | None:
-    """Return the slip that explains nearly all of what one body leaves of a log, None where there is none.
+    """Return the slip that explains much of what one body leaves of a log, and no rival does; None where there is none.
 
     log       the rows that would be fitted, in order of time
     rotation  (N, 3, 3) S to W at the rows, and gravity (3,) [m/s^2] in W, where they are known
