@@ -16,6 +16,7 @@ from steelyard.logs.alignment import AlignOptions, align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
+from steelyard.sanity import examine
 from steelyard.sanity.sensor_matrix import SURE, sensor_matrix
 from steelyard.simulate import hammer
 from steelyard.simulate.logs import simulate_log
@@ -204,3 +205,27 @@ def test_gains_that_differ_are_told_and_in_the_bars(
     (finding,) = (f for f in found.findings if f.code == "gains-differ")
     said = float(finding.message.split(" read ")[1].split(" %")[0])
     assert said == pytest.approx(100 * (max(gains) - min(gains)), rel=0.15)
+
+
+def about_one_axis(tilt: float, sign: int = 1, seed: int = 0) -> Recording:
+    """Return a mass point felt by a sensor that turns about x alone, gravity off by degrees about it, too."""
+    time, rng = np.arange(0, 30, 0.01), np.random.default_rng(seed)
+    R = Rotation.exp(np.outer(1.2 * np.sin(0.5 * time) + 0.3 * np.sin(1.3 * time), [1.0, 0.0, 0.0]))
+    given = np.array([0.0, 0.0, -9.81])
+    com = np.array([0.02, 0.01, 0.08])
+    moved = np.gradient(np.gradient(R.apply(com), time, axis=0), time, axis=0)
+    force = 2.0 * R.inverse().apply(moved - Rotation.exp(np.radians([tilt, 0.0, 0.0])).apply(given))
+    torque = np.cross(com, force)
+    felt = {"force": sign * (force + 0.05 * rng.normal(size=force.shape)),
+            "torque": sign * (torque + 0.0025 * rng.normal(size=force.shape))}  # fmt: skip
+    return Recording((Stream("log", {"rotation": R.matrix, **felt}, time),), given)
+
+
+@pytest.mark.parametrize("tilt", [0.0, 1.0, 3.0, 10.0])
+def test_a_flipped_wrench_is_no_turned_sensor_where_turns_are_about_one_axis(tilt: float) -> None:
+    """Half a turn about that axis turns forces round as a flip does, and takes a tilt in as well."""
+    tilted = {"base-tilted"} if tilt > 2 else set()
+    assert {f.code for f in examine(about_one_axis(tilt))[1]} == tilted
+    assert {f.code for f in examine(about_one_axis(tilt, -1))[1]} == {"wrench-sign-flipped", *tilted}
+    if tilted:
+        assert identify(about_one_axis(tilt, -1)).mass == pytest.approx(2.0, abs=0.003)

@@ -29,7 +29,7 @@ from steelyard.sanity.mirrored import Mirror, mirrored
 from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.swapped import examine_swapped
-from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, flat, tilt_of, turned_sensor
+from steelyard.sanity.tilt import GlanceTilt, Turn, blind_axis, tilt_of, turned_sensor
 from steelyard.sanity.torques import examine_torques
 from steelyard.sanity.units import scaled
 from steelyard.sanity.weightless import require_weight
@@ -159,10 +159,18 @@ def _best_rival(recording: Recording, view: Glance, given: Reading) -> Reading |
     ]
     # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
     best = min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
-    if best is None or best.fit.force_share < LEVEL:
-        return best
-    turned = turned_sensor(view, given.gravity, 1)
-    return None if turned is not None and turned.force_share < MUCH_BETTER * best.fit.force_share else best
+    return best if best is not None and not _outdone(best, view, given.gravity) else None
+
+
+def _outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
+    """Tell whether a turned sensor explains much more than the reading does, even with gravity tilted.
+
+    In turns about one axis a turn of S is a tilt and a change of sign, too; then the reading holds.
+    """
+    free = tilt_of(reading.view or view, reading.gravity, reading.rotation, reading.fit.mass)
+    left = min(reading.fit.force_share, 1.0 if free is None or free.angle > STEEP else free.force_share)
+    turned = turned_sensor(view, gravity, 1) if left > LEVEL else None
+    return turned is not None and turned.force_share < MUCH_BETTER * left
 
 
 def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
@@ -228,14 +236,8 @@ def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
 
 
 def _sign(view: Glance, reading: Reading) -> int:
-    """Return the sign of the mass, 0 where it is not sure or half a turn of S explains a negative one much better.
-
-    A gravity that stays in one plane of S is turned round by half a turn in it: there a turn says nothing.
-    """
-    if reading.fit.sign >= 0 or flat(view, reading.gravity):
-        return reading.fit.sign
-    turned = turned_sensor(view, reading.gravity, 1)
-    return 0 if turned is not None and turned.force_share < MUCH_BETTER * reading.fit.force_share else -1
+    """Return the sign of the mass, 0 where it is not sure or a turn of S explains a negative one much better."""
+    return 0 if reading.fit.sign < 0 and _outdone(reading, view, reading.gravity) else reading.fit.sign
 
 
 def _both_signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
@@ -312,10 +314,10 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
+    along = ", ".join(f"{v:.3f}" for v in tilt.gravity / np.linalg.norm(tilt.gravity) + 0.0)
     message = (
         f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
-        f"given, along ({_shown(tilt.gravity / np.linalg.norm(tilt.gravity))}) of W; the answer uses the direction "
-        f"found{tilt.blind_words}."
+        f"given, along ({along}) of W; the answer uses the direction found{tilt.blind_words}."
     )
     return replace(recording, gravity=tilt.gravity), (Finding.of(code, message),)
 
@@ -344,7 +346,3 @@ def _plain(tilt: GlanceTilt, given: StaticFit) -> bool:
         and tilt.force_share < 0.3
         and tilt.torque_share < 1.1 * given.torque_share + 1e-3
     )
-
-
-def _shown(vector: Array) -> str:
-    return ", ".join(f"{v:.3f}" for v in vector + 0.0)

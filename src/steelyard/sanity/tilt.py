@@ -164,15 +164,6 @@ def blind_axis(view: Glance, rotation: Array) -> Array | None:
     return np.asarray(axes[:, 0]) if values[0] < bar < values[1] else None
 
 
-def flat(view: Glance, gravity: Array) -> bool:
-    """Tell whether gravity (3,) in W stays, beside a constant, in one plane of S."""
-    if view.rotation is None:
-        return False
-    pull = replace(view, acceleration=None).seen(gravity, view.rotation).pull
-    values = np.linalg.eigvalsh(np.cov(pull.T))
-    return bool(values[0] < _BLIND * values[2])
-
-
 def _axis_unseen(seen: Array) -> Array | None:
     if np.trace(seen) > 2.5:
         return None
