@@ -63,8 +63,7 @@ class SlipAt:
 
     def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array, drifts: bool = False) -> SlipAt:
         """Return the slip from the residuals (T, 6) of its robot against the others' motion, as `find_slip`."""
-        width = max(2, round((NEAR_S if drifts else WINDOW_S) * part.rate))
-        score, step = _steps(apart, seen, width, max(1, round(GAP_S * part.rate / 2)), noise)
+        score, step = _steps(apart, seen, *_window(part.rate, drifts), noise)
         row = int(np.argmax(score))
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
@@ -156,7 +155,7 @@ def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool 
     noise   (N, 6, 6) of a row of it, as far as its directions go
     drifts  whether rows far apart in time differ by more than a slip, as added up twists do
     """
-    width, gap = max(2, round((NEAR_S if drifts else WINDOW_S) * rate)), max(1, round(GAP_S * rate / 2))
+    width, gap = _window(rate, drifts)
     rows, count = seen.shape
     if rows < 4 * (width + gap) or count < 2:
         return None
@@ -171,6 +170,11 @@ def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool 
         if score[row] > threshold and large and (best is None or score[row] > best.score):
             best = Slip(i, row, distance, angle, float(score[row]))
     return best
+
+
+def _window(rate: float, drifts: bool) -> tuple[int, int]:
+    """Return how many rows at `rate` [Hz] are averaged on either side of a slip, and how many next to it are not."""
+    return max(2, round((NEAR_S if drifts else WINDOW_S) * rate)), max(1, round(GAP_S * rate / 2))
 
 
 def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tuple[Array, Array]:
