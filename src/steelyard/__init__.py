@@ -39,7 +39,7 @@ _HOME = {
     "NoiseAware": "steelyard.identify.noise_aware",
     "LeastSquares": "steelyard.identify.least_squares",
     "Geodesic": "steelyard.identify.geodesic",
-    "Options": "steelyard.pipelines.held_object",
+    "Options": "steelyard.pipelines.options",
     "SteelyardError": "steelyard.errors",
     "BadInput": "steelyard.errors",
     "CannotAnswer": "steelyard.errors",
@@ -69,7 +69,7 @@ if TYPE_CHECKING:
     from steelyard.logs.moments import Moments as Moments
     from steelyard.logs.recording import Recording as Recording
     from steelyard.logs.team_log import TeamLog as TeamLog
-    from steelyard.pipelines.held_object import Options as Options
+    from steelyard.pipelines.options import Options as Options
     from steelyard.spatial import Acceleration as Acceleration
     from steelyard.spatial import Pose as Pose
     from steelyard.spatial import Rotation as Rotation

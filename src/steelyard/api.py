@@ -19,6 +19,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.parts import Parts
 from steelyard.pipelines import held_object
+from steelyard.pipelines.options import DEFAULTS, Options
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 
@@ -29,13 +30,12 @@ if TYPE_CHECKING:
     from steelyard.shape.cloud import Cloud
     from steelyard.shape.views import Views
 
-DEFAULTS = held_object.Options()
 Log = str | Path | Recording | MotionLog
 
 
 def identify(
     log: Log,
-    options: held_object.Options = DEFAULTS,
+    options: Options = DEFAULTS,
     *,
     tool: str | Path | Recording | Estimate | None = None,
     parts: str | Path | Parts | None = None,

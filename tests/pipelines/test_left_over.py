@@ -9,8 +9,8 @@ import pytest
 
 import steelyard as sy
 from steelyard.logs.recording import Recording, Stream
-from steelyard.pipelines.held_object import DRIFT_ALLOWED
 from steelyard.pipelines.left_over import left_over, of_another_fit
+from steelyard.pipelines.options import DRIFT_ALLOWED
 from steelyard.simulate import hammer
 
 

@@ -11,7 +11,7 @@ import steelyard as sy
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.parts.parts import Parts
-from steelyard.pipelines.held_object import Options
+from steelyard.pipelines.options import Options
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.placement import Placement

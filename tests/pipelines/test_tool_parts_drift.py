@@ -12,7 +12,7 @@ from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
-from steelyard.pipelines.held_object import Options
+from steelyard.pipelines.options import Options
 from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation
 

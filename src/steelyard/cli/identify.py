@@ -75,7 +75,7 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     from steelyard import api
     from steelyard.cli.table import estimate_table
     from steelyard.io import read_pendant, result_dict, write_result
-    from steelyard.pipelines.held_object import Options
+    from steelyard.pipelines.options import Options
 
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
     given = {"tool": tool, "parts": parts, "scan": scan, "pose_in_sensor": pose_in_sensor, "data": data}

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
-
 import numpy as np
 
 from steelyard.check import Array
@@ -17,9 +15,7 @@ from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.shape_error import ShapeError
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
-
-if TYPE_CHECKING:
-    from steelyard.pipelines.held_object import Options
+from steelyard.pipelines.options import Options
 
 # Cuts of the object into parts, seen from S, the log weight of each beforehand, and how wrong they may be.
 Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]

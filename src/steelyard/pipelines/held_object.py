@@ -10,7 +10,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -26,6 +26,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.choice import Placed, estimator_for
+from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import rows_to_fit
 from steelyard.sanity import (
     after,
@@ -44,11 +45,8 @@ from steelyard.spatial import Pose
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
 
-METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # [m] No robot holds a part that fills a cube of this edge; one of a centimetre in millimetres does.
 LARGEST = 2.0
-# How the note begins that says that the bias may drift.
-DRIFT_ALLOWED = "the bias may drift in a line"
 # Findings after which motion or wrench are no body's.
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Findings of what a load and a bias share: a tared sensor has no bias.
@@ -57,36 +55,10 @@ OF_BIAS = {"nearly-planar"}
 ENCODERS = ("position", "linear_velocity")
 
 
-@dataclass(frozen=True)
-class Options:
-    """How to identify.
-
-    method       one of METHODS
-    bias         "free": the sensor's constant bias is estimated; "none": it is known to be tared
-    drift        the bias may grow linearly over the log; it does so by itself where the log shows it
-    gravity      "given": its direction in W is trusted, unless the log shows a clear tilt; "unknown": it is estimated
-    object_size  rough longest dimension of the object [m], used only where the data leave the inertia open
-    """
-
-    method: Literal["auto", "noise-aware", "least-squares", "geodesic"] = "auto"
-    bias: Literal["free", "none"] = "free"
-    drift: bool = False
-    gravity: Literal["given", "unknown"] = "given"
-    object_size: float | None = None
-
-    def __post_init__(self) -> None:
-        choices = {"method": METHODS, "bias": ("free", "none"), "drift": (False, True), "gravity": ("given", "unknown")}
-        for name, known in choices.items():
-            if getattr(self, name) not in known:
-                raise BadValue(f"{name} must be one of {', '.join(map(str, known))}; got {getattr(self, name)!r}.")
-        if self.object_size is not None and not 0.005 <= self.object_size <= 5:
-            raise BadValue(f"object_size must be 0.005 to 5 m; got {self.object_size}.")
-
-
 @within_numbers()
 def identify(
     recording: Recording,
-    options: Options = Options(),
+    options: Options = DEFAULTS,
     tool: Recording | Estimate | None = None,
     parts: Parts | Shape | None = None,
 ) -> Estimate:
@@ -180,7 +152,7 @@ def _beside(findings: tuple[Finding, ...]) -> Iterator[None]:
 @within_numbers()
 def identify_rows(
     log: MotionLog,
-    options: Options = Options(),
+    options: Options = DEFAULTS,
     tool: Estimate | None = None,
     parts: Parts | Shape | None = None,
     pose: Pose | None = None,

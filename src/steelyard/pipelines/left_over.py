@@ -9,7 +9,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import scaled_time
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
-from steelyard.pipelines.held_object import DRIFT_ALLOWED, Options
+from steelyard.pipelines.options import DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import GRAVITY_FOUND, rows_to_fit
 from steelyard.sanity import examine
 

@@ -7,7 +7,7 @@ A sensor that is turned looks like a delay, too: then delays are found anew with
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING, Literal
+from typing import Literal
 
 import numpy as np
 
@@ -19,15 +19,13 @@ from steelyard.logs.alignment import Aligned, AlignOptions, align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.known_motion import with_known_acceleration
+from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
 from steelyard.sanity.contact import untouched
 from steelyard.sanity.misplaced import Misplaced, misplaced
 from steelyard.sanity.sensor_matrix import turn_of
 from steelyard.sanity.small_slip import small_slip
-
-if TYPE_CHECKING:
-    from steelyard.pipelines.held_object import Options
 
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"
