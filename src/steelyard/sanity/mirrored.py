@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import permutations, product
 
 import numpy as np
@@ -35,7 +35,8 @@ def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
     """Return the exchange of axes and signs that explains the force best; None without rotations or all forces."""
     if view.rotation is None or any(view.dead[3:]):
         return None
-    seen, force, down = force_and_weight(view, gravity, sign)
+    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
+    force, down = force_and_weight(seen, sign)
     # force = X m down: the trace with X is largest for the right one.
     X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
     _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)

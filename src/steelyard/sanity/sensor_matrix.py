@@ -133,11 +133,8 @@ def examine_sensor(
     known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
     drift     whether the bias was taken to grow with time
     """
-    stream = felt_in_sensor(recording)
-    if stream is None or {f.code for f in known} & ELSEWHERE:
-        return estimate, ()
-    found = _looked_at(log, known, drift)
-    if found is None:
+    stream, found = felt_in_sensor(recording), _looked_at(log, recording, known, drift)
+    if stream is None or found is None:
         return estimate, ()
     findings = (*_turn(found, stream) * found.turned, *_gains(found) * found.unlike)
     return (_widened(estimate, found), findings) if findings else (estimate, ())
@@ -153,19 +150,22 @@ def turn_of(
     log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[float, float, float] | None:
     """Return the rotation vector [rad] by which the wrench is turned beyond doubt, None where it is not."""
-    if felt_in_sensor(recording) is None or {f.code for f in known} & ELSEWHERE:
-        return None
-    found = _looked_at(log, known, drift)
+    found = _looked_at(log, recording, known, drift)
     if found is None or not found.turned:
         return None
     x, y, z = (float(v) for v in found.turn)
     return x, y, z
 
 
-def _looked_at(log: MotionLog, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
-    """Return what the wrench says of the sensor, from the turn that it shows at once where a large one was told."""
-    told = any(f.code == "sensor-turned" for f in known)
-    return sensor_matrix(log, drift, _first_turn(log) if told else None)
+def _looked_at(log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
+    """Return what a wrench in S says of the sensor, None where it is not in S or something else is wrong with it.
+
+    Where a large turn was told, it begins with the turn that the force shows at once.
+    """
+    codes = {f.code for f in known}
+    if felt_in_sensor(recording) is None or codes & ELSEWHERE:
+        return None
+    return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes else None)
 
 
 def felt_in_sensor(recording: Recording) -> Stream | None:

@@ -114,14 +114,13 @@ def angle_between(a: Array, b: Array) -> float:
     return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
 
 
-def force_and_weight(view: Glance, gravity: Array, sign: float) -> tuple[Seen, Array, Array]:
-    """Return what is seen, and about their means the force (N, 3) and what it should follow, by the sign of the mass.
+def force_and_weight(seen: Seen, sign: float) -> tuple[Array, Array]:
+    """Return, about their means, the force (N, 3) and what it should follow by the sign of the mass.
 
     One that is not known (0) is taken to be right: turned by more than 120 degrees, forces look like a negative mass.
     """
-    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
     force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
-    return seen, force, -pull * (np.sign(sign) or 1.0)
+    return force, -pull * (np.sign(sign) or 1.0)
 
 
 def turned_sensor(view: Glance, gravity: Array, sign: float) -> Turn | None:
@@ -131,11 +130,12 @@ def turned_sensor(view: Glance, gravity: Array, sign: float) -> Turn | None:
     """
     if view.rotation is None or any(view.dead[3:]):
         return None
-    _, force, down = force_and_weight(view, gravity, sign)
+    still = replace(view, acceleration=None)
+    force, down = force_and_weight(still.seen(gravity, view.rotation), sign)
     turn = Rotation.aligning(force.T @ down)
     force = view.seen(gravity, view.rotation).wrench[:, 3:]
-    still = replace(view, acceleration=None)
-    return min((_refined(v.seen(gravity, v.rotation), force, turn, view.block) for v in (view, still)), key=_left)
+    turns = (_refined(v.seen(gravity, v.rotation), force, turn, view.block) for v in (view, still))
+    return min(turns, key=lambda turn: turn.force_share)
 
 
 def _refined(seen: Seen, force: Array, turn: Rotation, block: Integers) -> Turn:
@@ -149,10 +149,6 @@ def _refined(seen: Seen, force: Array, turn: Rotation, block: Integers) -> Turn:
         more, _, _ = solve(beside(body, -cross_matrix(felt - felt.mean(0))), right, block)
         turn = turn @ Rotation.exp(more[size:])
     return Turn(turn, share)
-
-
-def _left(turn: Turn) -> float:
-    return turn.force_share
 
 
 def blind_axis(view: Glance, rotation: Array) -> Array | None:
