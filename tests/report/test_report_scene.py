@@ -68,6 +68,17 @@ def test_a_noisy_sphere_is_drawn_even_and_as_large_as_it_was() -> None:
     assert even.mean() == pytest.approx(np.linalg.norm(noisy, axis=1).mean(), abs=0.002)
 
 
+def test_a_coarse_surface_is_drawn_as_it_is() -> None:
+    """Eight corners are a cube, not noise; only what is fine is evened."""
+    cube = np.array([[x, y, z] for x in (-1, 1) for y in (-1, 1) for z in (-1, 1)], float)
+    faces = ConvexHull(cube).simplices.astype(np.int64)
+    np.testing.assert_array_equal(evened(cube, faces), cube)
+    points, fine = sphere()
+    both, used = np.vstack([cube, 0.5 * points]), np.vstack([faces, fine + 8])
+    np.testing.assert_array_equal(evened(both, used)[:8], cube)
+    assert (evened(both, used)[8:] != both[8:]).any(1).all()
+
+
 def test_what_no_triangle_uses_stays_where_it_is() -> None:
     points, faces = sphere(200)
     lone = np.vstack([points, [[3.0, 0.0, 0.0]]])

@@ -11,6 +11,7 @@ from steelyard.spatial import unit_vectors
 
 CREASE = np.cos(np.deg2rad(42.0))  # faces that turn by more than this keep their edge
 _ROUNDS = 3  # of evening
+_FINE = 0.1  # of the size of a surface: where edges are longer on average, corners are its shape and not its noise
 _IN, _OUT = 0.5, -0.53  # share of the way to the mean of the neighbours, and then away from it
 
 
@@ -26,18 +27,20 @@ def part_skins(solid: TetMesh, labels: Integers) -> list[tuple[int, Integers]]:
 def evened(vertices: Array, triangles: Integers) -> Array:
     """Return vertices (V, 3) without what triangles (F, 3) of a noisy surface stick out, for drawing only.
 
-    Every vertex goes toward the mean of its neighbours and a little farther back, so that what is
-    large beside a triangle does not shrink; corners of a coarse mesh are rounded.
+    Every vertex goes toward the mean of its neighbours and a little farther back, so that the whole hardly shrinks. It
+    goes by a share of the length of its edges, and rounds corners by as much: vertices of long edges stay.
     Source: Taubin 1995, a signal processing approach to fair surface design.
     """
     ends = np.concatenate([triangles, np.roll(triangles, 1, axis=1)], axis=0).ravel()
     others = np.concatenate([np.roll(triangles, 1, axis=1), triangles], axis=0).ravel()
-    count = np.bincount(ends, minlength=len(vertices))[:, None]
+    count = np.bincount(ends, minlength=len(vertices))
+    length = np.bincount(ends, np.linalg.norm(vertices[ends] - vertices[others], axis=1), len(vertices))
+    fine = (count > 0) & (length <= _FINE * count * float(np.ptp(vertices, axis=0).max()))
     even = vertices.copy()
     for _ in range(_ROUNDS):
         for share in (_IN, _OUT):
             total = np.stack([np.bincount(ends, even[others, k], len(vertices)) for k in range(3)], axis=1)
-            even += share * np.where(count > 0, total / np.maximum(count, 1) - even, 0.0)
+            even[fine] += share * (total[fine] / count[fine, None] - even[fine])
     return even
 
 
