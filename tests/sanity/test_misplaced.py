@@ -3,17 +3,25 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
 import pytest
 
 from sanity.held_poses import BODY, of_the_tip, recorded
 from steelyard.identify.estimate import Estimate
+from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import Mount, Recording, Stream
+from steelyard.pipelines import rows
 from steelyard.pipelines.held_object import identify
 from steelyard.pipelines.left_over import left_over, of_another_fit
+from steelyard.pipelines.options import Options
+from steelyard.sanity import examine
 from steelyard.sanity.misplaced import misplaced
 from steelyard.simulate.logs import simulate_log
+from steelyard.spatial import Rotation
 
 TIPS = [(0.0, 0.0, 0.03), (0.0, 0.05, 0.0), (0.02, -0.03, 0.1)]
 
@@ -41,6 +49,74 @@ def test_positions_of_the_sensor_are_left_alone() -> None:
     found = identify(recorded("paper", 0))
     assert found.codes() == set()
     assert off(found) < 3.5
+
+
+def from_accelerometer(recording: Recording) -> Recording:
+    """Return the recording with what an accelerometer at the point of its positions shows in their place."""
+    (stream,) = recording.streams
+    channels = dict(stream.channels)
+    moved = np.gradient(np.gradient(channels.pop("position"), stream.time, axis=0), stream.time, axis=0)
+    felt = Rotation(channels["rotation"]).inverse().apply(moved - recording.gravity)
+    mount = Mount(Rotation.identity(), np.zeros(3))
+    imu = Stream("imu", {"specific_force": felt}, stream.time, mount=mount, delay=0.0)
+    return replace(recording, streams=(replace(stream, channels=channels), imu))
+
+
+def as_table(recording: Recording) -> Recording:
+    """Return the rows of the recording, accelerations with them, as a table without a clock."""
+    aligned = align(recording)
+    log = aligned.log
+    channels = {"rotation": aligned.rotation.matrix, "torque": log.wrench[:, :3], "force": log.wrench[:, 3:]}
+    motion = ("angular_velocity", "angular_acceleration")
+    channels |= {name: getattr(log, name) for name in motion} | {"linear_acceleration": log.acceleration}
+    return replace(recording, streams=(Stream("table", channels),))
+
+
+@pytest.mark.parametrize("made_of", [from_accelerometer, as_table])
+def test_accelerations_of_another_point_are_moved_to_the_sensor_once(
+    made_of: Callable[[Recording], Recording],
+) -> None:
+    found = identify(made_of(of_the_tip(recorded("paper", 0), TIPS[2])))
+    said = re.search(
+        r"a point \((.*?)\) ± 2 mm", next(f.message for f in found.findings if f.code == "motion-mismatch")
+    )
+    assert said is not None
+    np.testing.assert_allclose([float(v) for v in said[1].split(",")], 1e3 * np.array(TIPS[2]), atol=2.5)
+    assert found.mass == pytest.approx(BODY.mass, rel=0.01)
+
+
+def test_the_point_told_is_the_one_that_rows_were_made_with(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Also where the search does not settle: then bars hold what is left."""
+    recording, before = examine(of_the_tip(recorded("paper", 0), (0.0, 0.2, 0.5)))
+    used = []
+    monkeypatch.setattr(rows, "SETTLED", 0.0)
+    monkeypatch.setattr(rows, "align", lambda r, how: (used.append(how.place), align(r, how))[1])
+    place = rows.rows_to_fit(recording, before, Options()).place
+    assert place is not None
+    assert len(used) == rows.ROUNDS + 1
+    np.testing.assert_array_equal(place.place, used[-1])
+
+
+@pytest.mark.parametrize("noise", [0.0, 1e-4])
+@pytest.mark.parametrize("axis", [(1.0, 0.0, 0.0), (1.0, 1.0, 0.3)])
+def test_turns_about_one_axis_tell_the_point_but_for_that_axis(axis: tuple[float, ...], noise: float) -> None:
+    rng, time, g = np.random.default_rng(0), np.arange(0, 30, 0.01), np.array([0.0, 0.0, -9.81])
+    along, tip, com = np.array(axis) / np.linalg.norm(axis), np.array([0.02, -0.03, 0.1]), np.array([0.02, 0.01, 0.05])
+    R = Rotation.exp(np.outer(1.2 * np.sin(1.5 * time) + 0.5 * np.sin(4.3 * time), along))
+    path = np.stack([0.1 * np.sin(0.7 * time), 0.1 * np.cos(1.1 * time), 0.05 * np.sin(1.9 * time)], 1)
+    moved = np.gradient(np.gradient(path + R.apply(com), time, axis=0), time, axis=0)
+    force = 2.0 * R.inverse().apply(moved - g)
+    shown = R @ Rotation.exp(noise * rng.normal(size=(len(time), 3)))
+    channels = {"rotation": shown.matrix, "position": path + R.apply(tip) + noise * rng.normal(size=path.shape),
+                "force": force + 0.05 * rng.normal(size=path.shape),
+                "torque": np.cross(com, force) + 0.0025 * rng.normal(size=path.shape)}  # fmt: skip
+    found = identify(Recording((Stream("log", channels, time),), g))
+    (said,) = (f.message for f in found.findings if f.code == "motion-mismatch")
+    place = [float(v) for v in re.search(r"a point \((.*?)\) ±", said)[1].split(",")]  # type: ignore[index]
+    np.testing.assert_allclose(place, 1e3 * (tip - along * (along @ tip)), atol=0.6)
+    assert f"where it is along ({', '.join(f'{v:.2f}' for v in along)}) of S, turns about that axis alone" in said
+    assert "gains-differ" not in found.codes()
+    assert found.mass == pytest.approx(2.0, abs=0.002)
 
 
 def made(motion: str, noise: str, seed: int) -> MotionLog:

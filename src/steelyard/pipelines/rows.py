@@ -23,7 +23,7 @@ from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
 from steelyard.sanity.contact import untouched
-from steelyard.sanity.misplaced import Misplaced, misplaced
+from steelyard.sanity.misplaced import Misplaced, misplaced, of_sensor
 from steelyard.sanity.sensor_matrix import turn_of
 from steelyard.sanity.small_slip import small_slip
 
@@ -31,6 +31,8 @@ from steelyard.sanity.small_slip import small_slip
 GRAVITY_FOUND = "gravity was estimated"
 # The point is sought anew with the delays found for it until it moves by less [m].
 ROUNDS, SETTLED = 3, 1e-3
+# Where the acceleration comes from if an accelerometer gives it.
+MEASURED = "specific_force"
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,6 +73,7 @@ def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Opti
         return rows
     place = examine_place(rows.log, before, options.drift)
     if place is not None:
+        place = replace(place, measured=rows.aligned.acceleration_from == MEASURED)
         rows, how = _placed(place, recording, before, options)
     if rows.delayed and (turn := turn_of(rows.log, recording, before, options.drift)) is not None:
         rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place)
@@ -80,13 +83,19 @@ def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Opti
 def _placed(
     place: Misplaced, recording: Recording, before: tuple[Finding, ...], options: Options
 ) -> tuple[FitRows, AlignOptions]:
-    """Return the rows with accelerations of S, where they were of another point, and how they were aligned."""
-    for _ in range(ROUNDS):
+    """Return the rows with accelerations of S, where they were of another point, and how they were aligned.
+
+    The point told is the one that the rows were made with: what they still show beside it widens its bars.
+    """
+    for left in reversed(range(ROUNDS)):
         x, y, z = (float(v) for v in place.place)
         how = AlignOptions(place=(x, y, z))
         rows = _rows(recording, before, options, how)
         rest = misplaced(rows.log, options.drift)
         if rest is None or np.linalg.norm(rest.place) < SETTLED:
+            break
+        if not left:
+            place = replace(place, std=np.hypot(place.std, rest.place))
             break
         place = replace(place, place=place.place + rest.place, std=rest.std)
     return replace(rows, place=place), how
@@ -95,7 +104,7 @@ def _placed(
 def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
     """Return the rows to fit, aligned as said."""
     codes = {f.code for f in before}
-    aligned, level = levelled_as(options.gravity, align(recording, how), recording)
+    aligned, level = levelled_as(options.gravity, _aligned(recording, how), recording)
     log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes)
     keep: slice | Mask = slice(None)
     touched: tuple[Finding, ...] = ()
@@ -115,6 +124,17 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
             keep, finding = slip.longer_side(log)
             log, touched = log.rows(keep), (finding,)
     return FitRows(log, aligned, level, unmeasured, touched)
+
+
+def _aligned(recording: Recording, how: AlignOptions) -> Aligned:
+    """Return the recording aligned, with accelerations of S.
+
+    Aligning takes those of poses there; those that an accelerometer or a table gives come as they are.
+    """
+    aligned = align(recording, how)
+    if not any(how.place) or not (aligned.acceleration_from == MEASURED or aligned.log.time is None):
+        return aligned
+    return replace(aligned, log=of_sensor(aligned.log, np.array(how.place)))
 
 
 def levelled_as(

@@ -30,6 +30,8 @@ NOISE, CALM = 3.0, 0.05
 NEAR = 0.03
 # The point is sought anew with the body found until it moves by less [m].
 ROUNDS, SETTLED = 5, 1e-5
+# Along an axis of S about which alone it turns, no point is told from another: the motion shows this much less of it.
+BLIND = 0.01
 _FEWEST_ROWS, _FEWEST_BLOCKS = 50, 6
 
 
@@ -42,6 +44,9 @@ class Misplaced:
     moved       (10,) what the parameters are less with it
     com         (3,) [m] centre of mass with it
     noise       share of noise in the squared acceleration of the rows
+    blind       (3,) an axis of S along which the motion does not show the point, which is then taken to lie at zero;
+                None where there is none
+    measured    whether it is an accelerometer whose accelerations are of it, and not positions
     """
 
     place: Array
@@ -50,6 +55,8 @@ class Misplaced:
     moved: Array
     com: Array
     noise: float
+    blind: Array | None = None
+    measured: bool = False
 
     @property
     def sure(self) -> bool:
@@ -70,12 +77,21 @@ class Misplaced:
     def finding(self) -> Finding:
         """What is said of it."""
         where = ", ".join(f"{1e3 * v:.1f}" for v in self.place + 0.0)
-        text = (
-            f"The load moves as if the positions were those of a point ({where}) ± "
-            f"{1e3 * float(np.linalg.norm(self.std)):.1g} mm from the origin of S, such as the tip of a tool. The "
-            "answer assumes this."
-        )
-        return Finding("motion-mismatch", text, "Set the controller's TCP to S, or correct the positions.")
+        size = f"({where}) ± {1e3 * float(np.linalg.norm(self.std)):.1g} mm from the origin of S"
+        what, such = "the positions were those of", ", such as the tip of a tool"
+        remedy = "Set the controller's TCP to S, or correct the positions."
+        if self.measured:
+            what, such, remedy = "the accelerations were those of", "", "Correct the accelerometer's mount by as much."
+        text = f"The load moves as if {what} a point {size}{such}{self._blind_words}. The answer assumes this."
+        return Finding("motion-mismatch", text, remedy)
+
+    @property
+    def _blind_words(self) -> str:
+        """Say along which axis the point may lie anywhere."""
+        if self.blind is None:
+            return ""
+        axis = ", ".join(f"{v:.2f}" for v in self.blind * np.sign(self.blind[np.abs(self.blind).argmax()]) + 0.0)
+        return f"; where it is along ({axis}) of S, turns about that axis alone do not show"
 
     def widened(self, estimate: Estimate) -> Estimate:
         """Return the estimate with bars that hold how well the point is known."""
@@ -84,7 +100,12 @@ class Misplaced:
 
     def put_right(self, log: MotionLog) -> MotionLog:
         """Return the log with accelerations of S."""
-        return replace(log, acceleration=log.acceleration - _lever(log) @ self.place)
+        return of_sensor(log, self.place)
+
+
+def of_sensor(log: MotionLog, place: Array) -> MotionLog:
+    """Return the log with accelerations of S, where they are of a point (3,) [m] in S."""
+    return replace(log, acceleration=log.acceleration - _lever(log) @ place)
 
 
 def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
@@ -100,15 +121,17 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
     once = rows.solve()
     phi, place, at = once.solution[:10], np.zeros(3), len(once.solution)
     lever = _lever(rows.log)
+    axes, blind = _axes(lever)
     for _ in range(ROUNDS):
         # What a body misses in its wrench where the point at one metre along each axis is taken for S.
         missed = -np.concatenate([cross_matrix(phi[1:4]) @ lever, phi[0] * lever], 1)
-        fit = rows.solve(missed, jackknife=True)
-        before, place, phi = place, fit.solution[at:], fit.solution[:10]
+        fit = rows.solve(missed @ axes, jackknife=True)
+        before, place, phi = place, axes @ fit.solution[at:], fit.solution[:10]
         if np.linalg.norm(place - before) < SETTLED:
             break
     left = fit.left / once.left if once.left else 1.0
-    return Misplaced(place, fit.spread[at:], left, once.solution[:10] - phi, phi[1:4] / phi[0], noise_share(log))
+    std, moved = np.sqrt(axes**2 @ fit.spread[at:] ** 2), once.solution[:10] - phi
+    return Misplaced(place, std, left, moved, phi[1:4] / phi[0], noise_share(log), blind)
 
 
 def examine_place(log: MotionLog, known: tuple[Finding, ...], drift: bool = False) -> Misplaced | None:
@@ -131,3 +154,10 @@ def _lever(log: MotionLog) -> Array:
     """Return what turning adds to the acceleration of a point per metre from S (N, 3, 3)."""
     across = cross_matrix(log.angular_velocity)
     return np.asarray(cross_matrix(log.angular_acceleration) + across @ across)
+
+
+def _axes(lever: Array) -> tuple[Array, Array | None]:
+    """Return the axes of S (3, k) along which turns (N, 3, 3) show a point, and the one along which they do not."""
+    values, axes = np.linalg.eigh(np.einsum("nki,nkj->ij", lever, lever))
+    seen = values > BLIND * values[2]
+    return (np.eye(3), None) if seen.all() else (axes[:, seen], axes[:, 0])
