@@ -138,7 +138,8 @@ def saved_parts(shape: Shape) -> SavedParts:
     from steelyard.io.parts_files import SavedParts
 
     made, error = shape.segmentation, shape.error
-    return SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, error.com_m, error.stretch)
+    unsure = (error.com_m, error.stretch, error.turn_rad)
+    return SavedParts(made.mesh, made.labels, made.rgb, made.hierarchy, made.names, *unsure)
 
 
 def _seen(path: Path) -> Cloud | Views:

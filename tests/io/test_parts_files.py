@@ -26,7 +26,14 @@ def saved() -> SavedParts:
     labels = np.digitize(solid.centroids[:, 0], np.quantile(solid.centroids[:, 0], [1 / 3, 2 / 3]))
     tree = Hierarchy(labels, np.array([[0, 1], [2, 3]]), np.array([0.1, np.inf]))
     return SavedParts(
-        solid, labels, np.array([[1, 2, 3], [4, 5, 6], [250, 251, 252.5]]), tree, ("head", "shaft", "griß"), 4e-4, 0.03
+        solid,
+        labels,
+        np.array([[1, 2, 3], [4, 5, 6], [250, 251, 252.5]]),
+        tree,
+        ("head", "shaft", "griß"),
+        4e-4,
+        0.03,
+        0.01,
     )
 
 
@@ -38,7 +45,7 @@ def test_round_trip(saved: SavedParts, tmp_path: Path) -> None:
     np.testing.assert_array_equal(back.labels, saved.labels)
     np.testing.assert_array_equal(back.rgb, saved.rgb)
     assert back.names == saved.names
-    assert (back.parts.com_std, back.parts.stretch) == (4e-4, 0.03)
+    assert (back.parts.com_std, back.parts.stretch, back.parts.turn_std) == (4e-4, 0.03, 0.01)
     assert back.tree is not None
     assert saved.tree is not None
     for name in ("piece", "merges", "cost"):
@@ -53,7 +60,7 @@ def test_names_of_the_format(saved: SavedParts, tmp_path: Path) -> None:
         shapes = {name: archive[name].shape for name in archive.files}
     count = len(saved.solid)
     wanted = {"vertices": (30, 3), "tets": (count, 4), "labels": (count,), "merges": (2, 2), "cost": (2,), "piece": (count,),
-              "rgb": (3, 3), "volume_m3": (3,), "centroid_m": (3, 3), "names": (3,), "com_std_m": (), "stretch": ()}  # fmt: skip
+              "rgb": (3, 3), "volume_m3": (3,), "centroid_m": (3, 3), "names": (3,), "com_std_m": (), "stretch": (), "turn_std_rad": ()}  # fmt: skip
     assert shapes == wanted
 
 
@@ -86,7 +93,7 @@ def write_wrong(saved: SavedParts, path: Path, **changed: Any) -> None:
         ({"rgb": np.full((3, 3), 300)}, "3 parts need one colour 0..255 each (P, 3); got shape (3, 3)."),
         ({"names": np.array(["a"])}, "3 parts need one name each; got 1."),
         ({"com_std_m": np.array([1e-4, 1e-4])}, 'array "com_std_m" must hold one number; it has the shape (2,).'),
-        ({"stretch": np.float64(np.nan)}, "standard deviations of a shape must not be negative; got 0.0004, nan."),
+        ({"stretch": np.float64(np.nan)}, "standard deviations of a shape must not be negative; got 0.0004, nan, 0.01."),
         ({"names": np.zeros(3)}, 'array "names" must hold text; it holds float64.'),
         ({"labels": np.array(["x"])}, 'array "labels" must hold real numbers; it holds <U1.'),
         ({"merges": np.array([[0, 1], [0, 2]])}, "every node but the last must be joined once, after it was made; these merges are no tree."),

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 import steelyard as sy
+from steelyard.api import saved_parts
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.parts.parts import Parts
@@ -79,7 +80,9 @@ def test_where_a_scan_lies_is_in_the_error_of_its_shape_and_not_in_the_grasp(sha
     assert exact == shape.error
     assert unsure.com_m == pytest.approx(np.hypot(exact.com_m, 1e-3))
     assert (unsure.turn_rad, unsure.grasp_m, unsure.grasp_rad) == (0.01, 0.0, 0.0)
-    assert replace(shape, scan=placed).parts.com_std == unsure.com_m
+    parts, kept = replace(shape, scan=placed).parts, saved_parts(replace(shape, scan=placed)).parts
+    assert (parts.com_std, parts.stretch, parts.turn_std) == (unsure.com_m, unsure.stretch, unsure.turn_rad)
+    assert (kept.com_std, kept.stretch, kept.turn_std) == (unsure.com_m, unsure.stretch, unsure.turn_rad)
 
 
 def test_a_known_number_of_parts_is_kept(cloud: Cloud) -> None:

@@ -43,9 +43,10 @@ class ShapeError:
         if not all(np.isfinite(v) and v >= 0 for v in values):
             raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
 
-    def at_least(self, com_m: float, stretch: float) -> ShapeError:
+    def at_least(self, com_m: float, stretch: float, turn_rad: float = 0.0) -> ShapeError:
         """Return the error with its shape part no less than this."""
-        return replace(self, com_m=max(self.com_m, com_m), stretch=max(self.stretch, stretch))
+        turn = max(self.turn_rad, turn_rad)
+        return replace(self, com_m=max(self.com_m, com_m), stretch=max(self.stretch, stretch), turn_rad=turn)
 
     def scaled(self, factor: float) -> ShapeError:
         """Return the error with its shape part `factor` times as large, not below that of a measured shape."""

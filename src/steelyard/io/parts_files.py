@@ -44,7 +44,7 @@ class SavedParts:
     rgb     (P, 3) mean colours 0..255, None where they are not known
     tree    the tree that the parts were cut from, None where there is none
     names   (P,) what each part is called, empty where nothing says
-    com_std, stretch   how wrong the shape may be, as in `Parts`; 0 where nothing says
+    com_std, stretch, turn_std   how wrong the shape may be, as in `Parts`; 0 where nothing says
     """
 
     solid: TetMesh
@@ -54,6 +54,7 @@ class SavedParts:
     names: tuple[str, ...] = ()
     com_std: float = 0.0
     stretch: float = 0.0
+    turn_std: float = 0.0
 
     def __post_init__(self) -> None:
         labels = np.array(self.labels, np.int64)
@@ -82,7 +83,8 @@ class SavedParts:
     def parts(self) -> Parts:
         """The parts with their exact moments; raises BadValue where one has no volume."""
         moments = self.solid.moments(self.labels, self.count)
-        return Parts(np.arange(self.count), moments, self.rgb, com_std=self.com_std, stretch=self.stretch)
+        unsure = (self.com_std, self.stretch, self.turn_std)
+        return Parts(np.arange(self.count), moments, self.rgb, None, *unsure)
 
     def recut(self, volumes: Sequence[float]) -> SavedParts:
         """Return the solid in the parts of these volumes (K,) [m^3]: part k is the node of the tree with volume k.
@@ -141,6 +143,7 @@ def write_parts(saved: SavedParts, path: Path | str) -> None:
         "centroid_m": parts.centroid,
         "com_std_m": np.float64(saved.com_std),
         "stretch": np.float64(saved.stretch),
+        "turn_std_rad": np.float64(saved.turn_std),
     }
     if saved.rgb is not None:
         arrays["rgb"] = saved.rgb
@@ -177,7 +180,7 @@ def read_parts(path: Path | str) -> SavedParts:
         if all(name in arrays for name in _TREE):
             tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
         names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"]) if "names" in arrays else ()
-        unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch"))
+        unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
         saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)
     except BadValue as error:

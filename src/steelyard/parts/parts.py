@@ -28,8 +28,9 @@ class Parts:
     moments  (P, 10) the ten parameters of each part at a density of 1 kg/m^3: volume [m^3], first and second moments
     rgb      (P, 3) mean colour 0..255, None where it is not known
     interior where their volume is, None where only the moments are known
-    com_std, stretch   standard deviations of what the shape gives, where it says so itself (a scan): of the
-             centre of mass per axis [m], and of the second moments as a share of each; see `ShapeError`
+    com_std, stretch, turn_std   standard deviations of what the shape gives, where it says so itself (a scan): of the
+             centre of mass per axis [m], of the second moments as a share of each, and of the turn of the whole about
+             each axis [rad]; see `ShapeError`
     """
 
     label: Integers
@@ -38,6 +39,7 @@ class Parts:
     interior: Interior | None = None
     com_std: float = 0.0
     stretch: float = 0.0
+    turn_std: float = 0.0
 
     def __post_init__(self) -> None:
         moments = check.vectors("part moments", self.moments, 10)
@@ -60,8 +62,9 @@ class Parts:
         object.__setattr__(self, "moments", moments)
         if self.rgb is not None:
             object.__setattr__(self, "rgb", check.vectors("part colours", self.rgb))
-        if not (0 <= self.com_std < np.inf and 0 <= self.stretch < np.inf):
-            raise BadValue(f"standard deviations of a shape must not be negative; got {self.com_std}, {self.stretch}.")
+        unsure = (self.com_std, self.stretch, self.turn_std)
+        if not all(0 <= std < np.inf for std in unsure):
+            raise BadValue(f"standard deviations of a shape must not be negative; got {', '.join(map(str, unsure))}.")
 
     def __len__(self) -> int:
         return len(self.label)

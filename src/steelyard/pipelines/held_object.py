@@ -241,7 +241,7 @@ def _shape(parts: Parts | Shape, pose: Pose | None, std: tuple[float, float] | N
     grasp = std or (0.0, 0.0)
     if isinstance(parts, Parts):
         _require_metres(parts)
-        error = MEASURED.at_least(parts.com_std, parts.stretch)
+        error = MEASURED.at_least(parts.com_std, parts.stretch, parts.turn_std)
         return (parts.in_frame(pose),), None, error.placed(*grasp)
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(pose) for cut in cuts.parts)

@@ -50,7 +50,7 @@ class Shape:
     def parts(self) -> Parts:
         """The parts as shape and colour alone say, with how wrong the solid may be."""
         error = self.error
-        return replace(self.segmentation.parts, com_std=error.com_m, stretch=error.stretch)
+        return replace(self.segmentation.parts, com_std=error.com_m, stretch=error.stretch, turn_std=error.turn_rad)
 
     @property
     def findings(self) -> tuple[Finding, ...]:
