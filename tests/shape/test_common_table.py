@@ -8,6 +8,7 @@ import manifold3d
 import numpy as np
 import pytest
 
+from steelyard.shape import common_table
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled, slid
 from steelyard.shape.mesh import TriangleMesh
@@ -69,6 +70,15 @@ def test_right_poses_are_left_alone() -> None:
     assert levelled(scene) == 0.0
     np.testing.assert_array_equal(scene.R, R)
     np.testing.assert_array_equal(scene.p, p)
+
+
+def test_too_few_tables_tell_nothing(monkeypatch: pytest.MonkeyPatch) -> None:
+    """That is not a level one: a lens with which views lose the table is not a better one."""
+    scene = scene_of(wrong_by(pliers().views, "each"))
+    R, half = scene.R.copy(), lambda scene, tables=common_table._tables: tables(scene)[::2]
+    monkeypatch.setattr(common_table, "_tables", half)
+    assert levelled(scene) is None
+    np.testing.assert_array_equal(scene.R, R)
 
 
 def plate(size: tuple[float, float, float]) -> Scanned:

@@ -38,19 +38,23 @@ _PULL = 0.02  # of what heights tell of a usual view: so much holds it where it 
 _SEEN = 0.05  # pixels in a cell, blurred, from which on its height counts as known
 
 
-def levelled(scene: Scene) -> float:
+def levelled(scene: Scene) -> float | None:
     """Turn and lift views until the table is level in each; return how far off they had it, rms [m].
 
-    Zero, and no camera moved, where that is far less than the depth noise, or where too few views show a table. Where
+    Zero, and no camera moved, where that is far less than the depth noise; None where too few views show a table. Where
     something is moved, views without a table are left out: nobody knows where they are. Depth is then found less noisy
     than the table as all views together had it seemed to say.
     """
     planes = _tables(scene)
+    if not _shown(scene, planes):
+        return None
     if _is_level(scene, planes):
         return 0.0
     # What all have alike is no view's error: a wide object passed for the table.
     _lay(scene, np.median(planes[:, 1:4], axis=0))
     planes = _tables(scene)
+    if not _shown(scene, planes):
+        return None
     if _is_level(scene, planes):
         return 0.0
     off = _off(scene, planes)
@@ -62,9 +66,14 @@ def levelled(scene: Scene) -> float:
     return off
 
 
+def _shown(scene: Scene, planes: Array) -> bool:
+    """Whether enough views show a table to go by."""
+    return len(planes) >= _MOST * len(scene.R)
+
+
 def _is_level(scene: Scene, planes: Array) -> bool:
-    """Whether there is nothing to mend, or nothing to go by."""
-    return len(planes) < _MOST * len(scene.R) or _off(scene, planes) < _LEVEL * scene.sigma
+    """Whether there is nothing to mend."""
+    return _off(scene, planes) < _LEVEL * scene.sigma
 
 
 def _lay(scene: Scene, plane: Array) -> None:

@@ -38,6 +38,7 @@ _FAR = (0.02, 0.02, 0.02, *_WINDOWS)
 _MODEL = 2500  # points that views are fitted to
 _NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
 _STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
+_SAME = 0.1  # of the depth noise: views that spread by less are as good as each other
 _ON = 3.0  # times the depth noise: so near the surface a pixel lies on it
 _SAMPLES = 200_000  # pixels that are asked whether they do
 
@@ -120,7 +121,7 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
         raise no_surface()
     # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
     # spread more about it than about the best. Of a low object, which cannot be crossed, the last two tell.
-    most, least = max(each.shown for each in tries), min(each.seen.spread for each in tries)
+    most, least = max(each.shown for each in tries), max(min(each.seen.spread for each in tries), _SAME)
     best = min(tries, key=lambda each: each.crossed - each.shown / max(most, 1) + each.seen.spread / least)
     scene.R, scene.p = best.R, best.p
     return best.seen

@@ -84,9 +84,11 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
         level, off = _levelled(scene, mistake), 0.0
         if level.lens:
             read = scene_of(replace(scene.views, intrinsics=level.lens))
-            off = levelled(read)
-            # A lens with which the views have the table no more alike explains nothing.
-            scene, level = (read, level) if off < level.off else (scene, replace(level, lens=None))
+            again = levelled(read)
+            # A lens with which the views have the table no more alike, or with which they see none, explains nothing.
+            better = again is not None and again < level.off
+            scene, level = (read, level) if better else (scene, replace(level, lens=None))
+            off = again or 0.0
         off = off if level.lens else level.off
         clock.lap("table")
         found = _surface(scene, points, off, clock)
@@ -143,7 +145,7 @@ class _Level:
 
 
 def _levelled(scene: Scene, mistake: Callable[[], str]) -> _Level:
-    given, off = scene.views.intrinsics, levelled(scene)
+    given, off = scene.views.intrinsics, levelled(scene) or 0.0
     if off > _TABLE_OFF and mistake():
         raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
     return _Level(off, given, lens_by_table(scene) if off else None)
