@@ -2,13 +2,17 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from synthetic import Kind, write
 from traps import edited
 
+from sanity.held_poses import BODY, recorded
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
+from steelyard.pipelines.held_object import identify
 from steelyard.sanity import examine
 
 KINDS = {"hammer": Kind(noise=0.5), "box": Kind("box_tool", 0.2, 2), "drill": Kind("drill", 1.0, 5)}
@@ -91,3 +95,13 @@ def test_an_order_that_leaves_little_unexplained_is_told_too() -> None:
     kept = Recording((Stream("poses", channels),), np.array([0, 0, -9.81]), 1)
     assert examine(kept)[1] == ()
     assert "read as Tx = Tx, Ty = Tz, Tz = Ty: so" in named(edited(kept, torque=lambda v: v[:, [0, 2, 1]]))
+
+
+def test_no_row_passes_for_touched_where_columns_are_mixed_up() -> None:
+    """Nothing fits one body then: rows were left out without a word, and the mass was 6 % off."""
+    recording = recorded("paper", 0)
+    (stream,) = recording.streams
+    mixed = {**stream.channels, "torque": stream.channels["torque"][:, [1, 0, 2]]}
+    found = identify(replace(recording, streams=(replace(stream, channels=mixed),)))
+    assert found.codes() == {"force-unit", "inertia-not-identified"}
+    assert found.mass == pytest.approx(BODY.mass, rel=0.002)

@@ -130,7 +130,7 @@ def _not_following(
     left_in = any(f.left_in for f in before)
     wrong_unit = any(f.code == "force-unit" for f in (*before, *late)) or any(f.code == "length-in-mm" for f in late)
     seen = tuple(f for f in late if not (left_in and f.code == "nearly-planar"))
-    return () if wrong_unit or left_in else touched, seen
+    return () if wrong_unit else touched, seen
 
 
 @contextmanager

@@ -22,7 +22,6 @@ from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
-from steelyard.sanity.contact import untouched
 from steelyard.sanity.misplaced import Misplaced, misplaced, of_sensor
 from steelyard.sanity.sensor_matrix import turn_of
 from steelyard.sanity.small_slip import small_slip
@@ -108,17 +107,14 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes)
     keep: slice | Mask = slice(None)
     touched: tuple[Finding, ...] = ()
-    left_in = {f.code for f in before if f.left_in}
-    if unmeasured or "sensor-turned" in left_in:
-        pass  # nothing of it would fit one body
-    elif left_in:
-        keep, touched = untouched(log, options.bias == "free")
-    else:
+    # Where a cause is left in, nothing fits one body: rows that are left out as touched would be chance.
+    whole = not unmeasured and not any(f.left_in for f in before)
+    if whole:
         keep, touched = one_body(log, recording, options.bias == "free", options.drift)
     if codes & {"motion-mismatch", "weight-compensated"}:
         touched = ()  # moving rows carry another mass, and only look touched
     log = without_dead(with_declared(log.rows(keep), recording.noise))
-    if not (unmeasured or left_in or touched):
+    if whole and not touched:
         slip = small_slip(log, rotation_of(log, aligned), recording.gravity)
         if slip is not None:
             keep, finding = slip.longer_side(log)
