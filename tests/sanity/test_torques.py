@@ -105,3 +105,15 @@ def test_no_row_passes_for_touched_where_columns_are_mixed_up() -> None:
     found = identify(replace(recording, streams=(replace(stream, channels=mixed),)))
     assert found.codes() == {"force-unit", "inertia-not-identified"}
     assert found.mass == pytest.approx(BODY.mass, rel=0.002)
+
+
+def test_contact_is_told_beside_a_unit_that_was_put_right() -> None:
+    recording = recorded("paper", 0)
+    (stream,) = recording.streams
+    force = stream.channels["force"].copy()
+    force[300:420] += [0.0, 8.0, 5.0]
+    for factor, unit in ((1.0, set()), (1e-3, {"force-unit"})):
+        felt = {**stream.channels, "force": factor * force}
+        found = identify(replace(recording, streams=(replace(stream, channels=felt),)))
+        assert {"contact", *unit} <= found.codes()
+        assert found.mass == pytest.approx(BODY.mass, rel=0.002)

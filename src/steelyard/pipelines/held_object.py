@@ -128,7 +128,8 @@ def _not_following(
 ) -> tuple[tuple[Finding, ...], tuple[Finding, ...]]:
     """Return the findings `touched` and `late` without what only seems so in a wrong unit, or by a cause left in."""
     left_in = any(f.left_in for f in before)
-    wrong_unit = any(f.code == "force-unit" for f in (*before, *late)) or any(f.code == "length-in-mm" for f in late)
+    # A unit that was found before was put right, and what is touched then is touched.
+    wrong_unit = any(f.code in {"force-unit", "length-in-mm"} for f in late)
     seen = tuple(f for f in late if not (left_in and f.code == "nearly-planar"))
     return () if wrong_unit else touched, seen
 

@@ -283,7 +283,7 @@ def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[F
         message = f"{where}: the torque is in N mm; it was divided by 1000."
         return scaled(recording, stream, ("torque",), 1e-3), (Finding.of("length-in-mm", message),)
     message = f"{where}: the units of force and torque do not belong together."
-    return recording, (Finding.of("force-unit", message),)
+    return recording, (replace(Finding.of("force-unit", message), left_in=True),)
 
 
 def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
