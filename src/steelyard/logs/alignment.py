@@ -22,6 +22,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
 from steelyard.logs.outliers import bursts, inside, merged
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.steady import with_steady_stamps
 from steelyard.logs.stillness import pose_numbers, still_rows
 from steelyard.logs.tables import align_tables
 from steelyard.spatial import Rotation
@@ -92,7 +93,9 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
     if len(timed) < len(recording.streams):
         other = next(s for s in recording.streams if s not in timed)
         raise BadDescription(f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock.")
-    return _align_timed(_prepare(recording, options or AlignOptions()))
+    steady, notes = with_steady_stamps(recording)
+    aligned = _align_timed(_prepare(steady, options or AlignOptions()))
+    return replace(aligned, notes=(*notes, *aligned.notes)) if notes else aligned
 
 
 @dataclass(frozen=True, eq=False)
