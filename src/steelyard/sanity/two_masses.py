@@ -20,6 +20,8 @@ from steelyard.spatial import cross_matrix
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
 # distance [m], and leaves less of the squared residual.
 SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
+# A cable pulls back in the rhythm of a motion, as a mass that is not weighed would: a controller is blamed beyond so many.
+TAKEN = 8.0
 # No tool's tip is farther [m] from the sensor.
 FARTHEST = 5.0
 # Noise of an acceleration lowers the mass that it shows by its share of the variance; so many times that is allowed.
@@ -103,7 +105,7 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         f"The force follows the acceleration as that of {found.mass:.3g} ± {spread:.2g} kg, but the direction of "
         f"gravity as that of {found.weighed:.3g} kg: "
     )
-    if short > max(SURE * spread, SHARE * abs(found.mass)):
+    if short > max(TAKEN * spread, SHARE * abs(found.mass)):
         other = clock_words(found.mass, found.weighed)
         return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
