@@ -20,7 +20,8 @@ from steelyard.spatial import cross_matrix
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
 # distance [m], and leaves less of the squared residual.
 SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
-# A cable pulls back in the rhythm of a motion, as a mass that is not weighed would: a controller is blamed beyond so many.
+# A cable pulls back in the rhythm of a motion, as a mass that is not weighed would: a controller is blamed beyond so
+# many.
 TAKEN = 8.0
 # No tool's tip is farther [m] from the sensor.
 FARTHEST = 5.0
