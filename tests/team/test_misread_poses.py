@@ -101,6 +101,19 @@ def test_one_robot_misread_is_named_with_how(way: str, name: str) -> None:
         assert named == (2 if robots == 2 and way in EITHER else 1)
 
 
+@pytest.mark.parametrize("way", ["w last", "w first"])
+def test_rotations_that_all_robots_tell_wrongly_are_named(way: str) -> None:
+    spoil, words = SPOILED[way]
+    for robots in (2, 3):
+        log = made(robots)
+        for name in log.names:
+            log = spoiled(log, name, spoil)
+        with pytest.raises(BadValue, match="those of all robots are misread") as caught:
+            require_well_read(log)
+        assert words in str(caught.value)
+        assert "Set the form that their quaternions have" in str(caught.value)
+
+
 def test_one_recording_misread_is_named() -> None:
     log = made(kinds=("grasp", "motion"))
     for way, robot, only in (("mm", 1, 0), ("transposed", 0, 1), ("inverted", 2, 1)):

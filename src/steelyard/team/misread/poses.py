@@ -1,8 +1,8 @@
-"""One robot whose poses are read wrongly: positions in another unit, rotations or whole poses the other way round.
+"""Robots whose poses are read wrongly: positions in another unit, rotations or whole poses the other way round.
 
 No grasps and homes then fit the team. Every common misreading is undone for each robot in turn, in all recordings or in
-one: where one of them makes poses fit, it is named. A reading is judged by its first grasps in closed form; only the
-best few are fitted.
+one, and for all robots at once where rotations are misread, as where one logger wrote them all: where one of them makes
+poses fit, it is named. A reading is judged by its first grasps in closed form; only the best few are fitted.
 """
 
 from __future__ import annotations
@@ -51,9 +51,9 @@ class Reading:
 
 @dataclass(frozen=True, eq=False)
 class Try:
-    """A reading of one robot's poses, in one recording (its number) or in all (None), and the rows so read."""
+    """A reading of poses of one robot or all (None), in one recording (its number) or all (None), and rows so read."""
 
-    robot: int
+    robot: int | None
     reading: Reading
     recording: int | None
     parts: tuple[Stretch, ...]
@@ -78,8 +78,8 @@ METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": 0.025
 SWAP = "Set the form that its quaternions have: quaternion-wxyz or quaternion-xyzw."
 TRANSPOSE = 'Give its "rotation" from its grasp into its home: name the columns of the matrix in transposed order.'
 SCALES = tuple(_scaled(a, b, METRES[a] / METRES[b]) for a in METRES for b in METRES if a != b)
-READINGS = (
-    *SCALES,
+# Lengths that all robots tell in another unit fit one another as well as before; turns do not.
+TURNS = (
     Reading(
         "poses are those of its home in its grasp, not of its grasp in its home",
         "Write the inverse of each pose.",
@@ -92,10 +92,11 @@ READINGS = (
         for m in MISREAD
     ),
 )  # fmt: skip
+READINGS = (*SCALES, *TURNS)
 
 
 def require_well_read(log: TeamLog) -> None:
-    """Raise BadValue where poses that do not fit do so once one robot's are read in another way.
+    """Raise BadValue where poses that do not fit do so once one robot's, or all, are read in another way.
 
     Clocks are taken as they are, but for those far off: how fast a grasp turns is the same in all these readings.
     """
@@ -107,9 +108,14 @@ def require_well_read(log: TeamLog) -> None:
     judge = _Judge(names, reference)
     # A fit may end beside the optimum: then its start is the better of the two.
     given = min((judge(parts, exact) for exact in (True, False)), key=lambda judged: judged.cost)
-    readings = READINGS if judge.turns(parts) else SCALES
+    turns = judge.turns(parts)
+    readings = READINGS if turns else SCALES
     suspects = _suspects(parts, judge, given)
-    for tried in (_everywhere(parts, suspects, readings), _in_one(parts, suspects, readings, judge, given)):
+    for tried in (
+        _everywhere(parts, suspects, readings),
+        _of_all(parts, len(names), TURNS if turns else ()),
+        _in_one(parts, suspects, readings, judge, given),
+    ):
         best = _best(tuple(tried), given, judge)
         if best:
             raise BadValue(_words(best, names, [part.name for part in parts], given))
@@ -149,6 +155,17 @@ def _everywhere(parts: tuple[Stretch, ...], robots: Sequence[int], readings: Seq
             made = tuple(part for part in read if part is not None)
             if len(made) == len(parts):
                 yield Try(i, reading, None, made)
+
+
+def _of_all(parts: tuple[Stretch, ...], count: int, readings: Sequence[Reading]) -> Iterator[Try]:
+    """Yield readings of the poses of all robots at once."""
+    for reading in readings:
+        read: tuple[Stretch | None, ...] = parts
+        for i in range(count):
+            read = tuple(None if part is None else _read(part, i, reading) for part in read)
+        made = tuple(part for part in read if part is not None)
+        if len(made) == len(parts):
+            yield Try(None, reading, None, made)
 
 
 def _in_one(
@@ -257,8 +274,11 @@ def _words(best: list[tuple[Try, _Judged]], names: tuple[str, ...], recordings: 
     said = []
     for one, _ in best:
         where = "" if one.recording is None else f" in '{recordings[one.recording]}'"
-        said.append(f"those of '{names[one.robot]}' are misread{where} ({one.reading.words})")
-    remedies = dict.fromkeys(one.reading.remedy for one, _ in best)
+        whose = "all robots" if one.robot is None else f"'{names[one.robot]}'"
+        said.append(f"those of {whose} are misread{where} ({one.reading.words})")
+    remedies = dict.fromkeys(
+        one.reading.remedy.replace(" its ", " their ") if one.robot is None else one.reading.remedy for one, _ in best
+    )
     return (
         f"the robots' poses do not fit one payload, and do so if {' or if '.join(said)}: what they say of it then "
         f"differs by {in_words(best[0][1].noise)}, as given by {in_words(given.noise)}. {' '.join(remedies)}"
