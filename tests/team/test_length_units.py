@@ -18,9 +18,9 @@ def made(case: str, seed: int) -> TeamLog:
     return simulate_team(TeamScene(CASES[case], motion_samples=400), seed).log
 
 
-def misread(log: TeamLog, number: int, factor: float) -> TeamLog:
-    """Return the log with the positions of its second robot in another unit in one recording."""
-    name, recordings = log.names[1], list(log.recordings)
+def misread(log: TeamLog, number: int, factor: float, name: str = "robot1") -> TeamLog:
+    """Return the log with the positions of a robot in another unit in one recording."""
+    recordings = list(log.recordings)
     track = recordings[number].tracks[name]
     channels = {q: factor * v if q == "position" else v for q, v in track.channels.items()}
     tracks = {**recordings[number].tracks, name: replace(track, channels=channels)}
@@ -33,6 +33,15 @@ def misread(log: TeamLog, number: int, factor: float) -> TeamLog:
 def test_it_is_named(method: Method, number: int, factor: float) -> None:
     with pytest.raises(BadValue, match=r"positions of 'robot1' are .* Set the unit"):
         identify_team(misread(made("A", 1), number, factor), method)
+
+
+def test_millimetres_of_all_robots_are_named() -> None:
+    log = made("A", 1)
+    for number in range(len(log.recordings)):
+        for name in log.names:
+            log = misread(log, number, 1e3, name)
+    with pytest.raises(BadValue, match=r"come out .* m apart: lengths are not in the unit .* Set the unit"):
+        identify_team(log)
 
 
 @pytest.mark.parametrize("case", CASES)

@@ -177,15 +177,20 @@ def test_a_robot_that_is_merely_noisy_is_not_called_misread() -> None:
 
 
 def test_a_large_noisy_team_is_judged_robot_by_robot(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Not reading by reading: of twelve whom nobody misread each is left out once, and no more."""
-    judged = []
+    """Not reading by reading: of twelve whom nobody misread each is left out once; only all are read otherwise."""
+    judged, tried = [], []
 
     def counted(parts: Any, robot: int) -> Any:
         judged.append(robot)
         return left_out(parts, robot)
 
-    left_out = misread_poses._left_out
+    def read(part: Any, robot: int, reading: Any) -> Any:
+        tried.append(reading.words)
+        return _read(part, robot, reading)
+
+    left_out, _read = misread_poses._left_out, misread_poses._read
     monkeypatch.setattr(misread_poses, "_left_out", counted)
-    monkeypatch.setattr(misread_poses, "_read", lambda *_: pytest.fail("a reading was tried"))
+    monkeypatch.setattr(misread_poses, "_read", read)
     require_well_read(made(12, noise=replace(NOISY, pose_rad=8e-3, pose_m=4e-3)))
     assert judged == list(range(12))
+    assert set(tried) == {way.words for way in misread_poses.TURNS}

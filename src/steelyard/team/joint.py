@@ -32,6 +32,7 @@ from steelyard.team.hinge.team import identify_two_bodies
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.forces import with_one_reading
+from steelyard.team.misread.length_units import require_metres
 from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign
 from steelyard.team.misread.torques import with_torque_sign
@@ -127,6 +128,7 @@ class JointTeam:
                 found += tilted_bases(log, standing.fit.team.homes)
             made, path = standing.rows(log, self.highest_hz)
             down = vertical(standing.gravity(log), standing.fit.team.motion)
+        require_metres(log.names, grasps)
         placed = balance_frame(grasps).inverse() @ grasps
         require_balance(log, [body for body, _ in made], placed)
         groups = _groups(made, path, self.highest_hz, order)

@@ -1,4 +1,4 @@
-"""Whether a robot tells its positions in one unit in all its recordings: how far out they are, how far spread."""
+"""Whether positions are in the unit that was said: in all recordings of a robot, and of a team that has some size."""
 
 from __future__ import annotations
 
@@ -8,11 +8,14 @@ from steelyard.errors import BadValue
 from steelyard.findings import about
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
+from steelyard.spatial import Pose
 
 # Positions this many times as far from home, and as far spread, are millimetres beside metres.
 MANY = 100.0
 # A rest is away from home where it is farther out than so many times its spread.
 NOISE = 3.0
+# Nobody carries a payload by grasps so far apart [m].
+FARTHEST = 50.0
 
 
 def require_one_length_unit(log: TeamLog) -> None:
@@ -33,6 +36,17 @@ def require_one_length_unit(log: TeamLog) -> None:
                 f"{about(spread)} times as far: one of them is not in the unit that was said. Set the unit "
                 '("m" or "mm") that its "position" has there.'
             )
+
+
+def require_metres(names: tuple[str, ...], grasps: Pose) -> None:
+    """Raise BadValue where grasps (N,) lie farther from the first than a payload is long."""
+    apart = np.linalg.norm(grasps.position - grasps.position[0], axis=1)
+    far = int(apart.argmax())
+    if apart[far] > FARTHEST:
+        raise BadValue(
+            f"the grasps of '{names[0]}' and '{names[far]}' come out {apart[far]:.3g} m apart: lengths are not in the "
+            'unit that was said. Set the unit ("mm" or "mm/s", say) that each robot\'s "position" or velocity has.'
+        )
 
 
 def _size(track: Track) -> tuple[float, float]:
