@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.cli.table import LARGE_INERTIA, columns
+from steelyard.findings import about
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 
@@ -24,7 +25,7 @@ def versus_table(answers: Mapping[str, Estimate], truth: InertialParameters) -> 
     for name, estimate in answers.items():
         found = _errors(estimate, truth)
         cells = (
-            f"{scale * error:.2g} ({scale * std:.2g})"
+            f"{about(scale * error)} ({about(scale * std)})"
             for (error, std), (*_, scale, _) in zip(found, groups, strict=True)
         )
         rows.append((name, *cells, "yes" if estimate.parameters.validity().consistent else "no"))
