@@ -73,3 +73,13 @@ def test_short_streams_and_repeated_stamps_are_left(count: int) -> None:
         found, notes = steadied(stamps, stamps)
         assert notes == ()
         assert np.array_equal(found, stamps)
+
+
+def test_a_slow_rate_is_evened_as_well() -> None:
+    stamps = 10.0 * np.arange(120) + np.random.default_rng(5).normal(0, 0.2, 120)
+    stream = Stream("slow.csv", {"force": np.sin(0.02 * np.floor(stamps / 10 + 0.5))[:, None] * np.ones(3)}, stamps)
+    recording, notes = with_steady_stamps(Recording((stream,), np.array([0, 0, -9.81])))
+    time = recording.streams[0].time
+    assert time is not None
+    assert len(notes) == 1
+    assert np.abs(time - 10.0 * np.arange(120)).max() < 0.1

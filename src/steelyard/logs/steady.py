@@ -82,7 +82,8 @@ def _even(time: Array, index: Integers) -> Array:
     for rows in np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > _GAP * step) + 1):
         if len(rows) < _FEWEST:
             continue
-        x, pieces = index[rows].astype(float), max(int((time[rows[-1]] - time[rows[0]]) / _STEADY_S), 1)
+        x, pieces = index[rows].astype(float), int((time[rows[-1]] - time[rows[0]]) / _STEADY_S)
+        pieces = max(min(pieces, len(rows) // _FEWEST), 1)
         knees = x[np.linspace(0, len(x) - 1, pieces + 1).astype(np.int64)]
         even[rows] = make_lsq_spline(x, time[rows], np.concatenate([knees[:1], knees, knees[-1:]]), k=1)(x)
     return even
