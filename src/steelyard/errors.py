@@ -6,6 +6,7 @@ SteelyardError
  │   ├─ BadDescription    a log or team description says something impossible
  │   └─ BadValue          an argument or a column holds wrong numbers
  ├─ CannotAnswer          the data are sound but do not determine an answer (exit status 3)
+ │   └─ NoMasses          a given shape cannot follow the data, which may well answer without it
  └─ MissingDependency     an optional package is needed and not installed   (exit status 2)
 """
 
@@ -38,6 +39,10 @@ class CannotAnswer(SteelyardError):
     """Sound data that do not determine what was asked."""
 
     exit_status = 3
+
+
+class NoMasses(CannotAnswer):
+    """Parts that no masses make explain the data: it is their size or their place that is wrong."""
 
 
 class MissingDependency(SteelyardError):

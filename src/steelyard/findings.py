@@ -54,7 +54,7 @@ REMEDIES: dict[str, str] = {
     "part-unseen": "Nothing to do if the part is hidden inside; give its shape, since no scan can see it.",
     "parts-unsure": "Give --parts if you know how many, join parts of one material, or let a log of forces decide.",
     "part-not-homogeneous": "Check the shape, and that pose_in_sensor is of its own frame (that of a scan is not "
-    "a mesh's); if both are right, split the part by material.",
+    "a mesh's), not its inverse, and in the right unit (m, mm); if all are right, split the part by material.",
     "materials-tied": "Move faster, add poses, or shorten the list of materials.",
     "materials-impossible": "Add the missing material to the list, or check the shape and its units.",
     "grasp-direction-lost": "Turn the payload about a second axis as well, or move it along the missing direction.",

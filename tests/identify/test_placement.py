@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from steelyard.errors import NoMasses
 from steelyard.identify.effective import Effective
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.placement import misplaced
@@ -73,6 +74,18 @@ def test_a_scan_that_lies_elsewhere_is_named_however_much_less_it_is_trusted(
     named = [f for f in found.findings if f.code == "part-not-homogeneous"]
     assert bool(named) == said
     assert not said or "pose_in_sensor is wrong by at least that much. Shape and log see" in named[0].message
+
+
+@pytest.mark.parametrize("shift", [(3.0, 0, 0), (2.0, 2.0, 2.0)])
+def test_parts_that_can_have_no_mass_where_they_are_said_to_be_are_refused(shift: tuple[float, float, float]) -> None:
+    log = handling_log(CLUB.whole(MASSES), "paper", noise="low", seed=0)
+    one = Parts(np.arange(1), moved(shift).moments.sum(0, keepdims=True))
+    with pytest.raises(NoMasses) as caught:
+        PartMasses(one, shape_error=SCANNED).identify(log)
+    assert str(caught.value) == (
+        "No masses of these parts explain the wrench, that of 0.5 kg: the shape, of 170 cm^3, has another size or "
+        "place. Check the unit of its points, pose_in_sensor."
+    )
 
 
 def test_where_a_scan_lies_is_said_once() -> None:

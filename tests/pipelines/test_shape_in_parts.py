@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
@@ -18,7 +19,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.placement import Placement
 from steelyard.shape.scan import fuse
 from steelyard.simulate import hammer
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.sampling import surface_cloud
 
 
@@ -42,6 +43,28 @@ def test_a_cloud_becomes_the_solid_in_parts(made: hammer.Example, shape: Shape) 
     assert shape.solid.mesh.volume == pytest.approx(made.tool.parts.volume.sum(), rel=0.1)
     assert shape.parts.volume.sum() == pytest.approx(shape.solid.mesh.volume, rel=1e-9)
     assert 2 <= len(shape.parts) <= 2 * len(made.tool.parts)
+
+
+def turned_round(pose: Pose) -> Pose:
+    """A pose like that of another frame: far off, and turned."""
+    return Pose(Rotation.exp(np.array([0.0, 2.0, 1.0])), pose.position + np.array([1.5, 0.0, 0.0]))
+
+
+@pytest.mark.parametrize(
+    "wrong", [turned_round, lambda pose: Pose(pose.rotation, pose.position + np.array([0.0, 0.0, 8.0]))]
+)
+def test_a_pose_that_no_shape_can_follow_is_named_and_the_answer_is_that_of_the_log(
+    made: hammer.Example, shape: Shape, wrong: Callable[[Pose], Pose]
+) -> None:
+    assert made.recording.object_pose is not None
+    away = replace(made.recording, object_pose=wrong(made.recording.object_pose))
+    found, alone = sy.identify(away, scan=shape), sy.identify(made.recording)
+    np.testing.assert_array_equal(found.parameters.vector, alone.parameters.vector)
+    np.testing.assert_array_equal(found.covariance, alone.covariance)
+    (named,) = [f for f in found.findings if f.code == "part-not-homogeneous"]
+    assert "mm outside the object: pose_in_sensor is wrong by at least that much. The shape cannot" in named.message
+    assert "not its inverse, and in the right unit (m, mm)" in named.remedy
+    assert not any("taken as exact" in note for note in found.notes)
 
 
 def test_every_cut_is_the_whole_solid(shape: Shape) -> None:

@@ -52,6 +52,9 @@ class Bias:
         return self.kind == "free"
 
 
+# What the linear algebra raises where it breaks down.
+BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
+
 Solver = Callable[[Problem], Solution]
 
 
@@ -61,7 +64,7 @@ def within_numbers() -> Iterator[None]:
     try:
         with np.errstate(all="ignore"):
             yield
-    except (np.linalg.LinAlgError, ZeroDivisionError):
+    except BREAKDOWNS:
         raise CannotAnswer(
             "The equations of this log cannot be solved: its channels are constant, or their sizes are far from those "
             "of a held body. Check units and columns; `steelyard doctor` tells whether the installation is sound."

@@ -34,9 +34,9 @@ from steelyard.identify.part_models import (
     material_masses,
 )
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
-from steelyard.identify.placement import misplaced
+from steelyard.identify.placement import misplaced, refused, with_mass
 from steelyard.identify.problem import Problem
-from steelyard.identify.recentred import apart, followed, recentred
+from steelyard.identify.recentred import apart, followed, recentred, strayed
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
@@ -146,7 +146,7 @@ class PartMasses:
         for _ in range(RENEWALS - 1):
             free = self.density == "free" and not self.materials
             mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
-            body = _with_mass(self.parts, mean, data)
+            body = with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
         return self._of_scan(problem, data, body) if self._doubtful else self._answered(problem, data, body)
 
@@ -155,7 +155,7 @@ class PartMasses:
 
         What is wrong with the centre is wrong with the inertia. Source: scale factor of the Particle Data Group.
         """
-        drawn = self.parts.whole(self._masses(data, body, self.parts).mean)
+        drawn = with_mass(self.parts, self._masses(data, body, self.parts).mean, data)
         times = apart(data, drawn, self.shape_error.covariance(drawn))
         if times <= 1:
             return self._answered(problem, data, body)
@@ -171,7 +171,7 @@ class PartMasses:
 
     def _answered(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
         masses = self._masses(data, body, self.parts)
-        body = _with_mass(self.parts, masses.mean, data)
+        body = with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
         # Judged where the shape puts the body, as far as a scan says: what a wrong grasp moves must not hide a misfit.
         if self._doubtful:
@@ -206,17 +206,20 @@ class PartMasses:
         return self._built(problem, data, found.masses, body, spread + error, follows)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
-        """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within."""
+        """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within.
+
+        Raises NoMasses where even the largest keeps mass and centre of mass from where the log sees them.
+        """
         body = InertialParameters(data.best)
         limit = misfit_limit(data, len(self.parts))
         for doubling in range(1, DOUBLINGS):
             error = self.shape_error.scaled(2.0**doubling).covariance(self._sane(body))
             seen = data.blurred(error)
             masses = (averaged_masses if self.density == "averaged" else free_masses)(seen, self.parts)
-            body = self.parts.whole(masses.mean)
+            body = with_mass(self.parts, masses.mean, data)
             if seen.misfit(body.vector) < limit:
                 break
-        _with_mass(self.parts, masses.mean, data, LEAST_MASS)
+        with_mass(self.parts, masses.mean, data, LEAST_MASS)
         gain = error @ seen.information
         rest = np.eye(10) - gain
         B = self.parts.per_mass
@@ -225,11 +228,14 @@ class PartMasses:
         if self._doubtful:
             masses = misdrawn(data, self.parts, masses, self.shape_error)
         covariance = rest @ spread @ rest.T + error - gain @ error
+        whole, fits = nearest_body(body.vector, moved), seen.misfit(body.vector) < limit
+        if not fits and strayed(data, whole) > limit:
+            raise refused(self.parts, data)
         blur = _blur(data, error)
         masses_follow = spread @ blur
         follows = masses_follow + error @ (blur - seen.information @ masses_follow)
-        made = self._built(problem, data, masses, nearest_body(body.vector, moved), covariance, follows)
-        so = "so that the wrench fits" if seen.misfit(body.vector) < limit else "and the wrench does not fit even so"
+        made = self._built(problem, data, masses, whole, covariance, follows)
+        so = "so that the wrench fits" if fits else "and the wrench does not fit even so"
         note = f"the shape was trusted {2**doubling} times less than given, {so}"
         return replace(made, notes=(*made.notes, note))
 
@@ -336,13 +342,3 @@ def _blur(data: Effective, error: Array) -> Array:
 def _padded(phi: Array, size: int) -> Array:
     """Return phi (10,) followed by zeros (size,)."""
     return np.concatenate([phi, np.zeros(size - 10)])
-
-
-def _with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) -> InertialParameters:
-    """Return the body of the parts; raise CannotAnswer where it has only the `least` share of what the log weighs."""
-    if (body := parts.whole(mean)).mass > least * data.best[0]:
-        return body
-    raise CannotAnswer(
-        f"No masses of these parts explain the wrench, that of {data.best[0]:.3g} kg: the shape, of "
-        f"{1e6 * parts.volume.sum():.3g} cm^3, has another size or place. Check the unit of its points, pose_in_sensor."
-    )

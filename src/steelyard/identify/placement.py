@@ -5,10 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import NoMasses
+from steelyard.findings import Finding
 from steelyard.identify.effective import Effective
+from steelyard.identify.estimate import Estimate
 from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.nonnegative import nonnegative_masses
-from steelyard.inertia import forms
+from steelyard.inertia import InertialParameters, forms
 from steelyard.parts.parts import Parts
 
 # A gap counts where it is so many standard deviations wide, and wider than meshes are exact [m].
@@ -25,16 +28,21 @@ def misplaced(data: Effective, parts: Parts, least: float = LEAST) -> str:
     data   what the log says, blurred by the errors of shape and grasp
     least  a gap that is no more than this is none [m]
     """
-    mass = float(data.best[0])
+    return off(data.best, inverse_scaled(data.information), parts, least)
+
+
+def off(phi: Array, covariance: Array, parts: Parts, least: float = LEAST) -> str:
+    """Return the sentence of `misplaced` for a body phi (10,) that is known up to `covariance` (10, 10)."""
+    mass = float(phi[0])
     if mass <= 0:
         return ""
-    com = data.best[1:4] / mass
+    com = phi[1:4] / mass
     nearest = _among(parts.centroid, com)
     gap = com - nearest
     distance = float(np.linalg.norm(gap))
     ahead = gap / max(distance, 1e-12)
-    slope = np.einsum("i,ij->j", ahead, forms.com_jacobian(data.best)[:3])
-    std = float(np.sqrt(max(slope @ inverse_scaled(data.information) @ slope, 0.0)))
+    slope = np.einsum("i,ij->j", ahead, forms.com_jacobian(phi)[:3])[:4]  # none of it is of the inertia
+    std = float(np.sqrt(max(slope @ covariance[:4, :4] @ slope, 0.0)))
     if distance < max(CLEAR * std, least):
         return ""
     outside = float(ahead @ com) - float((parts.centroid @ ahead + REACH * _gyration(parts, ahead)).max())
@@ -47,6 +55,33 @@ def misplaced(data: Effective, parts: Parts, least: float = LEAST) -> str:
         f"The log puts the centre of mass {1e3 * distance:.1f} mm from where any masses of even parts would: unless "
         "one is uneven, pose_in_sensor is wrong by at least that much."
     )
+
+
+def no_masses(mass: float, parts: Parts) -> str:
+    """Return the words for parts that cannot have the mass [kg] that the log weighs where they are."""
+    return (
+        f"No masses of these parts explain the wrench, that of {mass:.3g} kg: the shape, of "
+        f"{1e6 * parts.volume.sum():.3g} cm^3, has another size or place."
+    )
+
+
+def contradicted(estimate: Estimate, parts: Parts) -> Finding:
+    """Return the finding on parts that cannot follow a log, of which `estimate` is the answer without them."""
+    where = off(estimate.parameters.vector, estimate.covariance, parts) or no_masses(estimate.mass, parts)
+    text = f"{where} The shape cannot follow this log, and was left out: the answer is the log's alone."
+    return Finding.of("part-not-homogeneous", text)
+
+
+def with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) -> InertialParameters:
+    """Return the body of the parts; raise NoMasses where it has only the `least` share of what the log weighs."""
+    if (body := parts.whole(mean)).mass > least * data.best[0]:
+        return body
+    raise refused(parts, data)
+
+
+def refused(parts: Parts, data: Effective) -> NoMasses:
+    """Return the error for parts that a log of this mass shows to lie elsewhere, or to be of another size."""
+    return NoMasses(f"{no_masses(data.best[0], parts)} Check the unit of its points, pose_in_sensor.")
 
 
 def _among(points: Array, goal: Array) -> Array:

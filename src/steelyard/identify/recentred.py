@@ -14,6 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.effective import Effective
+from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.nearest_body import nearest_body
 from steelyard.identify.people import half_trace_com, parameter_jacobian, people_jacobian
 from steelyard.inertia import InertialParameters
@@ -86,6 +87,13 @@ def apart(data: Effective, body: InertialParameters, error: Array) -> float:
     along = axes.T @ root.T @ (score[1:] - aside * score[0])
     told = seen > SEEN
     return float(np.sqrt(np.mean(along[told] ** 2 / (seen * (1 + seen))[told]))) if told.any() else 0.0
+
+
+def strayed(data: Effective, body: InertialParameters) -> float:
+    """Return the chi-square (four numbers) that mass and centre of a body leave, whatever the inertia."""
+    said, known = _of_log(data, body)
+    score = said @ (data.pull - data.information @ body.vector)
+    return float(score @ inverse_scaled(known) @ score)
 
 
 def _of_log(data: Effective, body: InertialParameters) -> tuple[Array, Array]:

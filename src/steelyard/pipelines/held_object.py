@@ -14,10 +14,11 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer, NoMasses
 from steelyard.findings import AT_REST, BARE, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias, within_numbers
+from steelyard.identify.fit import BREAKDOWNS, Bias, within_numbers
+from steelyard.identify.placement import contradicted
 from steelyard.identify.problem import ADD_POSES
 from steelyard.identify.shape_error import MEASURED
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
@@ -80,15 +81,15 @@ def identify(
     shape = None if parts is None else _shape(parts, recording.object_pose, recording.object_pose_std)
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, known)
     with _beside(before):
-        estimate = load.estimate()
+        load, estimate = load.followed()
     drift = drift_of(log)
     late = after(log, estimate, aligned, recording, drift)
     if load.bias.free and not load.bias.drift and drift and drift.sure and "base-tilted" not in {f.code for f in late}:
-        load = replace(load, bias=replace(load.bias, drift=True))
-        estimate = load.estimate().noted(f"{DRIFT_ALLOWED}, as the log shows (most surely {drift.surest_words})")
+        load, estimate = replace(load, bias=replace(load.bias, drift=True)).followed()
+        estimate = estimate.noted(f"{DRIFT_ALLOWED}, as the log shows (most surely {drift.surest_words})")
         late = after(log, estimate, aligned, recording, drift)
     late = late if unmeasured else (*late, *examine_masses(log, (*before, *late)))
-    if parts is None:
+    if load.shape is None:
         late = examine_wrench_unit(log, estimate, lambda rows: replace(load, log=rows).estimate(), before, late)
     touched, late = _not_following(touched, before, late)
     estimate = load.without_tool(estimate).noted(
@@ -98,20 +99,20 @@ def identify(
     estimate, of_sensor = examine_sensor(log, recording, estimate, (*before, *late), load.bias.drift)
     if any(f.code == "sensor-turned" for f in of_sensor):
         before = tuple(f for f in before if f.code != "sensor-turned")  # the fit tells it better
-    if parts is None:
+    if load.shape is None:
         of_sensor = (*of_sensor, *examine_body(estimate, (*before, *late, *of_sensor)))
-    if aligned.acceleration_from in ENCODERS and parts is None:
+    if aligned.acceleration_from in ENCODERS and load.shape is None:
         estimate = allow_softness(log, estimate)
     aligned = replace(aligned, notes=()) if unmeasured else aligned
     if not (parts is None or isinstance(parts, Parts)):
-        before = (*before, *(finding.instead(WEIGHED) for finding in parts.findings))
+        before = (*before, *(finding.instead(WEIGHED if load.shape else {}) for finding in parts.findings))
     # What is wrong with the log stands before what follows from it.
     own, estimate = estimate.findings, replace(_with_gain(estimate, aligned), findings=())
     told = (*before, *late, *of_sensor, *own, *aligned.findings, *touched)
     estimate = estimate.with_findings(*(f for f in told if load.bias.free or f.code not in OF_BIAS))
     if parts is not None and shape is not None:
-        estimate = _looked_at(estimate, parts, shape)
-        if not any(recording.object_pose_std or ()):
+        estimate = _looked_at(estimate, parts, shape, load.shape is not None)
+        if load.shape and not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     if "weight-compensated" in estimate.codes():
         estimate = estimate.without_inertia("What a controller leaves of a weight has no inertia of its own.")
@@ -168,8 +169,11 @@ def identify_rows(
         raise BadValue('gravity "unknown" needs a recording with rotations: rows know gravity in the sensor only.')
     shape = None if parts is None else _shape(parts, pose or Pose.identity(), pose_std)
     load = _Load(log, Bias(options.bias, drift=options.drift), options, shape, tool)
-    estimate = load.without_tool(load.estimate())
-    return estimate if parts is None or shape is None else _looked_at(estimate, parts, shape)
+    load, estimate = load.followed()
+    estimate = load.without_tool(estimate)
+    if parts is None or shape is None:
+        return estimate
+    return _looked_at(estimate, parts, shape, load.shape is not None)
 
 
 @dataclass(frozen=True)
@@ -198,6 +202,16 @@ class _Load:
         light = maybe_hollow(error, estimate.mass, float(parts[0].volume.sum()))
         return replace(self, shape=(parts, prior, light[0])).estimate().noted(light[1]) if light else estimate
 
+    def followed(self) -> tuple[_Load, Estimate]:
+        """Return what was held, with the load, which has lost a shape that cannot follow what the log alone can say."""
+        try:
+            return self, self.estimate()
+        except (NoMasses, *BREAKDOWNS):
+            if self.shape is None:
+                raise
+            alone = replace(self, shape=None)
+            return alone, alone.estimate()
+
     def without_tool(self, estimate: Estimate) -> Estimate:
         """Return the object alone."""
         if self.tool is None:
@@ -215,10 +229,11 @@ class _Load:
         return shared.noted(f"one sensor bias is shared with the tool's run (p = {p:.2g})")
 
 
-def _looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed) -> Estimate:
-    """Return the estimate with what its densities give away, first of all findings."""
+def _looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed, followed: bool) -> Estimate:
+    """Return the estimate with what its densities give away, and a shape that was not followed, before all findings."""
     dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts)
-    return replace(estimate, findings=(*dense, *estimate.findings))
+    lost = () if followed else (contradicted(estimate, max(shape[0], key=len)),)
+    return replace(estimate, findings=(*dense, *lost, *estimate.findings))
 
 
 def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
