@@ -36,7 +36,8 @@ def finite(name: str, values: ArrayLike) -> Array:
     if not good.all():
         bad = np.argwhere(~good)
         where = tuple(int(i) for i in bad[0])
-        raise BadValue(f"{name} must be finite; {len(bad)} entries are not, the first at index {where}.")
+        many = "1 entry is" if len(bad) == 1 else f"{len(bad)} entries are"
+        raise BadValue(f"{name} must be finite; {many} not, the first at index {where}.")
     return array
 
 

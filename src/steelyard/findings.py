@@ -132,6 +132,11 @@ def percent(share: float) -> str:
     return f"{100 * share:.0f} %" if share > 0.1 else f"{100 * share:.2g} %"
 
 
+def counted(count: int, noun: str) -> str:
+    """Return a number of things as a message says it: "1 part", "2 parts"."""
+    return f"{count} {noun}{'s' * (count != 1)}"
+
+
 def about(value: float) -> str:
     """Return a factor as a message says it: two figures, without a power of ten."""
     return f"{float(f'{value:.2g}'):g}"

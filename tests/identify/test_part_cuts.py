@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+
 import numpy as np
 import pytest
 
@@ -10,6 +12,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.problem import Problem
+from steelyard.identify.shape_error import ShapeError
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log
@@ -75,19 +78,30 @@ def test_a_prior_tips_the_scale_between_cuts_alike(rod: Parts) -> None:
     assert tipped[1] > plain[1]
 
 
-def test_a_cut_that_explains_nothing_is_left_out_with_a_word(rod: Parts, monkeypatch: pytest.MonkeyPatch) -> None:
-    right, fine = cuts(rod)[2:]
+@pytest.mark.parametrize(("cut", "said"), [(0, "1 part"), (3, "6 parts")])
+def test_a_cut_that_explains_nothing_is_left_out_with_a_word(
+    rod: Parts, cut: int, said: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    right, other = cuts(rod)[2], cuts(rod)[cut]
     log, whole = log_of(rod, 2), PartMasses.answered
 
     def refusing(self: PartMasses, log: MotionLog, problem: Problem) -> Estimate:
-        if len(self.parts) == len(fine):
+        if len(self.parts) == len(other):
             raise CannotAnswer("no masses")
         return whole(self, log, problem)
 
     monkeypatch.setattr(PartMasses, "answered", refusing)
-    answer, weight = PartCuts((right, fine), np.array([0.0, 9.0]), bias="none").weighed(log)
+    monkeypatch.setattr(PartCuts, "_weights", lambda *_: np.array([0.5, 0.5]))
+    answer, weight = PartCuts((right, other), bias="none").weighed(log)
     assert weight.tolist() == [1.0, 0.0]
-    assert answer.notes[-1] == "the cut into 6 parts explains nothing and was left out"
+    assert answer.notes[-1] == f"the cut into {said} explains nothing and was left out"
+
+
+def test_one_part_is_not_many(rod: Parts) -> None:
+    one, _, right, _ = cuts(rod)
+    shape = PartCuts((one, right), np.array([2.0, 0.0]), bias="none", shape_error=ShapeError(com_m=1e-2, stretch=0.5))
+    log = handling_log(one.whole(np.array([0.5])), noise="high", seed=0)
+    assert re.search(r"what the log says of them: 1 part \d+ %, 2 parts \d+ %$", shape.identify(log).notes[-1])
 
 
 def test_wrong_options_are_named(rod: Parts) -> None:

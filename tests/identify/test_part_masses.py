@@ -164,6 +164,14 @@ def test_more_parts_than_still_poses_can_tell() -> None:
     assert abs(found.mass / float(TRUTH.mass) - 1) < 0.01
 
 
+def test_one_combination_is_not_many() -> None:
+    half = Parts(np.arange(2), np.tile(boxes().moments.sum(0) / 2, (2, 1)))
+    body = half.whole(half.volume * 1000.0)
+    found = PartMasses(half, bias="none").identify(log_of(body, "low", 0))
+    (told,) = [f.message for f in found.findings if f.code == "more-parts-than-rank"]
+    assert told == "The data tell 1 combination of the masses of 2 parts apart; the rest is the prior's."
+
+
 def test_moved_parts_keep_their_masses() -> None:
     parts = boxes()
     found = PartMasses(parts, bias="none", shape_error=EXACT).identify(log_of(TRUTH, "none", 0))

@@ -101,7 +101,7 @@ BAD: dict[str, tuple[Callable[[], bytes], str]] = {
     "far vertex": (swapped("3 0 1 2", "3 0 1 9"), "F: triangles must name vertices 0..2; got 0..9."),
     "nan": (
         swapped("1 0 0", "1 0 nan"),
-        "F: mesh vertices must be finite; 1 entries are not, the first at index (1, 2).",
+        "F: mesh vertices must be finite; 1 entry is not, the first at index (1, 2).",
     ),
 }
 

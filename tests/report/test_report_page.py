@@ -305,9 +305,7 @@ def test_numbers_that_are_none_are_refused(full: Report) -> None:
     assert full.residuals is not None
     bad = np.array(full.residuals.force)
     bad[3, 1] = np.nan
-    with pytest.raises(
-        BadValue, match=r"force residuals must be finite; 1 entries are not, the first at index \(3, 1\)"
-    ):
+    with pytest.raises(BadValue, match=r"force residuals must be finite; 1 entry is not, the first at index \(3, 1\)"):
         replace(full.residuals, force=bad)
     with pytest.raises(BadValue, match=r"residuals need 500 rows of torque; got \(499,\)"):
         replace(full.residuals, torque=full.residuals.torque[:-1])

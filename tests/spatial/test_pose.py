@@ -133,7 +133,7 @@ def test_batch_shapes_broadcast() -> None:
         ),
         (
             lambda: Pose(Rotation.identity(), [0, np.inf, 0]),
-            "position must be finite; 1 entries are not, the first at index (1,).",
+            "position must be finite; 1 entry is not, the first at index (1,).",
         ),
         (lambda: Pose.from_matrix(np.eye(3)), "pose matrix must have shape (..., 4, 4); got (3, 3)."),
         (

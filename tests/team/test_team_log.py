@@ -79,7 +79,7 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     ),
     "falling clock": (
         lambda: Track.of([0.0, 0.02, 0.01], force=np.ones((3, 3))),
-        "time must rise from row to row; 1 rows do not, the first is row 3.",
+        "time must rise from row to row; 1 row does not, the first is row 3.",
     ),
     "lengths": (
         lambda: Track.of(TIME, force=np.ones((4, 3))),

@@ -13,6 +13,7 @@ from steelyard.cli.console import print_json, progress_bar, say, say_if_compilin
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
+from steelyard.findings import counted
 
 
 @click.group(cls=Group, context_settings=HELP)
@@ -104,7 +105,9 @@ def build(
         print_json({"folder": str(folder), "seed": seed, "seconds": round(seconds, 3), "objects": rows})
         return
     for row in rows:
-        click.echo(f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {row['parts']:2d} parts  {row['half']}")
+        click.echo(
+            f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {counted(row['parts'], 'part'):8s}  {row['half']}"
+        )
     say(f"{len(rows)} object folder{'s' * (len(rows) != 1)} in {folder} (seed {seed}, {seconds:.1f} s).")
     if views:
         one = folder / rows[0]["name"]

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import Finding, counted
 from steelyard.identify import noise_cost
 from steelyard.identify.dense import eigen, product, product_transposed
 from steelyard.identify.estimate import Estimate, Evidence
@@ -249,7 +249,7 @@ def _lost(lost: Mask, problem: Problem) -> CannotAnswer:
         "the centre of mass along z",
     )
     poses = len(np.unique(problem.block_number[problem.block_number >= 0]))
-    seen = f"{int(problem.samples)} rows" + (f" in {poses} still poses or time blocks" if poses else "")
+    seen = counted(int(problem.samples), "row") + (f" in {poses} still poses or time blocks" if poses else "")
     return CannotAnswer(
         f"The data do not fix {', '.join(n for n, gone in zip(names, lost, strict=True) if gone)} ({seen}). "
         + ADD_POSES

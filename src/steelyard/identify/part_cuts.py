@@ -16,6 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import counted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.part_masses import PartMasses
@@ -94,7 +95,7 @@ class PartCuts:
                 estimates.append(answer(self._of(int(k))))
             except CannotAnswer as error:
                 weight[k], refused = 0.0, error
-                left_out.append(f"the cut into {len(self.cuts[k])} parts explains nothing and was left out")
+                left_out.append(f"the cut into {counted(len(self.cuts[k]), 'part')} explains nothing and was left out")
         if not estimates and refused is not None:
             raise refused
         weight = weight / weight.sum()
@@ -121,5 +122,7 @@ class PartCuts:
     def _said(self, weight: Array) -> str:
         """Return what the log made of the cuts."""
         order = np.argsort(-weight, kind="stable")
-        shares = ", ".join(f"{len(self.cuts[k])} parts {100 * weight[k]:.0f} %" for k in order if weight[k] > 0)
+        shares = ", ".join(
+            f"{counted(len(self.cuts[k]), 'part')} {100 * weight[k]:.0f} %" for k in order if weight[k] > 0
+        )
         return f"averaged over cuts of the shape by what the log says of them: {shares}"

@@ -8,7 +8,7 @@ import numpy as np
 from scipy.special import gammaincinv
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, counted
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.material_choice import Choices
@@ -49,7 +49,8 @@ def part_findings(
     rank = seen_rank(parts, data.information, estimate.mass)
     if rank < len(parts):
         message = (
-            f"The data tell {rank} combinations of the masses of {len(parts)} parts apart; the rest is the prior's."
+            f"The data tell {counted(rank, 'combination')} of the masses of {counted(len(parts), 'part')} apart; "
+            "the rest is the prior's."
         )
         out.append(Finding.of("more-parts-than-rank", message))
         if len(parts) >= FEWEST_FOR_PLANE and flat(parts.centroid):

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
 from steelyard.logs.bandwidth import rigid_up_to
 from steelyard.logs.conditioning import noise_std, sampling_rate, signal
@@ -206,7 +206,7 @@ def _align_timed(given: _Prepared) -> Aligned:
         return replace(lower, notes=(*lower.notes, say.swings(rigid)))
     kept = ~touched & given.covered(time, clocks.delays_s)
     if kept.sum() < _FEWEST_ROWS:
-        raise CannotAnswer(f"only {int(kept.sum())} rows are left after alignment; record a longer stretch.")
+        raise CannotAnswer(f"only {counted(int(kept.sum()), 'row')} left after alignment; record a longer stretch.")
     log, motion = _log(given, time[kept], felt.rows(kept), clocks)
     findings = (
         *say.delay_findings(clocks, delayed, given.felt.stream),
@@ -280,7 +280,9 @@ def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[st
         ok = inner[0] & inner[1]
     pick = np.flatnonzero(ok)
     if len(pick) < _FEWEST_ROWS:
-        raise CannotAnswer(f"the streams share only {len(pick)} rows in time; record a longer stretch on all.")
+        raise CannotAnswer(
+            f"the streams share only {counted(len(pick), 'row')} in time; record a longer stretch on all."
+        )
     pick = pick[:: max(len(pick) // _FIT_ROWS, 1)]
     question = Question(time[pick], felt.rows(pick), given.kinematics, given.imu, given.unknown, given.known, reach)
     clocks = refine(question, {**given.known, **scan(question)})

@@ -63,7 +63,8 @@ def tap_findings(taps: Array, start: float, rows: int, total: int) -> tuple[Find
         return ()
     at = ", ".join(f"{t - start:.2f}" for t in taps.mean(1)[:8]) + (", ..." if len(taps) > 8 else "")
     bursts = "one short burst (tap or knock)" if len(taps) == 1 else f"{len(taps)} short bursts (taps or knocks)"
-    return (Finding.of("outliers", f"Found {bursts} at {at} s; {rows} of {total} rows were left out."),)
+    were = "was" if rows == 1 else "were"
+    return (Finding.of("outliers", f"Found {bursts} at {at} s; {rows} of {total} rows {were} left out."),)
 
 
 def planar_finding(gravity: Array) -> tuple[Finding, ...]:

@@ -18,6 +18,7 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
+from steelyard.findings import counted
 from steelyard.spatial import Pose, Rotation
 
 CHANNELS: Mapping[str, str] = MappingProxyType(
@@ -59,7 +60,8 @@ class Track:
         falling = np.diff(time) <= 0
         if falling.any():
             row = int(np.argmax(falling)) + 2  # counted from 1, the later of the two
-            raise BadValue(f"time must rise from row to row; {int(falling.sum())} rows do not, the first is row {row}.")
+            many = f"{counted(int(falling.sum()), 'row')} {'does' if falling.sum() == 1 else 'do'} not"
+            raise BadValue(f"time must rise from row to row; {many}, the first is row {row}.")
         object.__setattr__(self, "time", time)
         channels = {name: _accepted(name, values, len(time)) for name, values in self.channels.items()}
         object.__setattr__(self, "channels", MappingProxyType(channels))

@@ -131,7 +131,8 @@ def _alone(xyz: Array, reach: float) -> Mask:
 
 
 def _strays(some: int, of: int) -> Finding:
-    text = f"{some} of {of} points lie far from all others; they were left out."
+    lies, were = ("lies", "it was") if some == 1 else ("lie", "they were")
+    text = f"{some} of {of} points {lies} far from all others; {were} left out."
     return Finding("outliers", text, "Nothing to do if the scan has stray points.")
 
 
