@@ -100,6 +100,26 @@ def camera(**change: object) -> Callable[[Path], None]:
     return make
 
 
+CAMERA = "width, height, fx, fy, cx, cy, depth_unit_m"
+COLUMNS = "name, x, y, z, qw, qx, qy, qz"
+
+
+def without(*keys: str) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        path = folder / "camera.json"
+        path.write_text(json.dumps({k: v for k, v in json.loads(path.read_text()).items() if k not in keys}))
+
+    return make
+
+
+def headed(old: str, new: str) -> Callable[[Path], None]:
+    def make(folder: Path) -> None:
+        path = folder / "poses.csv"
+        path.write_text(path.read_text().replace(old, new, 1))
+
+    return make
+
+
 def pose(old: str, new: str) -> Callable[[Path], None]:
     def make(folder: Path) -> None:
         lines = (folder / "poses.csv").read_text().splitlines()
@@ -120,6 +140,11 @@ WRONG: list[tuple[str, Callable[[Path], object], str]] = [
     ("not a number", camera(fy="wide"), '"fy" must be a finite number'),
     ("kilometres", camera(depth_unit_m=0.9), "puts the scene"),
     ("no camera", lambda f: (f / "camera.json").unlink(), "this file is missing"),
+    ("no fx", without("fx"), rf'camera.json: "fx" is missing\. It needs {CAMERA}\.$'),
+    ("no fx, no cy", without("cy", "fx"), rf'camera.json: "fx", "cy" are missing\. It needs {CAMERA}\.$'),
+    ("camera a list", lambda f: (f / "camera.json").write_text("[]"), rf"expected one JSON object with {CAMERA}\.$"),
+    ("no x", headed("name,x,", "name,a,"), rf'poses.csv: "x" is missing among its columns\. It needs {COLUMNS}\.$'),
+    ("no header", headed(COLUMNS.replace(" ", ""), "1,2"), rf"expected the columns {COLUMNS} and a row per view\.$"),
     ("no poses", lambda f: (f / "poses.csv").unlink(), "this file is missing"),
     ("long quaternion", pose("qw", "3"), "must have length 1"),
     ("nan", pose("x", "nan"), "line 3 holds NaN"),
@@ -127,6 +152,8 @@ WRONG: list[tuple[str, Callable[[Path], object], str]] = [
     ("leaves the folder", pose("name", "../../etc/passwd"), "is no name of a view"),
     ("twice", pose("name", "0000"), "named 2 times"),
     ("bad table", lambda f: (f / "table.json").write_text('{"normal": [0, 0, 2], "offset_m": 0}'), "unit vector"),
+    ("table without offset", lambda f: (f / "table.json").write_text('{"normal": [0, 0, 1]}'),
+     r'table.json: "offset_m" is missing\. It needs normal, offset_m\.$'),
 ]  # fmt: skip
 
 

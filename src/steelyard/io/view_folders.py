@@ -54,9 +54,16 @@ def _object(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
         raise BadFile(f"{path}: this file is missing. It needs {', '.join(keys)}.") from None
     except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
         raise BadFile(f"{path}: expected a JSON file; {error}.") from None
-    if not isinstance(values, dict) or not set(keys) <= set(values):
+    if not isinstance(values, dict):
         raise BadFile(f"{path}: expected one JSON object with {', '.join(keys)}.")
+    if missing := [key for key in keys if key not in values]:
+        raise BadFile(f"{path}: {_named(missing)} missing. It needs {', '.join(keys)}.")
     return values
+
+
+def _named(missing: list[str]) -> str:
+    """Return what is missing, as the subject of a sentence."""
+    return ", ".join(f'"{key}"' for key in missing) + (" is" if len(missing) == 1 else " are")
 
 
 def _number(path: Path, key: str, value: Any) -> float:
@@ -92,8 +99,11 @@ def _poses(path: Path) -> tuple[list[str], Pose]:
     except (OSError, UnicodeDecodeError, csv.Error) as error:
         raise BadFile(f"{path}: cannot be read as CSV; {error}.") from None
     line, rows = [number for number, _ in numbered], [row for _, row in numbered]
-    if not rows or not set(_COLUMNS) <= {str(key) for key in rows[0]}:
+    missing = [key for key in _COLUMNS if not rows or key not in rows[0]]
+    if len(missing) == len(_COLUMNS):
         raise BadFile(f"{path}: expected the columns {', '.join(_COLUMNS)} and a row per view.")
+    if missing:
+        raise BadFile(f"{path}: {_named(missing)} missing among its columns. It needs {', '.join(_COLUMNS)}.")
     names, numbers = [], np.empty((len(rows), 7))
     for k, row in enumerate(rows):
         names.append(_name(path, line[k], str(row["name"] or "")))
