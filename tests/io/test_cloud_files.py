@@ -100,14 +100,24 @@ def test_holes_of_an_organised_cloud_are_left_out(tmp_path: Path) -> None:
     xyz[::2] = np.nan
     np.savez(tmp_path / "a.npz", xyz=xyz, rgb=CLOUD.rgb)
     assert np.array_equal(read_cloud(tmp_path / "a.npz").xyz, CLOUD.xyz[1::2])
-    xyz[1, 0] = np.nan
-    xyz[1, 1] = 0
-    np.savez(tmp_path / "b.npz", xyz=xyz)
-    with pytest.raises(BadFile, match="points must be finite; 1 of 50 are not, the first is point 2"):
-        read_cloud(tmp_path / "b.npz")
+    assert read_cloud(tmp_path / "a.npz").left_out == 25
 
 
-@pytest.mark.parametrize(("points", "what"), [(0, "the file holds no points"), (40, "all 40 points are NaN")])
+@pytest.mark.parametrize("bad", [np.nan, np.inf, -np.inf])
+def test_a_point_with_one_number_that_is_none_is_left_out(tmp_path: Path, bad: float) -> None:
+    xyz = CLOUD.xyz.copy()
+    xyz[1, 0], xyz[7, 2], xyz[8] = bad, bad, bad
+    np.savez(tmp_path / "b.npz", xyz=xyz, rgb=CLOUD.rgb, label=np.arange(50))
+    read = read_cloud(tmp_path / "b.npz")
+    kept = np.delete(np.arange(50), [1, 7, 8])
+    assert read.left_out == 3
+    np.testing.assert_array_equal(read.xyz, CLOUD.xyz[kept])
+    np.testing.assert_array_equal(read.label, kept)
+
+
+@pytest.mark.parametrize(
+    ("points", "what"), [(0, "the file holds no points"), (40, "all 40 points are NaN or infinite")]
+)
 def test_a_cloud_without_points_is_refused_with_what_to_do(tmp_path: Path, points: int, what: str) -> None:
     np.savez(tmp_path / "a.npz", xyz=np.full((points, 3), np.nan))
     with pytest.raises(BadFile) as error:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -43,6 +44,23 @@ def test_a_cloud_becomes_the_solid_in_parts(made: hammer.Example, shape: Shape) 
     assert shape.solid.mesh.volume == pytest.approx(made.tool.parts.volume.sum(), rel=0.1)
     assert shape.parts.volume.sum() == pytest.approx(shape.solid.mesh.volume, rel=1e-9)
     assert 2 <= len(shape.parts) <= 2 * len(made.tool.parts)
+
+
+@pytest.mark.parametrize(
+    ("lost", "said"),
+    [(0, []), (1, ["1 of {} points of the cloud is NaN"]), (7, ["7 of {} points of the cloud are NaN"])],
+)
+def test_points_without_a_place_are_counted(
+    made: hammer.Example, cloud: Cloud, tmp_path: Path, lost: int, said: list[str]
+) -> None:
+    xyz = np.concatenate([cloud.xyz, np.full((lost, 3), np.inf)])
+    np.savez(tmp_path / "cloud.npz", xyz=xyz)
+    found = sy.identify(made.recording, scan=tmp_path / "cloud.npz")
+    notes = [note for note in found.notes if "points of the cloud" in note]
+    assert notes == [f"{words.format(len(xyz))} or infinite: left out" for words in said]
+    np.testing.assert_array_equal(
+        found.parameters.vector, sy.identify(made.recording, scan=Cloud(cloud.xyz)).parameters.vector
+    )
 
 
 def turned_round(pose: Pose) -> Pose:

@@ -60,6 +60,7 @@ def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
             for k, name in enumerate(made.names)
         ],
         "sureness": {n: round(float(s), 4) for n, s in enumerate(sureness, 1) if s > 1e-3},
+        "notes": list(shape.notes),
         "findings": [finding.plain() for finding in shape.findings],
         "output": None if output is None else str(output),
     }
@@ -86,6 +87,8 @@ def _table(shape: Shape, scan: Path, output: Path | None) -> str:
         order = sorted(range(len(made.sureness)), key=lambda k: -made.sureness[k])[:4]
         said = ", ".join(f"{k + 1}: {100 * made.sureness[k]:.0f} %" for k in order if made.sureness[k] > 0.005)
         lines += ["", f"  How many parts, by shape and colour: {said}. A log of forces can decide further."]
+    if shape.notes:
+        lines += ["", *(f"  note   {note}" for note in shape.notes)]
     if output is not None:
         lines += ["", f"Parts written to {output}. Look at them: steelyard report RESULT --parts {output}"]
     return "\n".join([*lines, "", *finding_lines(shape.findings)])

@@ -22,9 +22,9 @@ _NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
 
 
 def read_cloud(path: Path | str) -> Cloud:
-    """Read a cloud in metres by the ending of its name; points that are NaN (holes of an organised PCD) are left out.
+    """Read a cloud in metres by the ending of its name; raises BadFile.
 
-    Raises BadFile.
+    Points with NaN or infinity, as in the holes of an organised PCD, are left out and counted.
     """
     path = Path(path)
     if not path.is_file():
@@ -103,27 +103,17 @@ def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any
     xyz = np.asarray(xyz, np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
-    holes = np.isnan(xyz).all(1)
+    holes = ~np.isfinite(xyz).all(1)
     if holes.all():
-        what = f"all {len(xyz)} points are NaN" if len(xyz) else "the file holds no points"
+        what = f"all {len(xyz)} points are NaN or infinite" if len(xyz) else "the file holds no points"
         raise BadFile(f"{path}: {what}. Write the cloud again, or scan the object again.")
-    _require_finite(path, xyz, holes)
     try:
         whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
         if holes.any():
             xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
-        return Cloud(xyz, *whole)
+        return Cloud(xyz, *whole, left_out=int(holes.sum()))
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
-
-
-def _require_finite(path: Path, xyz: Any, holes: Any) -> None:
-    """Raise BadFile where points that are no holes hold NaN or infinity, the first of them counted from 1."""
-    bad = np.flatnonzero(~np.isfinite(xyz).all(1) & ~holes)
-    if len(bad):
-        raise BadFile(
-            f"{path}: points must be finite; {len(bad)} of {len(xyz)} are not, the first is point {bad[0] + 1}."
-        )
 
 
 def write_cloud(cloud: Cloud, path: Path | str) -> None:

@@ -106,6 +106,7 @@ def identify(
     aligned = replace(aligned, notes=()) if unmeasured else aligned
     if not (parts is None or isinstance(parts, Parts)):
         before = (*before, *(finding.instead(WEIGHED if load.shape else {}) for finding in parts.findings))
+        estimate = estimate.noted(*parts.notes)
     # What is wrong with the log stands before what follows from it.
     own, estimate = estimate.findings, replace(_with_gain(estimate, aligned), findings=())
     told = (*before, *late, *of_sensor, *own, *aligned.findings, *touched)

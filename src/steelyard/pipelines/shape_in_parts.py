@@ -39,12 +39,14 @@ class Shape:
     segmentation  its parts as shape and colour alone say
     scan          the fusion of the views that it came from, None where a cloud was given
     asked         whether the number of parts was asked for, so that a log is offered no other
+    notes         what was done to the points as they were given
     """
 
     solid: Solid
     segmentation: Segmentation
     scan: Scan | None = None
     asked: bool = False
+    notes: tuple[str, ...] = ()
 
     @property
     def parts(self) -> Parts:
@@ -109,4 +111,14 @@ def shape_of(
     measured = (seen.cloud if isinstance(seen, Scan) else seen).normals is not None
     cloud = solid.cloud if measured else replace(solid.cloud, normals=None)
     made = segment(cloud, solid, parts=parts)
-    return Shape(solid, made, seen if isinstance(seen, Scan) else None, parts is not None)
+    scan, given = (seen, seen.cloud) if isinstance(seen, Scan) else (None, seen)
+    return Shape(solid, made, scan, parts is not None, _notes(given))
+
+
+def _notes(given: Cloud) -> tuple[str, ...]:
+    """Return how many points of a cloud had no place, if any."""
+    if not given.left_out:
+        return ()
+    are = "is" if given.left_out == 1 else "are"
+    of = len(given) + given.left_out
+    return (f"{given.left_out} of {of} points of the cloud {are} NaN or infinite: left out",)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from typing import Any
 
@@ -32,6 +32,7 @@ class Cloud:
     normals  (N, 3) unit vectors that leave the solid, None where they are not known
     seen     (N,) whether a camera saw the colour of each point; the rest have that of the nearest that one saw.
              None where all were seen
+    left_out how many further points were given without a place: NaN or infinite
     """
 
     xyz: Array
@@ -39,6 +40,7 @@ class Cloud:
     label: Integers | None = None
     normals: Array | None = None
     seen: Mask | None = None
+    left_out: int = field(default=0, kw_only=True)
 
     def __post_init__(self) -> None:
         xyz = check.vectors("points", self.xyz)
