@@ -2,17 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 import steelyard as sy
+from steelyard.api import shape_of
 from steelyard.errors import BadDescription, BadValue
 from steelyard.io.object_pose import read_object_pose
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recording_files import write_recording
 from steelyard.simulate import hammer
+from steelyard.workshop.sampling import surface_cloud
 
 TABLE = (
     '{ position = [1, 2, 120], unit = "mm", rotation = [0,-1,0, 1,0,0, 0,0,1], form = "matrix", '
@@ -35,6 +38,45 @@ BAD = {
     "{ position = [0, 0, 0] }": 'give both "rotation" and "position"',
     "{ position = [0, 0 }": "pose in sensor: ",
 }
+
+
+WHERE = "pose in sensor, [object], pose_in_sensor: "
+PLACE = "{ position = [0, 0, 0], rotation = [1,0,0, 0,1,0, 0,0,1]"
+BAD_STD = {
+    "std_mm = 2": '"std_deg" is missing beside "std_mm". Give both, or neither where the pose is exact.',
+    "std_deg = 0": '"std_mm" is missing beside "std_deg". Give both, or neither where the pose is exact.',
+    "std_mm = 0, std_deg = 0": '"std_mm" and "std_deg" are both 0. Leave both out where the pose is exact.',
+    "std_mm = -1, std_deg = 1": '"std_mm" must be zero or more; got -1.',
+    "std_mm = 1, std_deg = nan": '"std_deg" must be a finite number; got nan.',
+}
+
+
+@pytest.mark.parametrize("std", BAD_STD)
+def test_what_is_wrong_with_a_spread_is_named(std: str) -> None:
+    with pytest.raises(BadDescription) as caught:
+        read_object_pose(f"{PLACE}, {std} }}")
+    assert str(caught.value) == WHERE + BAD_STD[std]
+
+
+@pytest.mark.parametrize(("mm", "deg"), [(0, 1), (2, 0)])
+def test_position_or_turn_alone_may_be_uncertain(mm: float, deg: float) -> None:
+    """Zero is what a very small spread comes to, for mesh and scan, and all that is said is finite."""
+    made = hammer.recording(0)
+    assert made.recording.object_pose is not None
+    seen = shape_of(surface_cloud(made.tool))
+    for given in ({"parts": made.tool.parts}, {"scan": seen}):
+        found = []
+        for least in (0.0, 1e-6):
+            said = read_object_pose(f"{PLACE}, std_mm = {mm or least}, std_deg = {deg or least} }}").std
+            recording = replace(made.recording, object_pose_std=said)
+            found.append(sy.identify(recording, **given))
+        zero, small = found
+        assert np.isfinite(zero.parameters.vector).all()
+        assert np.isfinite(zero.std).all()
+        assert (zero.std > 0).all()
+        np.testing.assert_allclose(zero.parameters.vector, small.parameters.vector, rtol=1e-4, atol=1e-8)
+        np.testing.assert_allclose(zero.std, small.std, rtol=1e-3)
+        assert not any("taken as exact" in note for note in zero.notes)
 
 
 @pytest.mark.parametrize("text", BAD)

@@ -87,6 +87,13 @@ class Entry:
             raise self.error(f'"{key}" must be a finite number; got {value!r}.')
         return float(value)
 
+    def spread(self, key: str, largest: float = math.inf) -> float:
+        """Return one finite standard deviation, zero or more, and not above `largest`."""
+        value = self.number(key)
+        if value < 0:
+            raise self.error(f'"{key}" must be zero or more; got {value:g}.')
+        return self.bounded(key, value, largest)
+
     def positive(self, key: str, largest: float = math.inf) -> float:
         """Return one finite number above zero, and not above `largest`."""
         value = self.number(key)

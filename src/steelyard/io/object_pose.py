@@ -15,6 +15,8 @@ from steelyard.spatial import Pose
 
 _EXAMPLE = '{ position = [0, 0, 0.12], unit = "m", rotation = [1,0,0, 0,1,0, 0,0,1], form = "matrix" }'
 
+_STD = ("std_mm", "std_deg")
+
 
 @dataclass(frozen=True, eq=False)
 class ObjectPose:
@@ -34,14 +36,24 @@ def parse_object_pose(entry: Entry) -> ObjectPose | None:
     if "pose_in_sensor" not in entry:
         return None
     table = entry.table("pose_in_sensor")
-    rotation, position = parse_pose(table, "std_mm", "std_deg")
+    rotation, position = parse_pose(table, *_STD)
     if rotation is None or position is None:
         raise table.error('give both "rotation" and "position".')
-    if "std_mm" not in table and "std_deg" not in table:
-        return ObjectPose(Pose(rotation, position))
-    return ObjectPose(
-        Pose(rotation, position), (table.positive("std_mm") * 1e-3, float(np.radians(table.positive("std_deg"))))
-    )
+    return ObjectPose(Pose(rotation, position), _std(table))
+
+
+def _std(table: Entry) -> tuple[float, float] | None:
+    """Return the standard deviations [m], [rad], of which one may be zero; None where the pose is exact."""
+    given = [key for key in _STD if key in table]
+    if not given:
+        return None
+    for key in _STD:
+        if key not in table:
+            raise table.error(f'"{key}" is missing beside "{given[0]}". Give both, or neither where the pose is exact.')
+    mm, deg = (table.spread(key) for key in _STD)
+    if not mm and not deg:
+        raise table.error('"std_mm" and "std_deg" are both 0. Leave both out where the pose is exact.')
+    return mm * 1e-3, float(np.radians(deg))
 
 
 def read_object_pose(text: str) -> ObjectPose:
