@@ -102,6 +102,23 @@ def test_volume_is_right_and_a_bridge_is_not_filled(mesh: TriangleMesh) -> None:
     assert 0.93 < carved(enclose(scan.cloud), scan.empty).mesh.volume / true < 1.2  # filled bridge: 2.0
 
 
+@pytest.mark.parametrize(("count", "few"), [(8, True), (45, False)])
+def test_a_surface_of_which_few_views_show_little_is_named(count: int, few: bool) -> None:
+    scan = fuse(scan_mesh(BRIDGE, 1, count=count, intrinsics=SMALL, X_WO=LIES).views)
+    share = f"{100 * scan.seen / len(scan.cloud):.0f} %"
+    said = [(f.code, f.message, f.remedy) for f in scan.findings]
+    assert said == few * [
+        (
+            "surface-open",
+            f"Only {share} of the points were seen, in 8 views; the rest closes what is left.",
+            "Take more views, from all sides and heights: 3 must see each place of the surface.",
+        )
+    ]
+    told = [f for f in enclose(scan.cloud).findings if f.code == "thin-thickened"]
+    assert not few or told[0].message.startswith(f"Cameras saw only {share} of the points")
+    assert not any("Cameras" in f.message for f in told) or few
+
+
 def test_what_is_empty_is_outside(box: Scanned) -> None:
     scan = fuse(box.views)
     inside = np.random.default_rng(0).uniform([-0.047, -0.027, 0.002], [0.047, 0.027, 0.027], (500, 3))

@@ -13,7 +13,7 @@ from scipy.spatial import cKDTree
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import Finding, counted
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
@@ -38,6 +38,7 @@ _WRONG = 2.5  # times the depth noise: views that spread more are wrong in somet
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _TABLE_OFF = 0.003  # of the table in the views, rms [m], from which on poses or camera are said to be wrong
 _STILL = 1e-9  # move of a camera that is none [m]
+_LEAST_SEEN = 0.25  # of the points: scans with views from all sides see half
 _LOST = 0.1  # of where the object stands: so much without surface is not a ragged rim
 
 
@@ -100,7 +101,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock.lap("colour")
     placed = None if found.shift is None else _placed(scene, xyz.mean(0))
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = _findings(scene, found, level, placed, mistake)
+    findings = (*_findings(scene, found, level, placed, mistake), *_few_seen(seen / len(xyz), len(scene.views)))
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
@@ -272,6 +273,17 @@ def _findings(
             )
         )
     return tuple(found)
+
+
+def _few_seen(share: float, views: int) -> tuple[Finding, ...]:
+    """Return the finding on a surface that is mostly what closes it; `share` of the points were seen."""
+    if share >= _LEAST_SEEN:
+        return ()
+    text = (
+        f"Only {100 * share:.0f} % of the points were seen, in {counted(views, 'view')}; the rest closes what is left."
+    )
+    remedy = f"Take more views, from all sides and heights: {LEAST_VIEWS} must see each place of the surface."
+    return (Finding("surface-open", text, remedy),)
 
 
 def _said_of(level: _Level, shift: float | None, placed: Placement | None) -> str:

@@ -42,6 +42,7 @@ _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below 
 _OPEN = 0.11
 _WITHIN_NOISE = 4.0  # standard deviations of noise that two layers of points must be apart to be told as two
 _NOISY = 0.3  # of the points: so many that are nearer to the other side make the solid doubtful
+_FEW_SEEN = 0.25  # of the points: scans with views from all sides show the colour of about half
 _FACING = -0.5  # cosine between normals of two sides
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Doubt above which normals that come with a cloud may be wrong: thin walls reach 0.44, a tenth of them turned 0.67.
@@ -287,14 +288,7 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
     findings = used.findings + turned
     if thin:
         apart = surface.spacing * diagonal * 1e3
-        text = (
-            f"Walls are too thin for points {apart:.2g} mm apart to tell them from gaps: "
-            f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
-            if blurred
-            else f"Walls or gaps at {100 * noisy:.0f} % of the points are thinner than {_WITHIN_NOISE:.0f} times their "
-            f"noise of {used.noise * 1e3:.2g} mm."
-        )
-        findings += (Finding.of("thin-thickened", text),)
+        findings += (_blur(used.cloud, apart, doubt) if blurred else _within_noise(noisy, used.noise),)
     if hole:
         text = (
             f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
@@ -304,6 +298,22 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
     std = float(np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * thin) ** 2 + (_HOLE * gap * hole) ** 2))
     kept = replace(used.cloud, normals=surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
+
+
+def _blur(cloud: Cloud, apart: float, doubt: float) -> Finding:
+    """Return why inside and outside of points `apart` [mm] are hard to tell: few were seen, or else thin walls."""
+    what = f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
+    if cloud.seen is not None and (share := float(cloud.seen.mean())) < _FEW_SEEN:
+        text = f"Cameras saw only {100 * share:.0f} % of the points, and the rest closes what is left: {what}"
+        return Finding("thin-thickened", text, "Take more views, from all sides and heights.")
+    text = f"Walls are too thin for points {apart:.2g} mm apart to tell them from gaps: {what}"
+    return Finding.of("thin-thickened", text)
+
+
+def _within_noise(share: float, noise: float) -> Finding:
+    """Return that walls or gaps at a share of the points are thinner than their noise [m] lets see."""
+    text = f"Walls or gaps at {100 * share:.0f} % of the points are thinner than {_WITHIN_NOISE:.0f} times their "
+    return Finding.of("thin-thickened", f"{text}noise of {noise * 1e3:.2g} mm.")
 
 
 def _share_within(surface: Oriented, reach: float) -> float:
