@@ -50,6 +50,10 @@ class Effective:
         pull = half @ (g[:10] - g[10:] @ follow)
         return cls(0.5 * (information + information.T), pull, own @ g[10:], follow, half, own)
 
+    def left_by(self, error: Array) -> Array:
+        """Return (F^-1 + G)^-1 F^-1 (10, 10): what an error with covariance G leaves of F phi_hat."""
+        return np.asarray(np.linalg.inv(np.eye(10) + self.information @ error))
+
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
         shrink: Array = self.information @ error

@@ -24,7 +24,7 @@ def misdrawn(data: Effective, parts: Parts, masses: Masses, error: ShapeError) -
     To first order: a part k that is shifted by d misses m_k dB_k of phi, and C B^T F m_k dB_k of it goes to the
     masses. The whole does not feel it: the log alone holds that.
     """
-    blurred = data.blurred(error.covariance(parts.whole(masses.mean)))
+    blurred = data.blurred(error.with_grasp(parts.whole(masses.mean)))
     gain = masses.covariance @ parts.per_mass.T @ blurred.information
     shifted = (parts.in_frame(Pose(Rotation.identity(), DRAWN * axis)).per_mass for axis in np.eye(3))
     steps = [gain @ ((moved - parts.per_mass) * masses.mean) for moved in shifted]

@@ -44,7 +44,6 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts
-from steelyard.spatial import Pose
 
 # The weights depend on the answer, and settle in so many rounds.
 RENEWALS = 2
@@ -123,11 +122,11 @@ class PartMasses:
         linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
         if not linear[0] > 0:
             raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
-        return linear if self.tool is None else linear - _padded(self.tool.parameters.vector, len(linear))
+        return linear if self.tool is None else linear - np.pad(self.tool.parameters.vector, (0, len(linear) - 10))
 
     def _loaded(self, linear: Array) -> Array:
         """Return the linear parameters (p,) of the load, tool and object, from those with the object's."""
-        return linear if self.tool is None else linear + _padded(self.tool.parameters.vector, len(linear))
+        return linear if self.tool is None else linear + np.pad(self.tool.parameters.vector, (0, len(linear) - 10))
 
     def _data(self, problem: Problem, linear: Array, score: Array | None) -> Effective:
         """Return what the log says of the object, with the weights at `linear` (p,): the object's phi and the bias."""
@@ -148,7 +147,27 @@ class PartMasses:
             mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
             body = with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
-        return self._of_scan(problem, data, body) if self._doubtful else self._answered(problem, data, body)
+        there = self
+        if self.shape_error.grasp_steps():
+            there, data, body = self._where_seen(problem, data, body, score)
+        return there._of_scan(problem, data, body) if self._doubtful else there._answered(problem, data, body)
+
+    def _where_seen(
+        self, problem: Problem, data: Effective, body: InertialParameters, score: Array | None
+    ) -> tuple[PartMasses, Effective, InertialParameters]:
+        """Return parts, log and body for where the log sees the object, as far as its grasp allows.
+
+        What a grasp does to the parameters bends with its turn: it is judged from where it likely is.
+        """
+        error = self.shape_error
+        X = error.likeliest_grasp(body, data.pull - data.information @ body.vector, data.information)
+        if X is None:
+            return self, data, body
+        body = body.in_frame(X)
+        for _ in range(RENEWALS):
+            centred = recentred(data, body, error.with_grasp(body)).body
+            data = self._data(problem, data.linear_at(centred.vector), score)
+        return replace(self, parts=self.parts.in_frame(X)), data, body
 
     def _of_scan(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
         """Return the Estimate with a scan that is as much worse than it says as the log's centre of mass lies off it.
@@ -156,7 +175,7 @@ class PartMasses:
         What is wrong with the centre is wrong with the inertia. Source: scale factor of the Particle Data Group.
         """
         drawn = with_mass(self.parts, self._masses(data, body, self.parts).mean, data)
-        times = apart(data, drawn, self.shape_error.covariance(drawn))
+        times = apart(data, drawn, self.shape_error.with_grasp(drawn))
         if times <= 1:
             return self._answered(problem, data, body)
         found = replace(self, shape_error=self.shape_error.scaled(times))._answered(problem, data, body)
@@ -198,12 +217,11 @@ class PartMasses:
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
         body = InertialParameters(found.vector)
-        error, spread, follows = self.shape_error.with_grasp(body), found.covariance, found.covariance
         if self._movable:
-            placed = recentred(data, body, error)
-            body, error, follows = placed.body, placed.error, placed.following(data, follows)
-            spread = placed.left_of(data, spread) if self._doubtful else spread
-        return self._built(problem, data, found.masses, body, spread + error, follows)
+            return self._built(problem, data, found.masses, *self._placed(data, body, found.covariance))
+        error = self.shape_error.covariance(body)
+        follows = found.covariance @ data.left_by(error)
+        return self._built(problem, data, found.masses, body, found.covariance + error, follows)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within.
@@ -213,7 +231,7 @@ class PartMasses:
         body = InertialParameters(data.best)
         limit = misfit_limit(data, len(self.parts))
         for doubling in range(1, DOUBLINGS):
-            error = self.shape_error.scaled(2.0**doubling).covariance(self._sane(body))
+            error = self.shape_error.scaled(2.0**doubling).with_grasp(self._sane(body))
             seen = data.blurred(error)
             masses = (averaged_masses if self.density == "averaged" else free_masses)(seen, self.parts)
             body = with_mass(self.parts, masses.mean, data)
@@ -231,7 +249,7 @@ class PartMasses:
         whole, fits = nearest_body(body.vector, moved), seen.misfit(body.vector) < limit
         if not fits and strayed(data, whole) > limit:
             raise refused(self.parts, data)
-        blur = _blur(data, error)
+        blur = data.left_by(error)
         masses_follow = spread @ blur
         follows = masses_follow + error @ (blur - seen.information @ masses_follow)
         made = self._built(problem, data, masses, whole, covariance, follows)
@@ -252,8 +270,8 @@ class PartMasses:
         so that the log is blurred by it; a smooth average over densities is better off without, unless the shape is a
         scan: then masses would bend to put right what the shape has wrong.
         """
-        if self.materials or self._doubtful:
-            data = data.blurred(self.shape_error.covariance(self._sane(body)))
+        if self.materials or self._movable:
+            data = data.blurred(self.shape_error.with_grasp(self._sane(body)))
         if self.materials:
             return material_masses(data, parts, self.materials)
         return (averaged_masses if self.density == "averaged" else free_masses)(data, parts)
@@ -275,22 +293,25 @@ class PartMasses:
         log move it lost more in the thin axes than it won in the others. A scan, and mass and centre of an object whose
         grasp is uncertain, move as far as the log says.
         """
-        B = self.parts.per_mass
-        body = self.parts.whole(masses.mean)
-        moved = self._moved(data, body)
-        drawn = self.shape_error.covariance(body)
-        error = drawn + moved.T @ moved
-        spread = follows = B @ masses.covariance @ B.T
+        body, B = self.parts.whole(masses.mean), self.parts.per_mass
+        spread = B @ masses.covariance @ B.T
         if self._doubtful:
-            follows = spread @ _blur(data, drawn)
-        if self._movable:
-            by_grasp = bool(len(moved)) or not self._doubtful
-            placed = (recentred if by_grasp else followed)(data, body, error)
-            body, error, follows = placed.body, placed.error, placed.following(data, follows)
-        if self._doubtful:
-            spread = placed.left_of(data, spread)
             masses = misdrawn(data, self.parts, masses, self.shape_error)
-        return self._built(problem, data, masses, body, spread + error, follows)
+        if self._movable:
+            return self._built(problem, data, masses, *self._placed(data, body, spread))
+        return self._built(problem, data, masses, body, spread + self.shape_error.covariance(body), spread)
+
+    def _placed(
+        self, data: Effective, body: InertialParameters, spread: Array
+    ) -> tuple[InertialParameters, Array, Array]:
+        """Return the body where shape, grasp and log together see it, its covariance, and how it follows the log.
+
+        spread  (10, 10) of the body by masses of the log as blurred by the error of shape and grasp
+        """
+        error = self.shape_error.with_grasp(body)
+        placed = (followed if self._doubtful else recentred)(data, body, error)
+        covariance = placed.left_of(data, spread) + placed.error
+        return placed.body, covariance, placed.following(data, spread @ data.left_by(error))
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
@@ -320,25 +341,3 @@ class PartMasses:
         names = named_materials(len(parts), masses.choices, self.materials)
         rows = zip(parts.label, masses.mean, std, parts.volume, parts.centroid, names, strict=True)
         return tuple(PartMass(int(k), float(m), float(s), float(v), c, name) for k, m, s, v, c, name in rows)
-
-    def _moved(self, data: Effective, body: InertialParameters) -> Array:
-        """Return how phi (10,) changes when the grasp is off by one standard deviation, per axis (6, 10)."""
-        steps = self.shape_error.grasp_steps()
-        if not steps:
-            return np.zeros((0, 10))
-
-        def found(X: Pose) -> Array:
-            parts = self.parts.in_frame(X)
-            return parts.whole(self._masses(data, body, parts).mean).vector
-
-        return np.stack([(found(X) - found(X.inverse())) / 2 for X in steps])
-
-
-def _blur(data: Effective, error: Array) -> Array:
-    """Return (F^-1 + G)^-1 F^-1 (10, 10): what an error G of the shape leaves of F phi_hat."""
-    return np.asarray(np.linalg.inv(np.eye(10) + data.information @ error))
-
-
-def _padded(phi: Array, size: int) -> Array:
-    """Return phi (10,) followed by zeros (size,)."""
-    return np.concatenate([phi, np.zeros(size - 10)])

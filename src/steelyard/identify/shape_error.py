@@ -17,6 +17,8 @@ LEAN = 0.2
 # Masses of a scan's parts need not sum to the whole closer than this share: a sum that is known a thousand times better
 # than its parts makes a valley too narrow and bent for Newton's method. The whole then goes where the log sees it.
 LOOSE = 1e-3
+# A grasp within so many of the standard deviations that it was given is where the log sees it.
+LIKELY = 3.5
 
 
 @dataclass(frozen=True)
@@ -29,6 +31,7 @@ class ShapeError:
                     shape leans, too, by a share of that along each axis, in radii of gyration
     turn_rad        of the whole shape about its centre of mass, per axis [rad]
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
+    grasp_at        the origin of the object's frame in the sensor's [m], about which that turn is
     """
 
     com_m: float = 0.0
@@ -37,6 +40,7 @@ class ShapeError:
     turn_rad: float = 0.0
     grasp_m: float = 0.0
     grasp_rad: float = 0.0
+    grasp_at: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
     def __post_init__(self) -> None:
         values = (self.com_m, self.inertia_share, self.stretch, self.turn_rad, self.grasp_m, self.grasp_rad)
@@ -58,18 +62,33 @@ class ShapeError:
         """Return the error of a shape that is shifted and turned as a whole by these standard deviations, too."""
         return replace(self, com_m=float(np.hypot(self.com_m, std_m)), turn_rad=float(np.hypot(self.turn_rad, std_rad)))
 
-    def placed(self, std_m: float, std_rad: float) -> ShapeError:
-        """Return the error with a place in the sensor that is less sure by these standard deviations."""
-        return replace(
-            self, grasp_m=float(np.hypot(self.grasp_m, std_m)), grasp_rad=float(np.hypot(self.grasp_rad, std_rad))
-        )
+    def placed(self, std_m: float, std_rad: float, at: Array | None = None) -> ShapeError:
+        """Return the error with a place in the sensor that is less sure by these standard deviations, about `at`."""
+        x, y, z = self.grasp_at if at is None else (float(v) for v in at)
+        grasp_m, grasp_rad = float(np.hypot(self.grasp_m, std_m)), float(np.hypot(self.grasp_rad, std_rad))
+        return replace(self, grasp_m=grasp_m, grasp_rad=grasp_rad, grasp_at=(x, y, z))
 
     def grasp_steps(self) -> list[Pose]:
         """Return displacements of one standard deviation along and about each axis that has one."""
-        if not (self.grasp_m or self.grasp_rad):
-            return []
-        steps = [Pose(Rotation.identity(), self.grasp_m * axis) for axis in np.eye(3) if self.grasp_m]
-        return steps + [Pose(Rotation.exp(self.grasp_rad * axis), np.zeros(3)) for axis in np.eye(3) if self.grasp_rad]
+        at, still = np.array(self.grasp_at), Rotation.identity()
+        shifts = [Pose(still, self.grasp_m * axis) for axis in np.eye(3) if self.grasp_m]
+        turns = [Rotation.exp(self.grasp_rad * axis) for axis in np.eye(3) if self.grasp_rad]
+        return shifts + [Pose(turn, at - turn.apply(at)) for turn in turns]
+
+    def likeliest_grasp(self, body: InertialParameters, pull: Array, information: Array) -> Pose | None:
+        """Return how the object likely lies beside its place; None where that is far beyond what the grasp allows.
+
+        pull, information  F (phi_hat - phi) (10,) and F (10, 10) of the log at the parameters phi of the body
+        """
+        slopes = np.stack([self._moved(body, X)[0] for X in self.grasp_steps()])
+        u = slopes @ np.linalg.solve(np.eye(10) + information @ self.with_grasp(body), pull)
+        if np.abs(u).max() > LIKELY:
+            return None
+        # Along the axes and about them, as the steps are.
+        along = self.grasp_m * u[:3] if self.grasp_m else np.zeros(3)
+        turn = Rotation.exp(self.grasp_rad * u[-3:] if self.grasp_rad else np.zeros(3))
+        at = np.array(self.grasp_at)
+        return Pose(turn, at - turn.apply(at) + along)
 
     def covariance(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape gives the parameters of a body."""
@@ -89,12 +108,21 @@ class ShapeError:
         return np.asarray(back @ inner @ back.T)
 
     def with_grasp(self, body: InertialParameters) -> Array:
-        """Return the covariance (10, 10) that a wrong shape and a wrong grasp give the parameters of a body."""
+        """Return the covariance (10, 10) that a wrong shape and a wrong grasp give the parameters of a body.
+
+        A turn u of unit variance moves phi by u a + u^2 b: beside a a^T, E u^4 = 3 times b b^T.
+        """
         out = self.covariance(body)
         for X in self.grasp_steps():
-            off = (body.in_frame(X).vector - body.in_frame(X.inverse()).vector) / 2
-            out += np.outer(off, off)
+            off, bend = self._moved(body, X)
+            out += np.outer(off, off) + 3 * np.outer(bend, bend)
         return out
+
+    @staticmethod
+    def _moved(body: InertialParameters, X: Pose) -> tuple[Array, Array]:
+        """Return what a displacement does to phi (10,) in first and in second order."""
+        there, back = body.in_frame(X).vector, body.in_frame(X.inverse()).vector
+        return (there - back) / 2, (there + back) / 2 - body.vector
 
 
 def _second_moments(inertia: Array) -> Array:

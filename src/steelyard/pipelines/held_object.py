@@ -259,10 +259,10 @@ def _shape(parts: Parts | Shape, pose: Pose | None, std: tuple[float, float] | N
     if isinstance(parts, Parts):
         _require_metres(parts)
         error = MEASURED.at_least(parts.com_std, parts.stretch, parts.turn_std)
-        return (parts.in_frame(pose),), None, error.placed(*grasp)
+        return (parts.in_frame(pose),), None, error.placed(*grasp, pose.position)
     cuts = parts.cuts()
     placed = tuple(cut.in_frame(pose) for cut in cuts.parts)
-    return placed, cuts.prior, parts.error.placed(*grasp)
+    return placed, cuts.prior, parts.error.placed(*grasp, pose.position)
 
 
 def _volume(parts: Parts | Shape, placed: Placed) -> tuple[float, float]:
