@@ -86,6 +86,22 @@ def _line_of_points(
 
 
 @numba.njit(cache=True, nogil=True)
+def held(camera: Any, R: Any, p: Any, height: int, width: int, points: Any) -> Any:
+    """Return how many images hold each point (N, 3), and how densely their pixels lie on a level surface there: (N, 2).
+
+    The density is of all those images together [1/m^2], as if nothing stood before the point.
+    """
+    out = np.zeros((len(points), 2))
+    for i in range(len(points)):
+        for k in range(len(R)):
+            z, u, v = pixel_of(camera, R, p, k, points[i, 0], points[i, 1], points[i, 2])
+            if 0 <= u < width and 0 <= v < height:
+                out[i, 0] += 1
+                out[i, 1] += camera[0] * camera[1] * abs(p[k, 2] - points[i, 2]) / z**3
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
 def surfels(
     depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int, step: int, mask: Any, low: Any, pitch: float,
     cell: float, floor: float, layers: int, noise: float,

@@ -22,7 +22,7 @@ from steelyard.shape.image_borders import cut_off
 from steelyard.shape.lens_error import lens_by_table
 from steelyard.shape.placement import Placement, placement
 from steelyard.shape.registration import Seen, agreed
-from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, lost_share, scene_of, surface_of
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, followed, lost_share, scene_of, surface_of, surfels
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
@@ -159,10 +159,12 @@ def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> _Surface:
     moved = scene.p - (scene.X_WT.inverse() @ scene.views.X_WC).position
     shift = float(np.sqrt((moved**2).sum(1).mean())) if np.abs(moved).max() > _STILL else None
     clock.lap("registration")
-    xyz, normal = surface_of(scene, seen.patches, seen.region, points)
-    lost = lost_share(xyz, seen.region)
+    region = followed(scene, seen.region)
+    patches = seen.patches if region is seen.region else surfels(scene, region)
+    xyz, normal = surface_of(scene, patches, region, points)
+    lost = lost_share(xyz, region)
     clock.lap("surface")
-    return _Surface(xyz, normal, seen.region.others, seen.spread, shift, lost)
+    return _Surface(xyz, normal, region.others, seen.spread, shift, lost)
 
 
 class _Clock:

@@ -22,8 +22,14 @@ LEAST_VIEWS = 3  # that must agree before something is believed
 WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
 _SAMPLES = 30_000  # points that find the table
 _STRIDE = 3  # of the pixels that are averaged
+_ENDS, _CUT = 1.0, 0.5  # per cent of an object: its ends; share of the images from which on enough hold them
+_FULL, _SPARED = 18, 0.85  # images of which none is to be spared, of few that share
+_LOOKED_AT = 1000  # spots that are asked for that
 _NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
-_REACH = 0.6  # of the camera's distance: how far from where the cameras look the object may lie
+_REACHES = (0.6, 1.2, 2.4)  # of the camera's distance: how far from where the cameras look it is sought, and followed
+_WATCHED = 0.25  # of the pixels that usual cells hold: with fewer it is not known how high a cell is
+_BRIM = 3  # cells from the edge of the map: an object there goes on past it
+_COARSE = 4  # cells between those for which it is asked which images hold them
 _SEEDS = 4  # points that are settled, for each that stays
 _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the object is sought
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
@@ -69,6 +75,11 @@ class Scene:
         """Return what every pass over the images needs: depth, its unit, the camera and its poses."""
         return self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p
 
+    def held(self, points: Array) -> Array:
+        """Return how many images hold each of points (N, 3), and how densely their pixels lie there [1/m^2]: (N, 2)."""
+        lens = self.views.intrinsics
+        return np.asarray(images.held(lens.vector, self.R, self.p, lens.height, lens.width, points))
+
     def keep(self, rows: Any) -> None:
         """Leave out all views but those of `rows`."""
         if len(rows) < len(self.R):
@@ -84,6 +95,7 @@ class Region(NamedTuple):
     stands   (I, J) cells in which the object stands out of the table
     highest  over the table that anything is measured there, noise added [m]
     others   objects that stand beside it
+    cut      whether many images cut off a part of it
     """
 
     mask: Any
@@ -92,6 +104,18 @@ class Region(NamedTuple):
     stands: Any
     highest: float
     others: int
+    cut: bool
+
+    def spots(self, cells: Any) -> Array:
+        """Return the middles (N, 3) of cells (I, J) on the table."""
+        xy = self.low + self.pitch * (np.argwhere(cells) + 0.5)
+        return np.column_stack([xy, np.zeros(len(xy))])
+
+    @property
+    def runs_off(self) -> bool:
+        """Whether the object goes on where the map ends."""
+        inner = (slice(_BRIM, -_BRIM),) * 2
+        return bool(self.stands.sum() > self.stands[inner].sum())
 
     def holds(self, points: Array) -> Any:
         """Whether points (N, 3) lie over its cells."""
@@ -130,32 +154,82 @@ def noise_of(planes: Array, unit: float, distance: float) -> float:
 
 
 def object_on_table(scene: Scene) -> Region:
-    """Return where the largest object on the table lies; CannotAnswer where nothing stands out of it."""
+    """Return where the largest object near where the cameras look lies; CannotAnswer where nothing stands out there."""
+    return _object_within(scene, _REACHES[0] * scene.distance, _STRIDE)
+
+
+def followed(scene: Scene, region: Region) -> Region:
+    """Return all of the object: where it runs off the map it is followed as far as views look.
+
+    Only once they agree: the wrinkles of a table that they have apart have no end.
+    """
+    for reach in _REACHES[1:]:
+        if region.runs_off:
+            # Ends that lie far off are seen by few pixels: all of them are needed.
+            region = _object_within(scene, reach * scene.distance, 1)
+    spots, count = region.spots(region.stands), len(scene.R)
+    held = np.percentile(scene.held(spots[:: max(1, len(spots) // _LOOKED_AT)])[:, 0], _ENDS)
+    cut = bool(held < max(_CUT * count, min(_FULL, _SPARED * count)))
+    return region._replace(cut=cut) if cut else region
+
+
+def _object_within(scene: Scene, reach: float, stride: int) -> Region:
+    """Return where the largest object lies, of a map that reaches so far from where the cameras look [m]."""
     pitch = 2 * scene.pixel
-    half = int(_REACH * scene.distance / pitch)
+    half, near = int(reach / pitch), int(_REACHES[0] * scene.distance / pitch)
     low = np.full(2, -half * pitch)
     size = 2 * half
     cap = max(6 * scene.sigma, _CAP * scene.distance)
-    sums = images.height_map(*scene.images(), _STRIDE, low, pitch, cap, size, size)
-    count, mean = sums[..., 0], sums[..., 1] / np.maximum(sums[..., 0], 1)
-    watched = count >= 0.25 * np.median(count[count > 0])
-    spread = float(np.subtract(*np.percentile(mean[watched], (75, 25)))) / 1.35
-    level = float(np.median(mean[watched]))
+    sums = images.height_map(*scene.images(), stride, low, pitch, cap, size, size)
+    middle = (slice(half - near, half + near),) * 2
+    well, watched = _watched(scene, sums[..., 0], middle, low, pitch)
+    mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
+    spread = float(np.subtract(*np.percentile(mean[well], (75, 25)))) / 1.35
+    level = float(np.median(mean[well]))
     up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
     label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
-    if not found:
+    area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
+    if not area.any():
         raise CannotAnswer("no object was found on the table: nothing stands out of it where the cameras look.")
-    area = np.bincount(label.ravel(), minlength=found + 1)[1:]
     largest = int(np.argmax(area)) + 1
     others = int((area > max(0.1 * area.max(), 25)).sum()) - 1
     margin = max(3, int(np.ceil(_MARGIN / pitch)))
     mine = ndimage.binary_dilation(label == largest, np.ones((3, 3)), iterations=margin)
     stranger = ndimage.binary_dilation(
-        (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(area > 25)), np.ones((3, 3))
+        (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(whole > 25)), np.ones((3, 3))
     )
     mine &= ~stranger
     highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
-    return Region(mine, low, pitch, label == largest, highest, others)
+    return Region(mine, low, pitch, label == largest, highest, others, False)
+
+
+def _watched(scene: Scene, count: Array, middle: tuple[slice, slice], low: Array, pitch: float) -> tuple[Any, Any]:
+    """Return which cells (I, J) of a map hold enough pixels: in the middle as many as usual, and all that are followed.
+
+    count  (I, J) pixels in each
+
+    A cell that few images hold, or only from afar, has enough if it has its share of the pixels that those images turn
+    to it: what an image does not show is no sign that nothing is there.
+    """
+    typical = float(np.median(count[middle][count[middle] > 0]))
+    usual, apart = count >= _WATCHED * typical, np.ones(count.shape, bool)
+    well = np.zeros(count.shape, bool)
+    well[middle] = usual[middle]
+    held, density = _held(scene, count.shape, low, pitch)
+    apart[middle] = held[middle] < _CUT * len(scene.R)
+    apart &= held >= min(LEAST_VIEWS, len(scene.R))
+    due = density * pitch**2
+    share = float(np.median(count[well] / np.maximum(due[well], 1e-9)))
+    return well, usual | (apart & (count > 0) & (count >= _WATCHED * share * due))
+
+
+def _held(scene: Scene, shape: tuple[int, ...], low: Array, pitch: float) -> tuple[Array, Array]:
+    """Return how many images hold the cells (I, J) of a map, and how densely their pixels lie there [1/m^2]."""
+    i, j = (np.arange(-(-n // _COARSE)) + 0.5 for n in shape)
+    xy = low + pitch * _COARSE * np.stack(np.meshgrid(i, j, indexing="ij"), axis=-1).reshape(-1, 2)
+    coarse = scene.held(np.column_stack([xy, np.zeros(len(xy))])).reshape(len(i), len(j), 2)
+    fine = coarse.repeat(_COARSE, 0).repeat(_COARSE, 1)[: shape[0], : shape[1]]
+    return fine[..., 0], fine[..., 1]
 
 
 def lost_share(xyz: Array, region: Region) -> float:
@@ -171,8 +245,10 @@ def surfels(scene: Scene, region: Region) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
     cell = _CELL * scene.pixel
     floor = -4 * scene.sigma - 2 * cell
-    layers = int((min(region.highest, _REACH * scene.distance) - floor) / cell) + 2
-    found = images.surfels(*scene.images(), _STRIDE, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
+    layers = int((min(region.highest, _REACHES[0] * scene.distance) - floor) / cell) + 2
+    # Where few images hold an end of it, all of their pixels are needed.
+    stride = 1 if region.cut else _STRIDE
+    found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
     if not len(found):
         raise no_surface()

@@ -53,6 +53,8 @@ def scan_mesh(
     depth_unit: float = 0.001,
     table_known: bool = False,
     X_WO: Pose | None = None,
+    aim: tuple[float, float, float] | None = None,
+    distance: float | None = None,
 ) -> Scanned:
     """Return RGB-D views of `mesh` lying on the table z = 0, along a wrist's arc. Same seed, same scan.
 
@@ -60,14 +62,16 @@ def scan_mesh(
     pose_std    error of the reported poses [mm, deg]
     table_known whether the views carry the table's plane
     X_WO        where the mesh lies; left out, it rests on its most stable side, turned by chance
+    aim         where in W all cameras look, left out the middle of the mesh
+    distance    of the cameras from there [m], left out such that all of the mesh fits into the images
     """
     rng = np.random.default_rng(seed)
     yaw = rng.uniform(0, 2 * np.pi)
     X_WO = X_WO or resting_pose(mesh, yaw)
     placed = mesh.in_frame(X_WO)
     low, high = placed.bounds
-    target = np.array([*(low + high)[:2] / 2, 0.4 * high[2]])
-    distance = max(_CLOSEST, _FILL * float(np.linalg.norm(high - low)))
+    target = np.array([*(low + high)[:2] / 2, 0.4 * high[2]] if aim is None else aim)
+    distance = distance or max(_CLOSEST, _FILL * float(np.linalg.norm(high - low)))
     X_WC = wrist_arc(target, distance, count, elevations=elevations, start=rng.uniform(0, 360))
     size = (intrinsics.height, intrinsics.width)
     depth, rgb = np.zeros((count, *size), np.uint16), np.zeros((count, *size, 3), np.uint8)

@@ -1,0 +1,79 @@
+"""Cameras aimed beside an object: its ends come whole where enough images hold them, and are named where not."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import manifold3d
+import numpy as np
+import pytest
+
+from steelyard.shape import depth_images
+from steelyard.shape.carving import carved
+from steelyard.shape.mesh import TriangleMesh
+from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.views import Intrinsics
+from steelyard.shape.volume import enclose
+from steelyard.simulate.scanning import scan_mesh
+from steelyard.spatial import Pose
+
+WIDE = Intrinsics(320, 240, 195.0, 195.0, 160.0, 120.0)
+NARROW = replace(WIDE, fx=307.5, fy=307.5)
+LONG, ACROSS = 0.3, 0.03
+VOLUME = LONG * ACROSS**2
+
+
+def bar() -> TriangleMesh:
+    mesh = manifold3d.Manifold.cube([LONG, ACROSS, ACROSS]).translate([-LONG / 2, -ACROSS / 2, 0]).to_mesh64()
+    red = np.tile(np.array([200, 40, 40], np.uint8), (len(mesh.tri_verts), 1))
+    return TriangleMesh(mesh.vert_properties[:, :3], mesh.tri_verts, np.zeros(len(red)), red)
+
+
+def aimed(lens: Intrinsics, aside: float, distance: float) -> Scan:
+    """Return the scan of a bar along x by cameras that look so far beside its middle."""
+    made = scan_mesh(
+        bar(), 1, count=36, intrinsics=lens, X_WO=Pose.identity(), aim=(-aside, 0, 0.01), distance=distance
+    )
+    return fuse(made.views)
+
+
+def missing(scan: Scan) -> float:
+    return LONG - float(np.ptp(scan.cloud.xyz[:, 0]))
+
+
+@pytest.mark.parametrize(
+    ("lens", "aside", "distance"), [(WIDE, 0.10, 0.28), (WIDE, 0.05, 0.28), (NARROW, 0.0, 0.28), (NARROW, 0.05, 0.36)]
+)
+def test_a_bar_that_many_images_cut_off_comes_whole_where_half_of_them_hold_its_end(
+    lens: Intrinsics, aside: float, distance: float
+) -> None:
+    scan = aimed(lens, aside, distance)
+    assert missing(scan) < 0.007
+    assert 0.95 < carved(enclose(scan.cloud), scan.empty).mesh.volume / VOLUME < 1.05
+    assert scan.findings == ()
+
+
+def looks() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return rotations and positions of cameras, and points before and behind them."""
+    rng = np.random.default_rng(0)
+    R = np.linalg.qr(rng.normal(size=(20, 3, 3)))[0]
+    return R * np.linalg.det(R)[:, None, None], rng.normal(size=(20, 3)), rng.normal(size=(50, 3))
+
+
+def test_images_hold_the_points_that_fall_on_their_pixels_as_densely_as_areas_shrink() -> None:
+    R, p, points = looks()
+    held = depth_images.held(WIDE.vector, R, p, WIDE.height, WIDE.width, points)
+    edge = 1e-5
+    counts, density = np.zeros(len(points)), np.zeros(len(points))
+    for turn, eye in zip(R, p, strict=True):
+        corners = points[:, None] + edge * np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0]])
+        x, y, z = np.moveaxis((corners - eye) @ turn, -1, 0)
+        pixel = np.stack([WIDE.cx + WIDE.fx * x / z, WIDE.cy + WIDE.fy * y / z], axis=-1)
+        u, v = np.floor(pixel[:, 0] + 0.5).T
+        inside = (z[:, 0] > 0) & (u >= 0) & (u < WIDE.width) & (v >= 0) & (v < WIDE.height)
+        one, other = np.moveaxis(pixel[:, 1:] - pixel[:, :1], 1, 0)
+        area = np.abs(one[:, 0] * other[:, 1] - one[:, 1] * other[:, 0]) / edge**2
+        counts, density = counts + inside, density + np.where(inside, area, 0)
+    assert counts.max() > 2
+    assert np.array_equal(held[:, 0], counts)
+    assert held[:, 1] == pytest.approx(density, rel=1e-2)
