@@ -8,7 +8,7 @@ import manifold3d
 import numpy as np
 import pytest
 
-from steelyard.shape import depth_images
+from steelyard.shape import depth_images, sight_lines
 from steelyard.shape.carving import carved
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import Scan, fuse
@@ -53,6 +53,13 @@ def test_a_bar_that_many_images_cut_off_comes_whole_where_half_of_them_hold_its_
     assert scan.findings == ()
 
 
+@pytest.mark.parametrize(("aside", "distance"), [(0.10, 0.28), (0.0, 0.2), (0.05, 0.2)])
+def test_an_end_that_too_few_images_hold_is_named(aside: float, distance: float) -> None:
+    scan = aimed(NARROW, aside, distance)
+    assert missing(scan) > 0.006
+    assert "object-cut" in {finding.code for finding in scan.findings}
+
+
 def looks() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return rotations and positions of cameras, and points before and behind them."""
     rng = np.random.default_rng(0)
@@ -77,3 +84,11 @@ def test_images_hold_the_points_that_fall_on_their_pixels_as_densely_as_areas_sh
     assert counts.max() > 2
     assert np.array_equal(held[:, 0], counts)
     assert held[:, 1] == pytest.approx(density, rel=1e-2)
+
+
+def test_a_wall_is_measured_at_its_spots_and_seen_past_before_them() -> None:
+    lens, noise = WIDE, 0.001
+    wall = np.full((1, lens.height, lens.width), 1000, np.uint16)
+    spots = np.array([[0, 0, 1.0], [0.1, 0.1, 0.999], [0, 0, 0.9], [0, 0, 1.1], [5, 0, 1], [0, 0, -1]])
+    found = sight_lines.sights(wall, 0.001, lens.vector, np.eye(3)[None], np.zeros((1, 3)), spots, noise)
+    assert found.tolist() == [[0, 1], [0, 1], [1, 0], [0, 0], [0, 0], [0, 0]]

@@ -263,9 +263,10 @@ def _findings(
         )
     if far or level.lens or (placed and placed.at_wrist):
         found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
-    if cut := cut_off(scene, surface.xyz):
+    if cut := cut_off(scene, surface.xyz, surface.normal):
         found.append(cut)
-    if (lost := surface.lost) > _LOST:
+    # What is cut off has no surface for that reason.
+    elif (lost := surface.lost) > _LOST:
         found.append(
             Finding.of(
                 "surface-open",

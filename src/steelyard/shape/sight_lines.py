@@ -217,6 +217,24 @@ def seen_past(
 
 
 @numba.njit(cache=True, nogil=True)
+def sights(depth: Any, unit: float, camera: Any, R: Any, p: Any, points: Any, noise: float) -> Any:
+    """Return how many views see past each point (N, 3), and how many measure something there: (N, 2).
+
+    Within 3 standard deviations of the depth noise, and three pixel widths before it for a surface seen flat.
+    """
+    out = np.zeros((len(points), 2))
+    for i in range(len(points)):
+        for k in range(len(depth)):
+            z, u, v = pixel_of(camera, R, p, k, points[i, 0], points[i, 1], points[i, 2])
+            if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
+                continue
+            behind, error = depth[k, v, u] * unit - z, 3 * noise * z * z
+            out[i, 0] += behind > error
+            out[i, 1] += -error - 3 * z / camera[0] <= behind <= error
+    return out
+
+
+@numba.njit(cache=True, nogil=True)
 def _behind(work: Any, unit: float, margin: float, noise: float) -> int:
     """Return how many views measured something behind a point; mark those by 1, the others by 0."""
     depth, measured, found = work[3], work[6], 0
