@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from parts_blocks import body, solid
+from parts_blocks import body, inside, solid
 from scipy.spatial import cKDTree
 
 from steelyard.parts.colours import colour_modes
@@ -16,6 +16,7 @@ from steelyard.shape.volume import enclose
 BAR = ((0, 0, 0), (0.12, 0.02, 0.02))
 HALVES = [((0, 0, 0), (0.06, 0.02, 0.02)), ((0.06, 0, 0), (0.12, 0.02, 0.02))]
 LAMP = np.array([0.15, -0.25, 0.41])
+SIDES = np.concatenate([np.eye(3), -np.eye(3)])
 
 
 def noisy(rgb, sigma, seed=0):
@@ -36,7 +37,7 @@ def test_one_colour_is_one_mode():
     cloud = body([BAR], [(120, 130, 140)])
     modes = colour_modes(cloud.rgb, skin_of(solid(cloud, [BAR])))
     assert len(modes.rgb) == 1
-    assert not modes.lamp.any()
+    assert not modes.light.seen
     assert modes.noise == 0
     np.testing.assert_allclose(modes.rgb[0], (120, 130, 140), atol=0.5)
 
@@ -66,7 +67,7 @@ def test_a_lamp_is_found_and_taken_out(sigma):
         face[cloud.xyz[:, axis] == BAR[1][axis], axis] = 1
     lit = noisy(0.7 * cloud.rgb * (1 + face @ LAMP)[:, None], sigma)
     modes = colour_modes(lit, skin)
-    np.testing.assert_allclose(modes.lamp, [*LAMP, 0, 0, 0, 0, 0], atol=0.03)
+    np.testing.assert_allclose(modes.light.on(SIDES) / modes.light.on(SIDES).mean(), 1 + SIDES @ LAMP, atol=0.03)
     assert np.bincount(modes.label).max() > 0.97 * len(cloud)
 
 
@@ -83,13 +84,13 @@ def test_what_nobody_saw_tells_nothing_of_the_lamp_and_is_lent_its_colour():
     lit = cloud.rgb * (1 + face @ LAMP)[:, None]
     lit[~seen] = lit[seen][np.linalg.norm(cloud.xyz[~seen][:, None] - cloud.xyz[seen], axis=2).argmin(1)]
     modes = colour_modes(np.clip(lit, 0, 255).astype(np.uint8), skin, face, seen)
-    assert modes.lamp.any()
+    assert modes.light.seen
     assert len(modes.rgb) == 1
 
 
 def test_no_lamp_is_seen_where_colours_differ_by_part():
     cloud, skin = two_halves((220, 220, 220), (70, 70, 70))
-    assert not colour_modes(noisy(cloud.rgb, 5), skin).lamp.any()
+    assert not colour_modes(noisy(cloud.rgb, 5), skin).light.seen
 
 
 def test_a_run_from_one_colour_to_the_other_is_no_third():
@@ -130,5 +131,56 @@ def test_a_lamp_on_a_round_body_is_found_under_the_noise_of_a_camera():
     cloud = Cloud(0.03 * normal, noisy(np.array([200, 40, 40]) * (0.85 + 0.15 * normal[:, [0]]), 4))
     mesh = enclose(cloud).mesh
     modes = colour_modes(cloud.rgb[cKDTree(cloud.xyz).query(mesh.vertices)[1]], skin_of(mesh))
-    np.testing.assert_allclose(modes.lamp[:3], [0.15 / 0.85, 0, 0], atol=0.03)
+    np.testing.assert_allclose(
+        modes.light.on(SIDES) / modes.light.on(SIDES).mean(), 1 + SIDES[:, 0] * 0.15 / 0.85, atol=0.03
+    )
     assert np.bincount(modes.label).max() > 0.97 * len(mesh.vertices)
+
+
+def half_lit(normals):
+    """Brightness under one lamp, and a third of it from all about: the sides that face away are alike dark."""
+    return 0.35 + 0.65 * np.maximum(0, normals @ np.array([0.29, -0.39, 0.87]))
+
+
+def face_normals(xyz, boxes):
+    """Outward normals on the faces of boxes; of the last box that a point lies on."""
+    normals = np.zeros_like(xyz)
+    for low, high in boxes:
+        for axis in range(3):
+            for bound, sign in ((low, -1), (high, 1)):
+                on = np.isclose(xyz[:, axis], bound[axis]) & inside(xyz, (low, high), 1e-9)
+                normals[on] = sign * np.eye(3)[axis]
+    return normals
+
+
+def test_a_lamp_that_leaves_the_far_side_alike_dark_splits_no_ball():
+    k = np.arange(2500) + 0.5
+    z, turn = 1 - 2 * k / 2500, np.pi * (1 + 5**0.5) * k
+    normal = np.stack([np.sqrt(1 - z**2) * np.cos(turn), np.sqrt(1 - z**2) * np.sin(turn), z], axis=1)
+    skin = skin_of(enclose(Cloud(0.03 * normal, np.zeros((2500, 3), np.uint8))).mesh)
+    facing = skin.vertices / np.linalg.norm(skin.vertices, axis=1, keepdims=True)
+    modes = colour_modes(noisy(np.array([200, 60, 50]) * half_lit(facing)[:, None], 4), skin, facing)
+    ratio = modes.light.on(normal) / half_lit(normal)
+    assert np.std(ratio) < 0.02 * np.mean(ratio)
+    assert len(modes.rgb) == 1
+
+
+def test_a_lamp_is_seen_on_walls_thinner_than_the_spacing():
+    """Neighbours of a point on a thin wall lie on both of its sides, which are flat nevertheless."""
+    walls = [((0, 0, 0), (0.16, 0.1, 0.002)), ((0, 0, 0), (0.002, 0.1, 0.06)), ((0, 0, 0), (0.16, 0.002, 0.06))]
+    cloud = body(walls, [(200, 110, 30)] * 3, points=2500)
+    facing = face_normals(cloud.xyz, walls)
+    modes = colour_modes(noisy(cloud.rgb * half_lit(facing)[:, None], 4), skin_of(solid(cloud, walls)), facing)
+    assert modes.light.seen
+    assert len(modes.rgb) == 1
+
+
+def test_a_thin_rod_under_a_lamp_keeps_its_colour():
+    """No place of a rod is flat beside a block; it has a colour of its own all the same."""
+    boxes = [((0, 0, 0), (0.08, 0.04, 0.04)), ((0.08, 0.018, 0.018), (0.2, 0.022, 0.022))]
+    cloud = body(boxes, [(190, 40, 40), (90, 95, 105)], points=2500)
+    facing = face_normals(cloud.xyz, boxes)
+    modes = colour_modes(noisy(cloud.rgb * half_lit(facing)[:, None], 4), skin_of(solid(cloud, boxes)), facing)
+    assert modes.light.seen
+    assert len(modes.rgb) == 2
+    assert agreement(modes.label, cloud.labels) > 0.97

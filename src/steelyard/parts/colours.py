@@ -14,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.parts.skin import Skin
+from steelyard.parts.light import Light, light_on
+from steelyard.parts.skin import OPPOSITE, Skin
 from steelyard.shape.mesh import Colours, Integers
 
 NEIGHBOURS = 8
@@ -25,14 +26,7 @@ _STEPS = 3.0  # one colour reaches this many median steps between neighbours
 _LEFT = 0.75  # of the noise: what averaging leaves of it is alike in neighbours, and so not seen between them
 _RARE = 0.01  # a colour has at least this share of the points
 _ONE_SIDE = 0.9  # product of the normals of neighbours on one side of a thin body, which a lamp lights alike
-_TURNED = 0.15  # between the normals of a pair, for it to tell of the lamp
-_LAMP_SEEN = 0.1  # weaker shading is below the difference of two colours
-_LAMP_MOST = 0.9  # a lamp beside the object turns no side of it black
 _SHADE = 0.08  # of the brightness: what is left of the light once the lamp is taken out
-_PLACES, _APART = 600, (16, 80)  # places whose pairs tell of the lamp, and how many flat places lie between the two
-_SETTLED = 1e-6  # step of the weights below which a brightness changes by less than any camera shows
-_EVEN = 0.05  # cost of a pair below which nothing is lit
-_ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
 
 
 @dataclass(frozen=True, eq=False)
@@ -41,14 +35,14 @@ class ColourModes:
 
     label  (V,) the colour 0..M-1 of every point
     rgb    (M, 3) the colours, 0..255, as they are without the lamp
-    lamp   (8,) weights of the harmonics of the normal; brightness is 1 + lamp . f(normal); 0 where no lamp is seen
+    light  what lights the object
     noise  median distance of neighbouring colours, 0..1, before averaging
     plain  (V, 3) the colour of every point, 0..1, without the lamp and before averaging
     """
 
     label: Integers
     rgb: Array
-    lamp: Array
+    light: Light
     noise: float
     plain: Array
 
@@ -63,22 +57,32 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near[:, :NEIGHBOURS]
     facing = skin.normals if normals is None else normals
     alike = np.einsum("id,ikd->ik", facing, facing[near])
-    flatness = skin.flatness if normals is None else alike.mean(1)
+    flatness = skin.flatness if normals is None else _flatness(alike)
     calm = _without_noise(colour, near, _step(colour, near, seen), alike > _ONE_SIDE)
-    lamp = _lamp(calm, facing, np.where(seen, flatness, 0.0), skin.vertices)
+    light = light_on(calm, facing, np.where(seen, flatness, 0.0), skin.vertices)
     sure = seen.copy()
-    if lamp.any():
-        colour = colour / (1 + _harmonics(facing) @ lamp)[:, None]
-        sure &= flatness > min(0.95, float(np.median(flatness[seen])))
+    if light.seen:
+        colour = colour / light.on(facing)[:, None]
+        around = np.minimum(np.median(flatness[skin.near], axis=1), np.median(flatness[seen]))
+        sure &= flatness > np.minimum(0.95, around)
     colour = _lent(colour, skin.vertices, seen)
     raw, noise = colour, _step(colour, near, sure)
     colour = _without_noise(colour, near, noise)
-    shade = _SHADE * float(np.median(np.linalg.norm(colour, axis=1))) if lamp.any() else 0.0
+    shade = _SHADE * float(np.median(np.linalg.norm(colour, axis=1))) if light.seen else 0.0
     reach = float(np.clip(max(_STEPS * _step(colour, near, sure), _LEFT * noise, shade), FINEST, COARSEST))
     modes = _modes(colour, near, sure, reach)
     label = _assigned(colour, near, sure, modes, reach)
     label, modes = _without_blends(label, modes, near, raw, max(FINEST, 2 * noise))
-    return ColourModes(label, np.clip(255 * modes, 0, 255), lamp, noise, raw)
+    return ColourModes(label, np.clip(255 * modes, 0, 255), light, noise, raw)
+
+
+def _flatness(alike: Array) -> Array:
+    """Return how much neighbours look the same way (V,), of their products (V, K) with the normal of each point.
+
+    Those that look the opposite way are on the other side of a thin wall, which may be as flat as any.
+    """
+    beside = alike > OPPOSITE
+    return np.asarray((alike * beside).sum(1) / np.maximum(beside.sum(1), 1))
 
 
 def _lent(colour: Array, xyz: Array, seen: Any) -> Array:
@@ -90,68 +94,6 @@ def _lent(colour: Array, xyz: Array, seen: Any) -> Array:
     lent = colour.copy()
     lent[~seen] = colour[seen][cKDTree(xyz[seen]).query(xyz[~seen])[1]]
     return lent
-
-
-def _harmonics(normals: Array) -> Array:
-    """Return the harmonics (..., 8) of first and second order of unit vectors (..., 3), which are the first three."""
-    x, y, z = np.moveaxis(normals, -1, 0)
-    return np.stack([x, y, z, x * y, x * z, y * z, (x * x - y * y) / 2, (3 * z * z - 1) / 2], axis=-1)
-
-
-def _lamp(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Array:
-    """Return the weights (8,) of the harmonics; 0 where the brightness does not follow the normals.
-
-    The fit is over pairs of flat places a few spacings apart whose normals differ: next neighbours share their errors,
-    and at an edge a colour is a mixture. It must take away a quarter of the pairs' robust cost to be believed.
-    """
-    from scipy.spatial import cKDTree
-
-    flat = np.flatnonzero(flatness > np.clip(np.median(flatness), 0.9, 0.98))
-    if len(flat) < 2:
-        return np.zeros(8)
-    tree, some = cKDTree(xyz[flat]), flat[:: 1 + len(flat) // _PLACES]
-    apart = flat[tree.query(xyz[some], min(_APART[-1] + 1, len(flat)))[1].reshape(len(some), -1)[:, _APART[0] :: 4]]
-    i, j = np.repeat(some, apart.shape[1]), apart.ravel()
-    used = ((normals[i] - normals[j]) ** 2).sum(1) > _TURNED**2
-    i, j = i[used], j[used]
-    light = np.log(np.maximum(colour.mean(1), 4 / 255))
-    side = light[i] - light[j]
-    before = _cost(side)
-    if before < _EVEN:
-        return np.zeros(8)
-    wave = _harmonics(normals)
-    lamp, off = _fitted(wave[i], wave[j], side)
-    seen = _cost(off) < 0.75 * before and np.linalg.norm(lamp) >= _LAMP_SEEN
-    return lamp if seen else np.zeros(8)
-
-
-def _cost(off: Array) -> float:
-    """Return the mean robust cost (Cauchy's) of differences of log brightness; 0 where there are none."""
-    return float(np.log1p((off / _ROUGH) ** 2).mean()) if len(off) else 0.0
-
-
-def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, Array]:
-    """Return the weights (K,) that explain differences of log brightness, and what they leave of each.
-
-    Robust Gauss-Newton steps: pairs of two albedos are outliers, with Cauchy's weights.
-
-    one, two  (E, K) harmonics at either point of a pair
-    """
-    lamp, off = np.zeros(one.shape[1]), side
-    for _ in range(12):
-        first, second = 1 + one @ lamp, 1 + two @ lamp
-        rows = one / first[:, None] - two / second[:, None]
-        off = side + np.log(second / first)
-        weighted = rows.T / (_ROUGH**2 + off**2)
-        normal = weighted @ rows
-        ridge = 1e-3 * np.trace(normal) / len(lamp)
-        step = np.linalg.solve(normal + ridge * np.eye(len(lamp)), weighted @ off - ridge * lamp)
-        lamp = lamp + step
-        dip = -min(float((one @ lamp).min()), float((two @ lamp).min()))
-        lamp *= min(1.0, _LAMP_MOST / max(dip, 1e-12))
-        if np.abs(step).max() < _SETTLED:
-            break
-    return lamp, off
 
 
 def _step(colour: Array, near: Integers, sure: Any) -> float:

@@ -1,0 +1,136 @@
+"""The light on a surface, found from how brightness follows the normals, without knowing any colour.
+
+However an object is lit from afar, brightness is nearly a quadratic function of the normal, the nine harmonics of up to
+second order. One lamp that leaves the sides that face away alike dark has a kink, which they round off, so that it is
+taken by itself: brightness is 1 + sky . f(n) + max(0, lamp . n), with the eight harmonics f of first and second order.
+Most pairs of places have one albedo, which drops out of their difference of log brightness; the rest are outliers.
+Source: Basri and Jacobs 2003, "Lambertian reflectance and linear subspaces", sec. 3: nine harmonics hold 99 %.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+
+_TURNED = 0.15  # between the normals of a pair, for it to tell of the light
+_LIGHT_SEEN = 0.1  # weaker shading is below the difference of two colours
+_DARKEST = 0.1  # light from all about turns no side of an object black
+_PLACES, _APART = 600, (16, 80)  # places whose pairs tell of the light, and how many flat places lie between the two
+_SETTLED = 1e-6  # step of the weights below which a brightness changes by less than any camera shows
+_OF_SKY = np.arange(11) < 8
+_STEPS, _LENGTHS = 20, (1.0, 0.3, 0.1)  # Gauss-Newton steps, and what of one is tried until the cost falls
+_EVEN = 0.05  # cost of a pair below which nothing is lit
+_ROUGH = 0.02  # relative brightness: scale beyond which a pair of neighbours is no longer trusted to have one albedo
+_RIDGE = 1e-3  # of the mean information of a weight: boxes show fewer normals than there are weights
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """How bright a surface is for its normal.
+
+    weights  (11,) of the eight harmonics of first and second order, then the lamp (3,); 0 where no light is seen
+    """
+
+    weights: Array
+
+    @property
+    def seen(self) -> bool:
+        """Whether brightness follows the normals."""
+        return bool(self.weights.any())
+
+    def on(self, normals: Array) -> Array:
+        """Return the brightness (...) of places with these normals (..., 3); 1 where no light is seen."""
+        return np.asarray(1 + _harmonics(normals) @ self.weights[:8] + np.maximum(0, normals @ self.weights[8:]))
+
+
+DARK = Light(np.zeros(11))
+
+
+def light_on(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Light:
+    """Return the light; DARK where the brightness does not follow the normals.
+
+    The fit is over pairs of flat places a few spacings apart whose normals differ: next neighbours share their errors,
+    and at an edge a colour is a mixture. It must take away a quarter of the pairs' robust cost to be believed.
+
+    colour    (V, 3) 0..1
+    normals   (V, 3) outward
+    flatness  (V,) 1 where the surroundings are one plane
+    """
+    from scipy.spatial import cKDTree
+
+    flat = np.flatnonzero(flatness > np.clip(np.median(flatness), 0.9, 0.98))
+    if len(flat) < 2:
+        return DARK
+    tree, some = cKDTree(xyz[flat]), flat[:: 1 + len(flat) // _PLACES]
+    apart = flat[tree.query(xyz[some], min(_APART[-1] + 1, len(flat)))[1].reshape(len(some), -1)[:, _APART[0] :: 4]]
+    i, j = np.repeat(some, apart.shape[1]), apart.ravel()
+    used = ((normals[i] - normals[j]) ** 2).sum(1) > _TURNED**2
+    i, j = i[used], j[used]
+    bright = np.log(np.maximum(colour.mean(1), 4 / 255))
+    side = bright[i] - bright[j]
+    before = _cost(side)
+    if before < _EVEN:
+        return DARK
+    light = _fitted(normals[i], normals[j], side)
+    seen = _cost(_left(light, normals[i], normals[j], side)) < 0.75 * before
+    return light if seen and np.linalg.norm(light.weights) >= _LIGHT_SEEN else DARK
+
+
+def _harmonics(normals: Array) -> Array:
+    """Return the harmonics (..., 8) of first and second order of unit vectors (..., 3), which are the first three."""
+    x, y, z = np.moveaxis(normals, -1, 0)
+    return np.stack([x, y, z, x * y, x * z, y * z, (x * x - y * y) / 2, (3 * z * z - 1) / 2], axis=-1)
+
+
+def _cost(off: Array) -> float:
+    """Return the mean robust cost (Cauchy's) of differences of log brightness; 0 where there are none."""
+    return float(np.log1p((off / _ROUGH) ** 2).mean()) if len(off) else 0.0
+
+
+def _left(light: Light, one: Array, two: Array, side: Array) -> Array:
+    """Return what the light leaves (E,) of differences `side` of log brightness between normals `one` and `two`."""
+    return np.asarray(side - np.log(light.on(one) / light.on(two)))
+
+
+def _fitted(one: Array, two: Array, side: Array) -> Light:
+    """Return the light that explains differences of log brightness: the harmonics first, then all with a lamp."""
+    sky = _improved(DARK, 8, one, two, side)
+    lamp = Light(np.append(sky.weights[:8], sky.weights[:3]))
+    return _improved(lamp, 11, one, two, side)
+
+
+def _improved(light: Light, count: int, one: Array, two: Array, side: Array) -> Light:
+    """Return the light after robust Gauss-Newton steps of its first weights: pairs of two albedos are outliers."""
+    off = _left(light, one, two, side)
+    for _ in range(_STEPS):
+        rows = (_slopes(light, one) - _slopes(light, two))[:, :count]
+        weighted = rows.T / (_ROUGH**2 + off**2)
+        normal = weighted @ rows
+        ridge, held = _RIDGE * np.trace(normal) / count, np.where(_OF_SKY, light.weights, 0.0)
+        step = np.linalg.solve(normal + ridge * np.eye(count), weighted @ off - ridge * held[:count])
+        step = np.append(step, np.zeros(len(light.weights) - count))
+        for length in _LENGTHS:
+            moved = _not_black(Light(light.weights + length * step), one, two)
+            left = _left(moved, one, two, side)
+            if better := _cost(left) < _cost(off):
+                light, off = moved, left
+                break
+        if not better or np.abs(step).max() < _SETTLED:
+            return light
+    return light
+
+
+def _slopes(light: Light, normals: Array) -> Array:
+    """Return how log brightness (E, 11) changes with every weight."""
+    lit = (normals @ light.weights[8:] > 0)[:, None]
+    return np.hstack([_harmonics(normals), normals * lit]) / light.on(normals)[:, None]
+
+
+def _not_black(light: Light, one: Array, two: Array) -> Light:
+    """Return the light with harmonics so weak that no place is black without the lamp."""
+    sky = Light(np.where(_OF_SKY, light.weights, 0.0))
+    dip = 1 - min(float(sky.on(one).min()), float(sky.on(two).min()))
+    return Light(light.weights - sky.weights * max(0.0, 1 - (1 - _DARKEST) / max(dip, 1e-12)))
