@@ -19,7 +19,7 @@ _TURNED = 0.15  # between the normals of a pair, for it to tell of the light
 _LIGHT_SEEN = 0.1  # weaker shading is below the difference of two colours
 _DARKEST = 0.1  # light from all about turns no side of an object black
 _PLACES, _APART = 600, (16, 80)  # places whose pairs tell of the light, and how many flat places lie between the two
-_SETTLED = 1e-6  # step of the weights below which a brightness changes by less than any camera shows
+_SETTLED = 1e-4  # relative fall of the cost below which a step is the last
 _OF_SKY = np.arange(11) < 8
 _STEPS, _LENGTHS = 20, (1.0, 0.3, 0.1)  # Gauss-Newton steps, and what of one is tried until the cost falls
 _EVEN = 0.05  # cost of a pair below which nothing is lit
@@ -43,7 +43,7 @@ class Light:
 
     def on(self, normals: Array) -> Array:
         """Return the brightness (...) of places with these normals (..., 3); 1 where no light is seen."""
-        return np.asarray(1 + _harmonics(normals) @ self.weights[:8] + np.maximum(0, normals @ self.weights[8:]))
+        return _brightness(self.weights, _harmonics(normals))
 
 
 DARK = Light(np.zeros(11))
@@ -74,9 +74,9 @@ def light_on(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Ligh
     before = _cost(side)
     if before < _EVEN:
         return DARK
-    light = _fitted(normals[i], normals[j], side)
-    seen = _cost(_left(light, normals[i], normals[j], side)) < 0.75 * before
-    return light if seen and np.linalg.norm(light.weights) >= _LIGHT_SEEN else DARK
+    wave = _harmonics(normals)
+    weights, after = _fitted(wave[i], wave[j], side)
+    return Light(weights) if after < 0.75 * before and np.linalg.norm(weights) >= _LIGHT_SEEN else DARK
 
 
 def _harmonics(normals: Array) -> Array:
@@ -90,47 +90,56 @@ def _cost(off: Array) -> float:
     return float(np.log1p((off / _ROUGH) ** 2).mean()) if len(off) else 0.0
 
 
-def _left(light: Light, one: Array, two: Array, side: Array) -> Array:
-    """Return what the light leaves (E,) of differences `side` of log brightness between normals `one` and `two`."""
-    return np.asarray(side - np.log(light.on(one) / light.on(two)))
+def _brightness(weights: Array, wave: Array) -> Array:
+    """Return the brightness (...) under the light of weights (11,) where the harmonics are `wave` (..., 8)."""
+    return np.asarray(1 + wave @ weights[:8] + np.maximum(0, wave[..., :3] @ weights[8:]))
 
 
-def _fitted(one: Array, two: Array, side: Array) -> Light:
-    """Return the light that explains differences of log brightness: the harmonics first, then all with a lamp."""
-    sky = _improved(DARK, 8, one, two, side)
-    lamp = Light(np.append(sky.weights[:8], sky.weights[:3]))
-    return _improved(lamp, 11, one, two, side)
+def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, float]:
+    """Return the weights that explain differences of log brightness best, and their cost: a sky, then with a lamp.
+
+    one, two  (E, 8) harmonics at either place of a pair
+    """
+    sky, _ = _improved(np.zeros(11), 8, one, two, side)
+    return _improved(np.append(sky[:8], sky[:3]), 11, one, two, side)
 
 
-def _improved(light: Light, count: int, one: Array, two: Array, side: Array) -> Light:
-    """Return the light after robust Gauss-Newton steps of its first weights: pairs of two albedos are outliers."""
-    off = _left(light, one, two, side)
+def _improved(weights: Array, count: int, one: Array, two: Array, side: Array) -> tuple[Array, float]:
+    """Return weights and cost after robust Gauss-Newton steps of the first `count`: pairs of two albedos are outliers."""
+    off = _left(weights, one, two, side)
+    cost = _cost(off)
     for _ in range(_STEPS):
-        rows = (_slopes(light, one) - _slopes(light, two))[:, :count]
+        rows = (_slopes(weights, one) - _slopes(weights, two))[:, :count]
         weighted = rows.T / (_ROUGH**2 + off**2)
         normal = weighted @ rows
-        ridge, held = _RIDGE * np.trace(normal) / count, np.where(_OF_SKY, light.weights, 0.0)
-        step = np.linalg.solve(normal + ridge * np.eye(count), weighted @ off - ridge * held[:count])
-        step = np.append(step, np.zeros(len(light.weights) - count))
+        ridge, held = _RIDGE * np.trace(normal) / count, np.where(_OF_SKY, weights, 0.0)[:count]
+        step = np.linalg.solve(normal + ridge * np.eye(count), weighted @ off - ridge * held)
+        step = np.append(step, np.zeros(len(weights) - count))
         for length in _LENGTHS:
-            moved = _not_black(Light(light.weights + length * step), one, two)
+            moved = _not_black(weights + length * step, one, two)
             left = _left(moved, one, two, side)
-            if better := _cost(left) < _cost(off):
-                light, off = moved, left
+            if better := _cost(left) < cost:
                 break
-        if not better or np.abs(step).max() < _SETTLED:
-            return light
-    return light
+        if not better:
+            break
+        weights, off, gain, cost = moved, left, cost - _cost(left), _cost(left)
+        if gain < _SETTLED * cost:
+            break
+    return weights, cost
 
 
-def _slopes(light: Light, normals: Array) -> Array:
+def _left(weights: Array, one: Array, two: Array, side: Array) -> Array:
+    """Return what the light leaves (E,) of differences `side` of log brightness."""
+    return np.asarray(side - np.log(_brightness(weights, one) / _brightness(weights, two)))
+
+
+def _slopes(weights: Array, wave: Array) -> Array:
     """Return how log brightness (E, 11) changes with every weight."""
-    lit = (normals @ light.weights[8:] > 0)[:, None]
-    return np.hstack([_harmonics(normals), normals * lit]) / light.on(normals)[:, None]
+    lit = (wave[:, :3] @ weights[8:] > 0)[:, None]
+    return np.hstack([wave, wave[:, :3] * lit]) / _brightness(weights, wave)[:, None]
 
 
-def _not_black(light: Light, one: Array, two: Array) -> Light:
-    """Return the light with harmonics so weak that no place is black without the lamp."""
-    sky = Light(np.where(_OF_SKY, light.weights, 0.0))
-    dip = 1 - min(float(sky.on(one).min()), float(sky.on(two).min()))
-    return Light(light.weights - sky.weights * max(0.0, 1 - (1 - _DARKEST) / max(dip, 1e-12)))
+def _not_black(weights: Array, one: Array, two: Array) -> Array:
+    """Return weights with harmonics so weak that no place is black without the lamp."""
+    dip = -min(float((one @ weights[:8]).min()), float((two @ weights[:8]).min()))
+    return np.where(_OF_SKY, weights * min(1.0, (1 - _DARKEST) / max(dip, 1e-12)), weights)
