@@ -1,10 +1,4 @@
-"""Colours of a surface: the light taken out, noise averaged, and the few colours that the object is made of.
-
-However an object is lit from afar, brightness is nearly a quadratic function of the normal, albedo (1 + s . f(n)) with
-the eight harmonics f of first and second order: a lamp lights one side and leaves the other alike dark. Most neighbours
-have one albedo, so s is found from pairs of them without knowing any colour, by a robust fit.
-Source: Basri and Jacobs 2003, "Lambertian reflectance and linear subspaces", sec. 3: nine harmonics hold 99 %.
-"""
+"""Colours of a surface: the light taken out, noise averaged, and the few colours that the object is made of."""
 
 from __future__ import annotations
 
@@ -25,8 +19,8 @@ FINEST, COARSEST = 0.03, 0.2
 _STEPS = 3.0  # one colour reaches this many median steps between neighbours
 _LEFT = 0.75  # of the noise: what averaging leaves of it is alike in neighbours, and so not seen between them
 _RARE = 0.01  # a colour has at least this share of the points
-_ONE_SIDE = 0.9  # product of the normals of neighbours on one side of a thin body, which a lamp lights alike
-_SHADE = 0.08  # of the brightness: what is left of the light once the lamp is taken out
+_ONE_SIDE = 0.9  # product of the normals of neighbours on one side of a thin body, which are lit alike
+_SHADE = 0.08  # of the brightness: what is left of the light once it is taken out
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,10 +28,10 @@ class ColourModes:
     """The M colours of an object.
 
     label  (V,) the colour 0..M-1 of every point
-    rgb    (M, 3) the colours, 0..255, as they are without the lamp
+    rgb    (M, 3) the colours, 0..255, as they are without the light
     light  what lights the object
     noise  median distance of neighbouring colours, 0..1, before averaging
-    plain  (V, 3) the colour of every point, 0..1, without the lamp and before averaging
+    plain  (V, 3) the colour of every point, 0..1, without the light and before averaging
     """
 
     label: Integers
@@ -51,7 +45,7 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255.
 
     normals  (V, 3) outward at the vertices, where they are known better than the triangles tell
-    seen     (V,) whose colour was measured; the rest take the colour that the nearest of those has without the lamp
+    seen     (V,) whose colour was measured; the rest take the colour that the nearest of those has without the light
     """
     seen = np.ones(len(rgb), dtype=bool) if seen is None or not seen.any() else seen
     colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near[:, :NEIGHBOURS]
@@ -63,6 +57,7 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     sure = seen.copy()
     if light.seen:
         colour = colour / light.on(facing)[:, None]
+        # Colours at edges are mixtures. An edge is less flat than what is around it; a thin rod is flat nowhere.
         around = np.minimum(np.median(flatness[skin.near], axis=1), np.median(flatness[seen]))
         sure &= flatness > np.minimum(0.95, around)
     colour = _lent(colour, skin.vertices, seen)

@@ -46,11 +46,11 @@ class Light:
         return _brightness(self.weights, _harmonics(normals))
 
 
-DARK = Light(np.zeros(11))
+UNLIT = Light(np.zeros(11))
 
 
 def light_on(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Light:
-    """Return the light; DARK where the brightness does not follow the normals.
+    """Return the light; UNLIT where the brightness does not follow the normals.
 
     The fit is over pairs of flat places a few spacings apart whose normals differ: next neighbours share their errors,
     and at an edge a colour is a mixture. It must take away a quarter of the pairs' robust cost to be believed.
@@ -63,7 +63,7 @@ def light_on(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Ligh
 
     flat = np.flatnonzero(flatness > np.clip(np.median(flatness), 0.9, 0.98))
     if len(flat) < 2:
-        return DARK
+        return UNLIT
     tree, some = cKDTree(xyz[flat]), flat[:: 1 + len(flat) // _PLACES]
     apart = flat[tree.query(xyz[some], min(_APART[-1] + 1, len(flat)))[1].reshape(len(some), -1)[:, _APART[0] :: 4]]
     i, j = np.repeat(some, apart.shape[1]), apart.ravel()
@@ -73,10 +73,10 @@ def light_on(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Ligh
     side = bright[i] - bright[j]
     before = _cost(side)
     if before < _EVEN:
-        return DARK
+        return UNLIT
     wave = _harmonics(normals)
     weights, after = _fitted(wave[i], wave[j], side)
-    return Light(weights) if after < 0.75 * before and np.linalg.norm(weights) >= _LIGHT_SEEN else DARK
+    return Light(weights) if after < 0.75 * before and np.linalg.norm(weights) >= _LIGHT_SEEN else UNLIT
 
 
 def _harmonics(normals: Array) -> Array:
@@ -105,27 +105,31 @@ def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, float]:
 
 
 def _improved(weights: Array, count: int, one: Array, two: Array, side: Array) -> tuple[Array, float]:
-    """Return weights and cost after robust Gauss-Newton steps of the first `count`: pairs of two albedos are outliers."""
-    off = _left(weights, one, two, side)
-    cost = _cost(off)
+    """Return weights and their cost after robust Gauss-Newton steps of the first `count`.
+
+    Pairs of two albedos are outliers (Cauchy's weights). A step is shortened until the cost falls: a lamp has a kink.
+    """
+    cost = _cost(_left(weights, one, two, side))
     for _ in range(_STEPS):
-        rows = (_slopes(weights, one) - _slopes(weights, two))[:, :count]
-        weighted = rows.T / (_ROUGH**2 + off**2)
-        normal = weighted @ rows
-        ridge, held = _RIDGE * np.trace(normal) / count, np.where(_OF_SKY, weights, 0.0)[:count]
-        step = np.linalg.solve(normal + ridge * np.eye(count), weighted @ off - ridge * held)
-        step = np.append(step, np.zeros(len(weights) - count))
-        for length in _LENGTHS:
-            moved = _not_black(weights + length * step, one, two)
-            left = _left(moved, one, two, side)
-            if better := _cost(left) < cost:
-                break
-        if not better:
-            break
-        weights, off, gain, cost = moved, left, cost - _cost(left), _cost(left)
-        if gain < _SETTLED * cost:
+        step = _step(weights, count, one, two, side)
+        tried = (_not_black(weights + length * step, one, two) for length in _LENGTHS)
+        better = ((moved, less) for moved in tried if (less := _cost(_left(moved, one, two, side))) < cost)
+        moved, less = next(better, (weights, cost))
+        fall, weights, cost = cost - less, moved, less
+        if fall <= _SETTLED * cost:
             break
     return weights, cost
+
+
+def _step(weights: Array, count: int, one: Array, two: Array, side: Array) -> Array:
+    """Return a Gauss-Newton step (11,) of the first `count` weights, those of the harmonics held by a small ridge."""
+    off = _left(weights, one, two, side)
+    rows = (_slopes(weights, one) - _slopes(weights, two))[:, :count]
+    weighted = rows.T / (_ROUGH**2 + off**2)
+    normal = weighted @ rows
+    ridge, held = _RIDGE * np.trace(normal) / count, np.where(_OF_SKY, weights, 0.0)[:count]
+    step = np.linalg.solve(normal + ridge * np.eye(count), weighted @ off - ridge * held)
+    return np.append(step, np.zeros(len(weights) - count))
 
 
 def _left(weights: Array, one: Array, two: Array, side: Array) -> Array:
