@@ -145,11 +145,13 @@ def surfels(
                 left, right = depth[k, v, u - step] * unit, depth[k, v, u + step] * unit
                 up, down = depth[k, v - step, u] * unit, depth[k, v + step, u] * unit
                 most = _STEEP * step * z / fx + 4 * noise * z * z
-                if left <= 0 or right <= 0 or up <= 0 or down <= 0:
+                left, west = _beside(left, z, most, -step / fx)
+                right, east = _beside(right, z, most, step / fx)
+                up, north = _beside(up, z, most, -step / fy)
+                down, south = _beside(down, z, most, step / fy)
+                if west == east or north == south:
                     continue
-                if max(abs(left - z), abs(right - z), abs(up - z), abs(down - z)) > most:
-                    continue
-                faces, nxc, nyc = _facing(a, b, left, right, up, down, step / fx, step / fy)
+                faces, nxc, nyc = _facing(a, b, left, right, up, down, west, east, north, south)
                 if not faces:
                     continue
                 nxw = R[k, 0, 0] * nxc + R[k, 0, 1] * nyc - R[k, 0, 2]
@@ -178,17 +180,30 @@ def surfels(
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
+def _beside(near: float, z: float, most: float, away: float) -> tuple[float, float]:
+    """Return depth and place of a neighbour, those of the pixel itself where that was lost or is of another surface.
+
+    near  depth of the neighbour [m], 0 where nothing was measured; z that of the pixel
+    most  how far the two may lie apart on one surface [m]
+    away  how far its ray is from the pixel's, in slope
+    """
+    return (near, away) if near > 0 and abs(near - z) <= most else (z, 0.0)
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
 def _facing(
-    a: float, b: float, left: float, right: float, up: float, down: float, across: float, along: float
-) -> tuple[bool, float, float]:
+    a: float, b: float, left: float, right: float, up: float, down: float, west: float, east: float, north: float,
+    south: float,
+) -> tuple[bool, float, float]:  # fmt: skip
     """Return whether a surface faces the camera enough to be asked, and its normal (x, y, -1) in the camera's axes.
 
-    a, b           slopes of the pixel's ray
-    left .. down   depths of the neighbours [m], `across` and `along` in slope from the pixel
+    a, b            slopes of the pixel's ray
+    left .. down    depths of the neighbours [m]
+    west .. south   how far their rays are from the pixel's, in slope
     """
     # tangents along the image's rows and columns
-    dx, dy, dz = a * (right - left) + across * (right + left), b * (right - left), right - left
-    ex, ey, ez = a * (down - up), b * (down - up) + along * (down + up), down - up
+    dx, dy, dz = a * (right - left) + east * right - west * left, b * (right - left), right - left
+    ex, ey, ez = a * (down - up), b * (down - up) + south * down - north * up, down - up
     x, y, z = ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx
     # Not made unit: slopes then average without a pull toward the camera, whatever their noise.
     if z >= 0:
