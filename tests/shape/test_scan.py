@@ -184,6 +184,14 @@ def test_views_from_one_side_close_the_far_one(arc: float) -> None:
     assert carved(enclose(scan.cloud), scan.empty).mesh.volume == pytest.approx(1.8e-4, rel=0.025)
 
 
+def test_a_volume_is_less_sure_the_more_of_its_skin_nobody_saw(box: Scanned) -> None:
+    scan = fuse(box.views)
+    solid = enclose(scan.cloud)
+    assert 0.2 < scan.unseen < 0.6
+    assert carved(solid, scan.empty, scan.unseen).volume_std < 0.07
+    assert carved(solid, scan.empty, 0.8).volume_std > carved(solid, scan.empty, 0.6).volume_std > 0.07
+
+
 @pytest.mark.parametrize(("camera", "most"), [(D435, 0.167), (SMALL, 0.14)], ids=["fine", "coarse"])
 def test_a_rod_of_two_or_three_pixels_is_found(camera: Intrinsics, most: float) -> None:
     """No pixel of it has both neighbours across: where one is of the table the other tells the slope."""

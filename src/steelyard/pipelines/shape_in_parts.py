@@ -103,7 +103,7 @@ def shape_of(
     """
     if isinstance(seen, Views):
         seen = fuse(seen)
-    solid = carved(enclose(seen.cloud), seen.empty) if isinstance(seen, Scan) else enclose(seen)
+    solid = carved(enclose(seen.cloud), seen.empty, seen.unseen) if isinstance(seen, Scan) else enclose(seen)
     if refill is not None:
         mesh = refill(solid.mesh)
         solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)), around=None, inside=None)

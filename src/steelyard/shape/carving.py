@@ -20,12 +20,16 @@ _EMPTY, _FULL = 0.5, 0.1  # share of the places seen empty, above which a cell i
 # Cells that cloud and views judge differently count half. Volumes of scans are no better than this share even where
 # they agree: the rms error over scans of tools without hidden hollows, whose undersides nobody saw.
 _HALF, _LEAST_STD = 0.5, 0.05
+# Of what lies on a table views all around leave half of the skin unseen. What closes more of it may stand off: so much
+# further standard deviation for all of the skin.
+_ON_TABLE, _UNSEEN = 0.5, 0.3
 
 
-def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
+def carved(solid: Solid, empty: Callable[[Array], Any], unseen: float = 0.0) -> Solid:
     """Return the solid with its cells decided anew where the views decide.
 
-    empty  whether points (N, 3) are known to be outside: `Scan.empty`
+    empty   whether points (N, 3) are known to be outside: `Scan.empty`
+    unseen  share of the skin that nobody saw: `Scan.unseen`
 
     With the underside closed, all that no view saw to be empty is the object's; between, the solid's own verdict holds.
     A surface that looked open is closed by that. CannotAnswer where the views leave nothing.
@@ -45,7 +49,8 @@ def carved(solid: Solid, empty: Callable[[Array], Any]) -> Solid:
     findings = tuple(f for f in solid.findings if f.code != "surface-open")
     mesh = around.chosen(inside)
     disputed = float(around.volumes[(share < _EMPTY) != (known >= 0)].sum()) / mesh.volume
-    std = max(_LEAST_STD, min(solid.volume_std, _HALF * disputed))
+    least = _LEAST_STD + _UNSEEN * max(0.0, unseen - _ON_TABLE)
+    std = max(least, min(solid.volume_std, _HALF * disputed))
     return replace(
         solid, mesh=mesh, sure=sure[inside], volume_std=std, findings=findings, inside=np.flatnonzero(inside)
     )

@@ -73,6 +73,11 @@ class Scan:
     stages: dict[str, float]
     empty: Callable[[Array], Any] = field(repr=False)
 
+    @property
+    def unseen(self) -> float:
+        """Share of the cloud that no camera saw, which closes the rest."""
+        return 1 - self.seen / len(self.cloud)
+
 
 def fuse(views: Views, points: int = POINTS) -> Scan:
     """Return the object that lies on the table as one cloud of about `points` points.
