@@ -7,6 +7,7 @@ import itertools
 import numpy as np
 import pytest
 from parts_blocks import body, solid
+from scipy.spatial import Delaunay, cKDTree
 
 from steelyard.errors import BadValue
 from steelyard.evaluate.segments import score_segments
@@ -52,8 +53,6 @@ def bent(points=1500, seed=0):
     middle, turn = spine(s)
     out = np.stack([np.cos(turn), 0 * turn, -np.sin(turn)], axis=1)
     xyz = middle + r[:, None] * (np.cos(angle)[:, None] * out + np.sin(angle)[:, None] * np.array([0, 1, 0]))
-    from scipy.spatial import Delaunay, cKDTree
-
     tets = Delaunay(xyz).simplices
     axis = spine(np.linspace(0, length, 400))[0]
     near = cKDTree(axis).query(xyz[tets].mean(1))[0] < thick
@@ -70,6 +69,18 @@ def test_two_colours_are_two_parts_that_fill_the_solid():
     np.testing.assert_allclose(found.rgb, [RUBBER, STEEL], atol=10)
     assert found.sureness.argmax() == 1
     assert found.sureness.sum() == pytest.approx(1)
+
+
+def test_a_sliver_that_hangs_free_is_no_part():
+    """It is skin all over, as foil is, but weighs nothing, and no neighbour could take it in."""
+    cloud, mesh = made(MALLET, [RUBBER, STEEL])
+    x, y = np.meshgrid(np.linspace(-0.004, 0.004, 5), np.linspace(-0.004, 0.004, 5))
+    sliver = np.stack([x, y, -0.0005 - 0.0002 * (np.arange(25) % 2).reshape(5, 5)], axis=2).reshape(-1, 3)
+    tets = Delaunay(sliver).simplices + len(cloud)
+    xyz = np.concatenate([cloud.xyz, sliver])
+    one = Cloud(xyz, np.concatenate([cloud.rgb, np.tile(np.uint8((200, 30, 30)), (25, 1))]))
+    found = segment(one, TetMesh(xyz, np.concatenate([mesh.tets, tets])))
+    assert len(found) == 2
 
 
 def test_a_handle_in_a_head_of_the_same_colour_is_found_by_its_shape():

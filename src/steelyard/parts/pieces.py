@@ -74,7 +74,9 @@ def pieces_of(
     seen = np.bincount(skin.cell, skin.areas, len(mesh)) / skin.areas.sum()
     size = np.maximum(mesh.volumes / mesh.volume / TINY, seen / TINY_SKIN)
     piece = _absorbed(piece, size, pairs, areas, 1.0)
-    piece = _specks_to_nearest(mesh, piece, size)
+    # A sliver that hangs free is skin all over, and was foil for that.
+    touching = np.isin(piece, piece[pairs][piece[pairs[:, 0]] != piece[pairs[:, 1]]])
+    piece = _specks_to_nearest(mesh, piece, np.where(touching, size, mesh.volumes / mesh.volume / TINY))
     # A piece has the colour of most of its volume.
     count, colours = int(piece.max()) + 1, int(colour.max()) + 1
     volume = np.bincount(piece * colours + colour, mesh.volumes, count * colours).reshape(count, colours)
