@@ -8,6 +8,7 @@ from parts_blocks import body, inside, solid
 from scipy.spatial import cKDTree
 
 from steelyard.parts.colours import colour_modes
+from steelyard.parts.light import Light
 from steelyard.parts.prints import without_prints
 from steelyard.parts.skin import skin_of
 from steelyard.shape.cloud import Cloud
@@ -184,3 +185,10 @@ def test_a_thin_rod_under_a_lamp_keeps_its_colour():
     assert modes.light.seen
     assert len(modes.rgb) == 2
     assert agreement(modes.label, cloud.labels) > 0.97
+
+
+def test_no_side_is_black_however_little_tells_of_it():
+    """The fit knows the sides that are seen; on others harmonics may pass zero, and colours would burst."""
+    light = Light(np.array([0.9, 0, 0, 0, 0, 0, -0.9, 0, 0, 0, 0.0]))
+    assert light.on(SIDES).min() == pytest.approx(0.1)
+    np.testing.assert_allclose(light.on(SIDES)[[0, 1, 2]], [1.45, 1.45, 1.0])

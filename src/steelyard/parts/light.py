@@ -42,8 +42,11 @@ class Light:
         return bool(self.weights.any())
 
     def on(self, normals: Array) -> Array:
-        """Return the brightness (...) of places with these normals (..., 3); 1 where no light is seen."""
-        return _brightness(self.weights, _harmonics(normals))
+        """Return the brightness (...) of places with these normals (..., 3); 1 where no light is seen.
+
+        Toward sides of which no pair told, harmonics may fall below zero: nothing is darker than the darkest.
+        """
+        return np.maximum(_brightness(self.weights, _harmonics(normals)), _DARKEST)
 
 
 UNLIT = Light(np.zeros(11))
