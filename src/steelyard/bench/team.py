@@ -88,7 +88,8 @@ def run(
 
     With `joint` also its errors over the Cramer-Rao bound where noise is white, over as many trials, and how often its
     95 % intervals hold the truth, over `coverage` trials per kind of noise, and what becomes of it when a clock is
-    late, a grasp slips (`slips` times in two cases) or a robot leaves. An empty choice means all.
+    late, a grasp slips (`slips` times in two cases) or a robot leaves, what motions do not show, and what must not
+    change its answer. An empty choice means all.
     `progress(done, all)` is called after every trial of the cases. Raises BadValue for unknown names.
     """
     require_one("trial", trials)
@@ -115,14 +116,15 @@ def run(
 
 
 def _of_joint(trials: int, coverage: int, slips: int, workers: int) -> dict[str, Any]:
-    """Return what is asked of the joint estimator alone: bound, times, events, troubles, and its intervals."""
-    from steelyard.bench import team_bound, team_coverage, team_events, team_troubles
+    """Return what is asked of the joint estimator alone: bound, times, events, troubles, laws, and its intervals."""
+    from steelyard.bench import team_bound, team_coverage, team_events, team_laws, team_troubles
 
     out: dict[str, Any] = {
         "bound": team_bound.run(trials),
         "times": [times(robots, rows) for robots, rows in TIMED],
         "events": team_events.run(trials, slips, workers),
         "troubles": team_troubles.run(trials, workers),
+        "laws": team_laws.run(max(1, trials // 4), workers),
     }
     return out | {"coverage": team_coverage.coverage(coverage, workers=workers)} if coverage else out
 

@@ -44,6 +44,7 @@ def team_table(result: dict[str, Any]) -> str:
         lines += [f"joint, {row['n']} robots, {row['rows']} rows, whole identification: {row['time_s']:.3f} s CPU"]
     lines += _events(result.get("events", {}))
     lines += _troubles(result.get("troubles", {}))
+    lines += _laws(result.get("laws", {}))
     for noise, kinds in result.get("coverage", {}).items():
         if isinstance(kinds, dict):
             said = ", ".join(f"{kind} {v['coverage_pct']:.1f} %" for kind, v in kinds.items())
@@ -90,6 +91,25 @@ def _troubles(troubles: dict[str, Any]) -> list[str]:
                 f"{name.replace('_', ' ')}: named in {told['named']} of {troubles['trials']}, falsely in "
                 f"{told['false']}; with it (without): {errors}"
             )
+    return lines
+
+
+def _laws(laws: dict[str, Any]) -> list[str]:
+    """Return a line for every motion and what it shows, and for every change that must not matter."""
+    lines = []
+    for sensed, motions in laws.get("motions", {}).items():
+        for name, told in motions.items():
+            least, most = told["shown"]
+            lines.append(
+                f"{sensed}, {name.replace('_', ' ')}: shows {told['asked']} of 6 (told {least} to {most}, named in "
+                f"{told['named']} of {laws['trials']}), wrench rank {told['wrench_rank'][0]} to "
+                f"{told['wrench_rank'][1]}; along what is shown {told['deg']:.4f} deg, {told['mm']:.3f} mm"
+            )
+    for session, changes in laws.get("same", {}).items():
+        said = ", ".join(
+            f"{name.replace('_', ' ')} {d['grasps']:.0e}, {d['parameters']:.0e}" for name, d in changes.items()
+        )
+        lines.append(f"{session}, largest difference of grasps and of parameters: {said}")
     return lines
 
 
