@@ -48,8 +48,9 @@ PLACES, SIGNS = np.argwhere(AD != 0).astype(np.int64), AD[AD != 0]
 
 @dataclass(frozen=True, eq=False)
 class TwistFit:
-    """The optimum: grasps (N,), noise (N, 2) [rad/s, m/s], spread, and delays (N,) [s] with standard deviations.
+    """The optimum: grasps (N,), noise (N, 2) [rad/s, m/s], spread, and delays (N,) [s] with covariance (N, N) [s^2].
 
+    Delays are against the reference's clock.
     left  how long the last step was, in standard deviations: next to nothing unless STEPS were too few
     """
 
@@ -57,8 +58,17 @@ class TwistFit:
     noise: Array
     spread: Spread
     delays: Array
-    delay_std: Array
+    delay_covariance: Array
     left: float
+
+    def punctual(self, least: float, stds: float) -> bool:
+        """Return whether all clocks are within `least` [s] or `stds` standard deviations of their mean.
+
+        Of the mean, since of the reference the answer would depend on who that is.
+        """
+        centred = np.eye(len(self.delays)) - 1 / len(self.delays)
+        std = np.sqrt(np.maximum(np.diag(centred @ self.delay_covariance @ centred), 0))
+        return bool((np.abs(centred @ self.delays) < np.maximum(least, stds * std)).all())
 
 
 def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> TwistFit:
@@ -93,8 +103,9 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level
     blind[unknown] = lost
     turn = adjoint(grasps)
     turn[:, 3:, :3] = 0.0
-    delays, std = _delays(merged, grasps, noise, reference)
-    return TwistFit(grasps, noise, Spread(spread, blind, std, turn), delays, std, float(np.sqrt(gained)))
+    delays, doubt = _delays(merged, grasps, noise, reference)
+    late = np.sqrt(np.maximum(np.diag(doubt), 0))
+    return TwistFit(grasps, noise, Spread(spread, blind, late, turn), delays, doubt, float(np.sqrt(gained)))
 
 
 def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[Array, Array]:
@@ -302,7 +313,7 @@ def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown
 
 
 def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) -> tuple[Array, Array]:
-    """Return how late every clock is (N,) [s] and its standard deviation, beside known grasps."""
+    """Return how late every clock is against the reference's (N,) [s], and its covariance, beside known grasps."""
     count = merged.count
     size = 6 * count
     H, g = np.zeros((count, count)), np.zeros(count)
@@ -314,7 +325,7 @@ def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) ->
         mixed = P @ (S[:size, size:] @ split.WJ)
         g -= np.einsum("ak,ak->a", mixed, fitted).reshape(count, 6).sum(1)
     others = np.arange(count) != reference
-    delays, std = np.zeros(count), np.zeros(count)
+    delays, covariance = np.zeros(count), np.zeros((count, count))
     inverse = np.linalg.pinv(H[np.ix_(others, others)], hermitian=True)
-    delays[others], std[others] = inverse @ g[others], np.sqrt(np.maximum(np.diag(inverse), 0))
-    return delays, std
+    delays[others], covariance[np.ix_(others, others)] = inverse @ g[others], inverse
+    return delays, covariance

@@ -65,10 +65,9 @@ class TwistTeam:
         for left in reversed(range(CLOCK_ROUNDS)):
             parts = _changed(twist_stretches(log, late), edit)
             fit = _joint_fit(parts, log)
-            enough = (SETTLED if any(late.values()) else 1.0) * np.maximum(PUNCTUAL, DOUBTED * fit.delay_std)
-            settled = bool((np.abs(fit.delays) < enough).all())
+            share = SETTLED if any(late.values()) else 1.0
             # What is told of clocks is what the rows and the fit were made with.
-            if not (clocks and left) or settled:
+            if not (clocks and left) or fit.punctual(share * PUNCTUAL, share * DOUBTED):
                 break
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
         return cls(parts, fit, late)
