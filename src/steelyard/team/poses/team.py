@@ -13,7 +13,6 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
-from steelyard.spatial.screws import exp_pose
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
@@ -33,9 +32,10 @@ from steelyard.team.turns import turns_between, twists_between
 PUNCTUAL = 2e-4
 # A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
 DOUBTED = 4.0
-CLOCK_ROUNDS = 6
-# Delays longer than this [s] are found once more, about themselves.
-LONG = 1e-3
+# Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
+# is the reference, and by where noisy rows are then read the answer does in its sixth digit.
+STILL = 1e-8
+CLOCK_ROUNDS = 10
 # Clocks that move by less [s] leave what the rows say as it is: nobody turns a payload far in that time.
 UNCHANGED = 0.02
 # Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
@@ -94,10 +94,11 @@ class PoseTeam:
             timed = replace(data, twist=_twists(parts, team))
             fit = fit_poses(timed, replace(team, delays=np.zeros(data.count)), reference, fit.noise, NEARLY, known)
             step = np.abs(fit.team.delays)
-            if not left or (step < np.maximum(PUNCTUAL, DOUBTED * fit.doubt)).all():
+            near = STILL if any(late.values()) else np.maximum(PUNCTUAL, DOUBTED * fit.doubt)
+            if not left or (step < near).all():
                 break
             known = fit.known if step.max() < UNCHANGED else None
-            late = _later(late, _whole_delays(parts, timed, fit))
+            late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion(*all_poses(parts))
         share = shares_at_rest(parts, fit)
@@ -105,7 +106,7 @@ class PoseTeam:
             fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
         else:
             fit = fit_poses(replace(timed, share=share), fit.team, reference, fit.noise)
-        return cls(parts, fit, _later(late, fit.team.delays))
+        return cls(parts, fit, _later(late, fit))
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
@@ -200,25 +201,9 @@ class PoseTeam:
         return out, noise
 
 
-def _later(late: Mapping[str, float], delays: Array) -> dict[str, float]:
-    """Return how late each clock is [s] with the delays (N,) that a fit found."""
-    return {name: before + float(more) for (name, before), more in zip(late.items(), delays, strict=True)}
-
-
-def _whole_delays(parts: tuple[Stretch, ...], timed: TeamMotion, fit: PoseFit) -> Array:
-    """Return the delays (N,) [s] of a fit, found once more about themselves where they are long.
-
-    A long delay is no small residual, so that who is the reference decides about its last microsecond, and by where
-    rows are then read about the sixth digit of the answer.
-    """
-    delays = fit.team.delays
-    if np.abs(delays).max() < LONG:
-        return delays
-    twist = _twists(parts, fit.team)
-    back = timed.poses @ exp_pose(-delays[:, None] * twist)
-    team = replace(fit.team, delays=0 * delays)
-    about = fit_poses(replace(timed, poses=back, twist=twist), team, fit.reference, fit.noise, NEARLY)
-    return np.asarray(delays + about.team.delays)
+def _later(late: Mapping[str, float], fit: PoseFit) -> dict[str, float]:
+    """Return how late each clock is [s] with what a fit found."""
+    return {name: before + float(more) for (name, before), more in zip(late.items(), fit.team.delays, strict=True)}
 
 
 def _followed(data: TeamMotion, fit: PoseFit) -> Team:
