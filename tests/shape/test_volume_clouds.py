@@ -158,6 +158,19 @@ def test_an_underside_that_nobody_saw_is_said(brick: Sheet) -> None:
     assert solid.volume_std > 0.1
 
 
+@pytest.mark.parametrize("share", [0.1, 0.33, 0.5])
+@pytest.mark.parametrize("body", [block((0, 60), (0, 40), (0, 30)), ring(20, 14, 0, 50), channel(100, 12, 15, 2)])
+def test_patches_of_normals_that_are_turned_do_not_cost_the_volume(body: object, share: float) -> None:
+    made = sheet(body)
+    xyz, normal, *_ = spread_evenly(made.mesh, np.random.default_rng(1), 1500)
+    along = xyz @ np.array([1.0, 0.4, 0.2])
+    turned = np.where((along < np.quantile(along, share))[:, None], -normal, normal)
+    right, wrong = (enclose(Cloud(xyz, normals=given)) for given in (normal, turned))
+    assert "normals-flipped" not in codes(right)
+    assert "normals-flipped" in codes(wrong)
+    assert wrong.mesh.volume == pytest.approx(made.volume, rel=0.1)
+
+
 @pytest.mark.parametrize(("turned", "said"), [(0, set()), (1200, {"normals-flipped"}), (500, {"normals-flipped"})])
 def test_normals_that_come_with_the_cloud_are_used_unless_they_are_wrong(
     brick: Sheet, brick_normals: Drawn, turned: int, said: set[str]

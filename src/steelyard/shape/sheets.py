@@ -44,6 +44,18 @@ def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
     return float((off.sum(1) >= _FEW).mean())
 
 
+def torn(xyz: Array, normals: Array, index: Integers, slope: float) -> float:
+    """Return the share of links between neighbours on one sheet whose normals face opposite ways.
+
+    Arguments as in `sheet_planes`, normals (N, 3) unit vectors. It is next to nothing where normals are right, but on
+    walls so thin that a sheet's neighbours lie on its other side.
+    """
+    link = np.abs(sheet_planes(xyz, index, slope)[1])
+    opposite = np.einsum("nkd,nd->nk", normals[index], normals) < _OPPOSITE
+    return float((link * opposite).sum() / max(float(link.sum()), 1e-300))
+
+
+_OPPOSITE = -0.5  # cosine between normals that face opposite ways
 _STEEP = 0.25  # slope of the line to a neighbour on another sheet, at least
 _ALIKE = 0.9  # cosine between normals that look the same way
 _FLAT = 3.0  # links of a point on a flat piece
