@@ -312,7 +312,8 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
         )
         findings += (Finding.of("surface-open", text),)
     unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
-    std = float(np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * thin) ** 2 + (_HOLE * gap * hole) ** 2))
+    wrong = thin or any(finding.code == "table-in-cloud" for finding in findings)
+    std = float(np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * wrong) ** 2 + (_HOLE * gap * hole) ** 2))
     kept = replace(used.cloud, normals=surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
 

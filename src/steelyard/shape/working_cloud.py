@@ -11,6 +11,7 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.left_table import left_table
 from steelyard.shape.mesh import Integers
 from steelyard.shape.noisy_points import settled
 from steelyard.shape.spacing import Neighbours
@@ -49,7 +50,9 @@ def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> Workin
     thin = _thinned(_without_repeats(cloud), most, settle)
     cloud, last = _one_object(thin.cloud)
     _require_solid(cloud.xyz)
-    return WorkingCloud(cloud, thin.noise, (*found, *thin.findings, *last))
+    # What views gave stands on a table that was found and taken away.
+    table = left_table(cloud.xyz, float(np.median(cloud.near.spacing))) if cloud.seen is None else None
+    return WorkingCloud(cloud, thin.noise, (*found, *thin.findings, *last, *([table] if table else [])))
 
 
 def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
