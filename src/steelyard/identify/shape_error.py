@@ -14,6 +14,8 @@ from steelyard.spatial import Pose, Rotation
 
 # How far the centre of mass of a scan errs along an axis, over the stretch of its radius of gyration.
 LEAN = 0.2
+# What a hidden core may take from a second moment across a long body, as a share of it (one standard deviation).
+CORE = 0.15
 # Masses of a scan's parts need not sum to the whole closer than this share: a sum that is known a thousand times better
 # than its parts makes a valley too narrow and bent for Newton's method. The whole then goes where the log sees it.
 LOOSE = 1e-3
@@ -95,10 +97,10 @@ class ShapeError:
         phi, inner = body.vector.copy(), np.zeros((10, 10))
         inner[range(1, 4), range(1, 4)] = self.com_m**2
         if self.stretch:
-            slope = _stretched(body.inertia_com)
+            slope = _stretched(body.inertia_com, self.stretch)
             inner[0, 0] = (LOOSE * float(body.mass)) ** 2
             inner[1:4, 1:4] += (LEAN * self.stretch) ** 2 * _second_moments(body.inertia_com) / body.mass
-            inner[4:, 4:] = self.stretch**2 * slope @ slope.T
+            inner[4:, 4:] = slope @ slope.T
         else:
             inner[4:, 4:] = (self.inertia_share * half_trace_com(phi)) ** 2 * np.eye(6)
         if self.turn_rad:
@@ -137,20 +139,24 @@ def _turned(inertia: Array) -> Array:
     return np.asarray(change[:, *np.triu_indices(3)].T)
 
 
-def _stretched(inertia: Array) -> Array:
-    """Return what six independent unit strains do to the inertia about the centre of mass (6, 6).
+def _stretched(inertia: Array, stretch: float) -> Array:
+    """Return what six independent strains of one standard deviation do to the inertia about the centre of mass (6, 6).
 
     The second moments S = 1/2 tr(I) 1 - I become S + S^1/2 E S^1/2. Of the symmetric E the entries on the diagonal have
-    variance 1 and those beside it 1/2, so that no axes are preferred; each entry errs by a share of what it comes from.
+    the variance `stretch` squared and those beside it half of that, so that no axes are preferred; each entry errs by a
+    share of what it comes from. Across a long body, where no scan sees whether a tang runs through the grip, the
+    diagonal's are larger by CORE: the small moments are those of the skin, and what is inside may lie at the middle.
     """
     moments, axes = np.linalg.eigh(_second_moments(inertia))
-    root = (axes * np.sqrt(np.maximum(moments, 0))) @ axes.T
+    moments = np.maximum(moments, 0)
+    root = axes * np.sqrt(moments)
+    across = CORE * (1 - np.sqrt(moments / max(float(moments[-1]), 1e-300)))
     rows, columns = np.triu_indices(3)
     out = np.empty((6, 6))
     for k, (i, j) in enumerate(zip(rows, columns, strict=True)):
         E = np.zeros((3, 3))
-        E[i, j] = E[j, i] = 1.0 if i == j else np.sqrt(0.5)
-        change = root @ E @ root
+        E[i, j] = E[j, i] = np.hypot(stretch, across[i]) if i == j else stretch * np.sqrt(0.5)
+        change = root @ E @ root.T
         out[:, k] = (np.trace(change) * np.eye(3) - change)[rows, columns]
     return out
 

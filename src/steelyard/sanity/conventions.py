@@ -293,15 +293,6 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
     turned = turned_sensor(view, reading.gravity, _sign(view, reading))
     stream = next(s for s in recording.streams if "force" in s.channels)
-    if turned is not None and _sensor_turned(turned, tilt, reading.fit):
-        message = (
-            f"The wrench is turned by {np.degrees(turned.rotation.angle()):.0f} degrees against the frame whose "
-            f"rotation is given: '{stream.name}' looks mounted by the rotation vector "
-            f"({vector(mount_of(stream, turned.rotation))}) rad in S. So read, {percent(turned.force_share)} of the "
-            f"force variance is left unexplained instead of {percent(reading.fit.force_share)}; the answer does not "
-            "assume this."
-        )
-        return recording, (Finding("sensor-turned", message, mount_remedy(stream, turned.rotation), left_in=True),)
     mirror = mirrored(view, reading.gravity, _sign(view, reading))
     if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
         message = (
@@ -311,6 +302,15 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
         )
         remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
         return recording, (Finding("force-unit", message, remedy, left_in=True),)
+    if turned is not None and _sensor_turned(turned, tilt, reading.fit):
+        message = (
+            f"The wrench is turned by {np.degrees(turned.rotation.angle()):.0f} degrees against the frame whose "
+            f"rotation is given: '{stream.name}' looks mounted by the rotation vector "
+            f"({vector(mount_of(stream, turned.rotation))}) rad in S. So read, {percent(turned.force_share)} of the "
+            f"force variance is left unexplained instead of {percent(reading.fit.force_share)}; the answer does not "
+            "assume this."
+        )
+        return recording, (Finding("sensor-turned", message, mount_remedy(stream, turned.rotation), left_in=True),)
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
