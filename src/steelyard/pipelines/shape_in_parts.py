@@ -15,7 +15,7 @@ from steelyard.findings import Finding
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.parts.parts import Parts
 from steelyard.parts.segment import Segmentation, segment
-from steelyard.shape.carving import carved
+from steelyard.shape.carving import carved, least_std
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.tets import TetMesh
@@ -103,7 +103,7 @@ def shape_of(
     """
     if isinstance(seen, Views):
         seen = fuse(seen)
-    solid = carved(enclose(seen.cloud), seen.empty, seen.unseen) if isinstance(seen, Scan) else enclose(seen)
+    solid = carved(enclose(seen.cloud), seen.empty, seen.unseen) if isinstance(seen, Scan) else _enclosed(seen)
     if refill is not None:
         mesh = refill(solid.mesh)
         solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)), around=None, inside=None)
@@ -113,6 +113,14 @@ def shape_of(
     made = segment(cloud, solid, parts=parts)
     scan, given = (seen, seen.cloud) if isinstance(seen, Scan) else (None, seen)
     return Shape(solid, made, scan, parts is not None, _notes(given))
+
+
+def _enclosed(cloud: Cloud) -> Solid:
+    """Return the solid of a cloud; that of a scan which was saved is no surer than with its views at hand."""
+    solid = enclose(cloud)
+    if cloud.seen is None:
+        return solid
+    return replace(solid, volume_std=max(solid.volume_std, least_std(1 - float(cloud.seen.mean()))))
 
 
 def _notes(given: Cloud) -> tuple[str, ...]:

@@ -49,11 +49,18 @@ def carved(solid: Solid, empty: Callable[[Array], Any], unseen: float = 0.0) -> 
     findings = tuple(f for f in solid.findings if f.code != "surface-open")
     mesh = around.chosen(inside)
     disputed = float(around.volumes[(share < _EMPTY) != (known >= 0)].sum()) / mesh.volume
-    least = _LEAST_STD + _UNSEEN * max(0.0, unseen - _ON_TABLE)
-    std = max(least, min(solid.volume_std, _HALF * disputed))
+    std = max(least_std(unseen), min(solid.volume_std, _HALF * disputed))
     return replace(
         solid, mesh=mesh, sure=sure[inside], volume_std=std, findings=findings, inside=np.flatnonzero(inside)
     )
+
+
+def least_std(unseen: float) -> float:
+    """Return the least standard deviation of the volume of a scan, as a share of it.
+
+    unseen  share of the skin that nobody saw
+    """
+    return _LEAST_STD + _UNSEEN * max(0.0, unseen - _ON_TABLE)
 
 
 def _cells(solid: Solid) -> tuple[TetMesh, Array]:
