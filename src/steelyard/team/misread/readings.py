@@ -80,7 +80,8 @@ class Reading:
         if self.unit:
             also = "" if np.isclose(size, 1.0) else ', and that of its "torque"'
             out.append(
-                f'Set the unit of the "force" of \'{name}\' to what its numbers are in, "{_NAMES[self.unit]}"{also}.'
+                f'Set the unit of the "force" of \'{name}\' to what its numbers are in, "{_NAMES[self.unit]}"{also}; '
+                'of a robot that gives "joint_torque", that of this, in the same measure.'
             )
         if mixed and turned and np.linalg.det(self.axes) > 0:
             numbers = ", ".join(f"{v:.0f}" for v in self.axes.ravel() + 0.0)
