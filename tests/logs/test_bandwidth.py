@@ -34,7 +34,8 @@ def lowered(aligned):
 def test_swinging_is_left_out(hz, at):
     aligned = align(swinging(hz))
     assert lowered(aligned) == [
-        f"above {at} Hz the wrench does not follow the poses, as where an arm swings or noise is most of it: it was low-passed there"
+        f"above {at} Hz the wrench does not follow the poses, as where an arm swings or noise is most of it: "
+        "it was low-passed there"
     ]
     assert np.median(np.diff(aligned.log.time)) == pytest.approx(1 / (2.5 * at), rel=0.2)
     assert fitted(aligned.log)[0] == pytest.approx(float(BODY.mass), rel=2e-3)

@@ -35,7 +35,10 @@ def _delayed(name: str, delay: float, std: float, own: bool) -> Finding:
 
 def swings(rigid: float) -> str:
     """Return the note on a structure that swings from `rigid` [Hz] on."""
-    return f"above {rigid:g} Hz the wrench does not follow the poses, as where an arm swings or noise is most of it: it was low-passed there"
+    return (
+        f"above {rigid:g} Hz the wrench does not follow the poses, as where an arm swings or noise is most of it: "
+        "it was low-passed there"
+    )
 
 
 def mount_findings(imu: Imu | None, mounting: Mounting | None) -> tuple[Finding, ...]:
