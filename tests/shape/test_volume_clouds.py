@@ -21,7 +21,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
-from steelyard.workshop.solids import block, ring
+from steelyard.workshop.solids import block, ring, rod
 
 Drawn = tuple[np.ndarray, np.ndarray]
 
@@ -156,6 +156,16 @@ def test_an_underside_that_nobody_saw_is_said(brick: Sheet) -> None:
     solid = enclose(Cloud(xyz[xyz[:, 2] > 1e-4]))
     assert codes(solid) == {"surface-open"}
     assert solid.volume_std > 0.1
+
+
+@pytest.mark.parametrize("points", [150, 300, 600, 1200])
+def test_bars_of_few_points_hold_what_chords_cut_off(points: int) -> None:
+    round_body = sheet(rod(20, 0, 90), points)
+    solid = enclose(round_body.cloud)
+    short = 1 - solid.mesh.volume / round_body.volume
+    assert 0 < short < 2.5 * solid.volume_std
+    flat = sheet(block((0, 60), (0, 40), (0, 30)), 2000)
+    assert enclose(flat.cloud).volume_std < 0.03
 
 
 @pytest.mark.parametrize("share", [0.1, 0.33, 0.5])

@@ -12,6 +12,7 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.canonical import canonical
 from steelyard.shape.cells import cells
+from steelyard.shape.chords import lacking
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.discs import Discs
 from steelyard.shape.islands import without_islands
@@ -52,8 +53,9 @@ _CLEARER = 0.5  # of that doubt: no more is left without such normals
 # tenth of the points turned: 0.005 and more; right ones 0.003 in most clouds, 0.1 on thin walls), and the share of them
 # that is left where points alone tell better.
 _TORN, _MENDED = 0.004, 0.8
-# Standard deviation of the volume: of any solid; per share of cells unsure; where walls blur; per share left open.
-_STD, _UNSURE, _THIN, _HOLE = 0.025, 0.1, 0.5, 1.0
+# Standard deviation of the volume: of any solid; per share between points of round surfaces and their chords; per share
+# of cells unsure; where walls blur; per share left open.
+_STD, _CHORDS, _UNSURE, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.5, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -313,7 +315,10 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
         findings += (Finding.of("surface-open", text),)
     unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
     wrong = thin or any(finding.code == "table-in-cloud" for finding in findings)
-    std = float(np.sqrt(_STD**2 + (_UNSURE * unsure) ** 2 + (_THIN * wrong) ** 2 + (_HOLE * gap * hole) ** 2))
+    few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
+    std = float(
+        np.sqrt(max(_STD, few) ** 2 + (_UNSURE * unsure) ** 2 + (_THIN * wrong) ** 2 + (_HOLE * gap * hole) ** 2)
+    )
     kept = replace(used.cloud, normals=surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
 
