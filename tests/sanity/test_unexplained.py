@@ -7,11 +7,12 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation as Turn
 
 import steelyard as sy
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
-from steelyard.logs.recording import Recording
+from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
 from steelyard.sanity import examine, examine_body
 from steelyard.simulate import hammer
@@ -122,6 +123,26 @@ def test_it_leaves_the_answer_of_rest(made: Recording) -> None:
 def test_a_clock_that_runs_too_slow_looks_like_a_weight_taken_away(made: Recording) -> None:
     (found,) = (f for f in held_object.identify(faster(made, 0.25)).findings if f.code == "weight-compensated")
     assert "A clock that runs 4 times too slow, or positions 16 times too small, do so, too" in found.message
+
+
+def test_columns_are_told_before_a_sensor_that_only_seems_turned() -> None:
+    """Where gravity stays near a plane of S, a turn does most of what an exchange of columns does."""
+    rng, normal = np.random.default_rng(0), np.array([0.6, 0.0, 0.8])
+    around = rng.uniform(0, 2 * np.pi, 40)
+    along, across = np.array([0.8, 0.0, -0.6]), np.array([0.0, 1.0, 0.0])
+    down = (
+        np.outer(np.cos(around), along) + np.outer(np.sin(around), across) + 0.2 * np.outer(rng.normal(size=40), normal)
+    )
+    down /= np.linalg.norm(down, axis=1, keepdims=True)
+    turns = np.stack([Turn.align_vectors([[0, 0, -1.0]], [d])[0].as_matrix() for d in down])
+    force = -1.5 * 9.81 * down
+    torque = np.cross([0.01, 0.02, 0.06], force)
+    felt = {"force": force + rng.normal(0, 0.05, force.shape), "torque": torque + rng.normal(0, 0.003, torque.shape)}
+    table = Recording((Stream("poses", {"rotation": turns, **felt}, None),), np.array([0, 0, -9.81]))
+    assert examine(table)[1] == ()
+    codes = {f.code for f in examine(forces(table, np.array([[0.0, 1, 0], [1, 0, 0], [0, 0, 1]])))[1]}
+    assert "force-unit" in codes
+    assert "sensor-turned" not in codes
 
 
 def test_it_is_said_with_the_refusal_too(made: Recording) -> None:
