@@ -11,7 +11,7 @@ from steelyard.spatial import Pose, Rotation
 
 
 @pytest.mark.parametrize("sensed", team_laws.SENSED)
-@pytest.mark.parametrize("motion", team_laws.MOTIONS)
+@pytest.mark.parametrize("motion", ["ball_joint", "one_axis", "one_axis_pivot", "one_axis_translation"])
 def test_what_a_motion_shows(motion: str, sensed: str) -> None:
     row = team_laws.lost_trial((sensed, motion, team_laws.FIRST_SEED))
     shows = team_laws.MOTIONS[motion].shows

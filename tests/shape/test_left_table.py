@@ -67,3 +67,11 @@ def test_what_views_gave_stands_on_no_table() -> None:
     xyz = on_table(points(THING), 0.05)
     solid = enclose(Cloud(xyz, seen=np.ones(len(xyz), np.bool_)))
     assert "table-in-cloud" not in {finding.code for finding in solid.findings}
+
+
+def test_few_points_are_no_table_and_no_error() -> None:
+    rng = np.random.default_rng(4)
+    for count in range(22, 60):
+        xyz = rng.uniform(size=(count, 3)) * [1.0, 1.0, rng.choice([0.2, 1.0])]
+        xyz[: count // 4, 2] = 0
+        left_table(xyz, 0.05 * rng.integers(1, 9))

@@ -11,6 +11,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from steelyard.bench.pool import spread
+from steelyard.bench.team_events import TWISTS
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import simulate_team
@@ -18,7 +19,6 @@ from steelyard.simulate.team_cases import TeamNoise, TeamScene, case
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.spatial.screws import log_pose
-from steelyard.team.adjoint import log as pose_log
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
@@ -35,21 +35,18 @@ SENSED: Mapping[str, TeamScene] = MappingProxyType(
 SESSIONS: Mapping[str, TeamScene] = MappingProxyType(
     {
         "joints": replace(case("D"), robots=4, late_s={1: 0.013}),
-        "twists": TeamScene(
-            TeamNoise(force_white_N=1.0, rate_rad_s=0.008, velocity_m_s=0.002),
-            sensing="twists", bases_move=True, motion_samples=2000,
-        ),
+        "twists": TeamScene(TWISTS, sensing="twists", bases_move=True, motion_samples=2000),
     }
-)  # fmt: skip
+)
 RULES = (
     "motions: three robots, one motion of 15 s with white noise (poses 0.1 mrad and 0.1 mm, twists 2 mrad/s and "
     "0.5 mm/s), bases that stand (poses) or move (twists). asked = how many of a grasp's six directions such a motion "
     "shows; shown = how many the answer calls shown, least and most over trials; named = trials with the finding; "
     "wrench_rank = how many of the ten parameters are called shown; deg, mm = mean error of the grasps along what is "
-    "shown. same: case D with four robots and a late clock, and a team with "
-    "moving bases; largest difference between the answer and that of the same log with the robots in another order, "
-    "another reference, or (where they stand) other homes: of grasps [rad, m], and of the ten parameters as a share "
-    "of each one's group (mass, first moments, inertia)."
+    "shown. same: case D with four robots and a late clock, and a team with moving bases; largest difference between "
+    "the answer and that of the same log with the robots in another order, another reference, or (where they stand) "
+    "other homes: of grasps [rad, m], and of the ten parameters as a share of each one's group (mass, first moments, "
+    "inertia)."
 )
 
 
@@ -133,7 +130,7 @@ def _changes(log: TeamLog) -> dict[str, TeamLog]:
 def _apart(log: TeamLog, one: TeamEstimate, two: TeamEstimate) -> list[float]:
     """Return the largest difference of grasps and of parameters, both seen from the first one's reference."""
     X = one.grasps[two.reference].pose
-    gaps = [pose_log(one.grasps[n].pose.inverse() @ (X @ two.grasps[n].pose)) for n in log.names]
+    gaps = [log_pose(one.grasps[n].pose.inverse() @ (X @ two.grasps[n].pose)) for n in log.names]
     was, now = one.parameters.vector, two.parameters.in_frame(X).vector
     size = np.repeat([abs(was[0]), np.abs(was[1:4]).max(), np.abs(was[4:]).max()], [1, 3, 6])
     return [float(np.abs(gaps).max()), float(np.abs((now - was) / size).max())]
@@ -142,7 +139,7 @@ def _apart(log: TeamLog, one: TeamEstimate, two: TeamEstimate) -> list[float]:
 def run(trials: int, workers: int) -> dict[str, Any]:
     """Return every motion by what is sensed over `trials` seeds, and every change that must not matter."""
     seeds = [FIRST_SEED + k for k in range(trials)]
-    motions = {s: {m: _motion(s, m, list(seeds), workers) for m in MOTIONS} for s in SENSED}
+    motions = {s: {m: _motion(s, m, seeds, workers) for m in MOTIONS} for s in SENSED}
     return {"rules": RULES, "trials": trials, "motions": motions, "same": _same(seeds, workers)}
 
 

@@ -30,7 +30,7 @@ class ShapeError:
     com_m           of the centre of mass that the shape gives, per axis [m]
     inertia_share   of every entry of the inertia alike, as a share of half its trace: that of a measured mesh
     stretch         of the second moments, each as a share of itself: that of a scan, in place of the former. Such a
-                    shape leans, too, by a share of that along each axis, in radii of gyration
+                    shape may hide a core (CORE), and leans by a share of that along each axis, in radii of gyration
     turn_rad        of the whole shape about its centre of mass, per axis [rad]
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     grasp_at        the origin of the object's frame in the sensor's [m], about which that turn is

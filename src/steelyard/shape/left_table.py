@@ -66,7 +66,7 @@ def _reach(points: Array) -> float:
     """Return how far off a neighbour some ranks away is, in the middle of points (N, 2 or 3)."""
     from scipy.spatial import cKDTree
 
-    return float(np.median(cKDTree(points).query(points, min(_NEXT + 1, len(points)))[0][:, -1]))
+    return float(np.median(cKDTree(points).query(points, [min(_NEXT + 1, len(points))])[0]))
 
 
 def _largest_plane(xyz: Array, spacing: float) -> Mask:
