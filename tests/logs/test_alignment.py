@@ -7,7 +7,8 @@ import pytest
 from made_recordings import BODY, GRAVITY, Swing, fitted, recording
 
 from steelyard.errors import BadDescription, CannotAnswer
-from steelyard.logs.alignment import AlignOptions, align
+from steelyard.logs.alignment import align
+from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.spatial import Rotation
 

@@ -12,8 +12,9 @@ from sanity.held_poses import BODY, recorded
 from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import solids
-from steelyard.logs.alignment import AlignOptions, align
+from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
+from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity import examine

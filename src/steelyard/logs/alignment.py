@@ -7,21 +7,23 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
 from steelyard.logs.bandwidth import rigid_up_to
+from steelyard.logs.clock_rates import ClockRate, clock_rates, put_right
 from steelyard.logs.conditioning import noise_std, sampling_rate, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
-from steelyard.logs.imu import Imu, Mounting, imu
+from steelyard.logs.imu import Mounting
 from steelyard.logs.joint_fit import refine
-from steelyard.logs.kinematics import Kinematics, Motion, kinematics
+from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
 from steelyard.logs.outliers import bursts, inside, merged
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.prepared import AlignOptions, Prepared, prepared, stamps_of
+from steelyard.logs.recording import Recording
 from steelyard.logs.steady import with_steady_stamps
 from steelyard.logs.stillness import pose_numbers, still_rows
 from steelyard.logs.tables import align_tables
@@ -30,28 +32,6 @@ from steelyard.spatial import Rotation
 _FIT_ROWS = 6000
 _FEWEST_ROWS = 12
 _INTERPOLATION = 0.01  # of a sampling step
-
-
-@dataclass(frozen=True)
-class AlignOptions:
-    """How to align.
-
-    cutoff_hz         [Hz] common low-pass; above it an arm and its load do not move as one body
-    max_delay_s       [s] widest delay looked for (no more than a tenth of the log)
-    estimate_delays   look for delays that were not given; False counts them as none
-    leave_out_taps    leave the rows of taps out
-    smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
-    place             (3,) [m] in S, the point whose position, velocity or acceleration the poses give
-    turn              (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
-    """
-
-    cutoff_hz: float = 40.0
-    max_delay_s: float = 0.25
-    estimate_delays: bool = True
-    leave_out_taps: bool = True
-    smallest_delay_s: float = 0.5e-3
-    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
-    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,115 +74,24 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
         other = next(s for s in recording.streams if s not in timed)
         raise BadDescription(f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock.")
     steady, notes = with_steady_stamps(recording)
-    aligned = _align_timed(_prepare(steady, options or AlignOptions()))
+    aligned = _align_timed(prepared(steady, options or AlignOptions()), rates=True)
     return replace(aligned, notes=(*notes, *aligned.notes)) if notes else aligned
 
 
-@dataclass(frozen=True, eq=False)
-class _Prepared:
-    """A timed recording, each stream as a function of its own time.
-
-    clock, felt     (N,) raw samples of the wrench on the object
-    known, unknown  delays that were given, and the streams whose delay is sought
-    cutoff          [Hz] common low-pass, None where one stream tells everything on one clock
-    """
-
-    recording: Recording
-    options: AlignOptions
-    clock: Array
-    felt: Felt
-    cutoff: float | None
-    kinematics: Kinematics
-    imu: Imu | None
-    known: Mapping[str, float]
-    unknown: tuple[str, ...]
-
-    @property
-    def source(self) -> str:
-        return "specific_force" if self.imu is not None else self.kinematics.source
-
-    def wrench(self, delays: Mapping[str, float]) -> Array:
-        """Return the raw wrench (N, 6) in S; a delay that is not known counts as none."""
-        turned = self.kinematics.at(self.clock, delays).rotation if self.felt.world else None
-        return self.felt.in_sensor(turned)
-
-    def spans(self) -> dict[str, tuple[float, float]]:
-        """Return the first and last stamp of every stream that is used."""
-        spans = {n: self.kinematics.spans[n] for n in self.kinematics.streams}
-        if self.imu is not None:
-            spans[self.imu.name] = (self.imu.signal.start, self.imu.signal.end)
-        return spans
-
-    def covered(self, time: Array, delays: Mapping[str, float]) -> Mask:
-        """Return which times (N,) all streams cover."""
-        ok = np.ones(len(time), bool)
-        for name, (start, end) in self.spans().items():
-            stamp = time + delays.get(name, 0.0)
-            ok &= (stamp >= start - 1e-9) & (stamp <= end + 1e-9)
-        return ok
-
-
-def _prepare(recording: Recording, options: AlignOptions) -> _Prepared:
-    """Smooth the motion and low-pass the rest."""
-    source = _wrench_stream(recording)
-    lag = source.delay or 0.0
-    streams = tuple(replace(s, time=_time(s) - lag, delay=0.0) if s is source else s for s in recording.streams)
-    wrench_stream = next(s for s in streams if s.name == source.name and "force" in s.channels)
-    cutoff = _cutoff(streams, wrench_stream, options)
-    moving = replace(kinematics(streams, recording.gravity, cutoff), place=np.array(options.place))
-    feeling = next((s for s in streams if "specific_force" in s.channels), None)
-    sensor = None
-    if feeling is not None and "linear_acceleration" not in moving.channels:
-        sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
-    used = {*moving.streams, *([sensor.name] if sensor is not None else [])}
-    if cutoff is None or source.delay is not None or "specific_force" in source.channels:
-        used -= {source.name}
-    known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
-    late = [s.name for s in recording.streams if s.name in used and s.delay is None]
-    sought = late if options.estimate_delays else []
-    felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
-    known = {n: d for n, d in known.items() if n not in sought}
-    return _Prepared(
-        recording, options, _time(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought)
-    )  # fmt: skip
-
-
-def _wrench_stream(recording: Recording) -> Stream:
-    for stream in recording.streams:
-        if "force" in stream.channels:
-            if "torque" not in stream.channels:
-                raise BadDescription(f"'{stream.name}' has force but no torque; give both in one stream.")
-            return stream
-    raise BadDescription("no stream has force; a log needs force and torque.")
-
-
-def _time(stream: Stream) -> Array:
-    if stream.time is None:
-        raise BadDescription(f"'{stream.name}' has no time.")
-    return stream.time
-
-
-def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) -> float | None:
-    """Return the common low-pass [Hz]: what the slower of wrench and quickest motion stream can follow."""
-    given = {"linear_acceleration", "angular_acceleration"}
-    if len(streams) == 1 and given <= set(wrench.channels):
-        return None
-    rates = {s.name: sampling_rate(_time(s)) for s in streams if s is not wrench}
-    feeling = [rates[s.name] for s in streams if "specific_force" in s.channels and s is not wrench]
-    rate = min(sampling_rate(_time(wrench)), feeling[0] if feeling else max(rates.values(), default=np.inf))
-    return min(options.cutoff_hz, 0.4 * rate)
-
-
-def _align_timed(given: _Prepared) -> Aligned:
-    """Find clocks and mounts on rows without taps, then make the log."""
+def _align_timed(given: Prepared, rates: bool = False) -> Aligned:
+    """Find clocks and mounts on rows without taps, then make the log; `rates`: look for clocks that run fast, too."""
     taps = _taps(given) if given.options.leave_out_taps else np.zeros((0, 2))
     time, felt = _rows(given)
     touched = inside(time, taps)
     straight = felt.rows(~touched).turned_back(given.options.turn)
     clocks, delayed = _clocks(given, time[~touched], straight)
+    fast = _fast(given, time[~touched], straight, clocks) if rates else {}
+    if fast:
+        right = _align_timed(prepared(put_right(given.recording, fast), given.options))
+        return replace(right, findings=(*say.rate_findings(fast), *right.findings))
     rigid = _rigid(given, time[~touched], felt.rows(~touched), clocks)
     if rigid is not None:
-        lower = _align_timed(_prepare(given.recording, replace(given.options, cutoff_hz=rigid)))
+        lower = _align_timed(prepared(given.recording, replace(given.options, cutoff_hz=rigid)))
         return replace(lower, notes=(*lower.notes, say.swings(rigid)))
     kept = ~touched & given.covered(time, clocks.delays_s)
     if kept.sum() < _FEWEST_ROWS:
@@ -227,7 +116,7 @@ def _align_timed(given: _Prepared) -> Aligned:
     )
 
 
-def _taps(given: _Prepared) -> Array:
+def _taps(given: Prepared) -> Array:
     """Return the intervals (K, 2) of taps on the wrench clock, as wide as the low-pass smears them."""
     margin = 0.03 if given.cutoff is None else max(0.03, 1.5 / given.cutoff)
     # Delays are not known yet: a tap is far quicker than what they turn.
@@ -236,11 +125,11 @@ def _taps(given: _Prepared) -> Array:
     for stream in given.recording.streams:
         if "specific_force" in stream.channels and given.imu is not None:
             late = given.known.get(stream.name, 0.0)
-            found.append(bursts(_time(stream) - late, stream.channels["specific_force"], margin))
+            found.append(bursts(stamps_of(stream) - late, stream.channels["specific_force"], margin))
     return merged(*found)
 
 
-def _rows(given: _Prepared) -> tuple[Array, Felt]:
+def _rows(given: Prepared) -> tuple[Array, Felt]:
     """Return the common clock (M,) and the wrench there: low-passed, thinned to what passes."""
     every = 1
     if given.cutoff is not None:
@@ -270,7 +159,7 @@ def _rows(given: _Prepared) -> tuple[Array, Felt]:
     return time[shared], replace(given.felt, values=values)
 
 
-def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
+def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
     reach = min(given.options.max_delay_s, 0.1 * float(time[-1] - time[0]))
     ok = given.covered(time, given.known)
@@ -301,7 +190,16 @@ def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[st
         clocks = replace(again, delays_std_s={**clocks.delays_std_s, **{n: found[n] for n in late}})
 
 
-def _rigid(given: _Prepared, time: Array, felt: Felt, clocks: Clocks) -> float | None:
+def _fast(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> dict[str, ClockRate]:
+    """Return the clocks that run fast or slow beside the wrench's, told by all rows that every stream covers."""
+    ok = given.covered(time, clocks.delays_s)
+    if ok.sum() < _FEWEST_ROWS:
+        return {}
+    question = Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known)
+    return clock_rates(question, clocks.delays_s)
+
+
+def _rigid(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> float | None:
     """Return the low-pass [Hz] that poses need beside a structure that swings; an accelerometer swings with it."""
     ok = given.covered(time, clocks.delays_s)
     if given.cutoff is None or given.imu is not None or not given.kinematics.differentiates or ok.sum() < _FEWEST_ROWS:
@@ -310,13 +208,13 @@ def _rigid(given: _Prepared, time: Array, felt: Felt, clocks: Clocks) -> float |
     return rigid_up_to(sampling_rate(time), given.cutoff, felt.rows(ok).in_sensor(motion.rotation), motion)
 
 
-def _with_interpolation(given: _Prepared, stds: Mapping[str, float]) -> dict[str, float]:
+def _with_interpolation(given: Prepared, stds: Mapping[str, float]) -> dict[str, float]:
     """Return standard deviations that allow for interpolation: a hundredth of a stream's step."""
-    steps = {s.name: 1 / sampling_rate(_time(s)) for s in given.recording.streams}
+    steps = {s.name: 1 / sampling_rate(stamps_of(s)) for s in given.recording.streams}
     return {n: float(np.hypot(v, _INTERPOLATION * steps[n])) if v > 0 else v for n, v in stds.items()}
 
 
-def _log(given: _Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[MotionLog, Motion]:
+def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[MotionLog, Motion]:
     """Return the log with its still rows, poses and noise."""
     motion = given.kinematics.at(time, clocks.delays_s)
     wrench = felt.in_sensor(motion.rotation)

@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
 from steelyard.logs.imu import Imu, Mounting
 from steelyard.spatial import Rotation
@@ -18,6 +21,24 @@ _THIRD = 0.1  # of its size: below this, gravity hardly sweeps a third direction
 def delay_findings(clocks: Clocks, names: tuple[str, ...], wrench: str) -> tuple[Finding, ...]:
     """Return `stream-delayed` for each of the named streams; `wrench` is the one that holds the wrench."""
     return tuple(_delayed(n, clocks.delays_s[n], clocks.delays_std_s[n], n == wrench) for n in names)
+
+
+def rate_findings(rates: Mapping[str, ClockRate]) -> tuple[Finding, ...]:
+    """Return `clock-unsteady` for each stream whose clock runs fast or slow beside the wrench's."""
+    return tuple(
+        Finding(
+            "clock-unsteady",
+            f"The clock of '{name}' runs {_parts(abs(clock.rate))} {'fast' if clock.rate > 0 else 'slow'} "
+            f"(± {1e6 * clock.rate_std:.2g} ppm) beside the wrench's; its stamps were put right.",
+            "Check the rate or the time column of this stream, or stamp all streams by one clock.",
+        )
+        for name, clock in rates.items()
+    )
+
+
+def _parts(share: float) -> str:
+    """Return a share as clocks are told of: in parts of a million, or per cent from a thousandth on."""
+    return f"{100 * share:.3g} %" if share >= 1e-3 else f"{1e6 * share:.3g} ppm"
 
 
 def _delayed(name: str, delay: float, std: float, own: bool) -> Finding:

@@ -15,7 +15,8 @@ from steelyard.logs.recording import Stream
 from steelyard.logs.smoothing import Smooth, SmoothRotation, smooth, smooth_rotations
 from steelyard.spatial import Rotation, lever_acceleration
 
-Delays = Mapping[str, float]
+# How late each stream's stamps are [s]: throughout, or at each of the times asked for.
+Delays = Mapping[str, float | Array]
 _UNKNOWN_LEVER = 0.5  # [m] how far from a turning axis S may be when nothing measures its acceleration
 
 

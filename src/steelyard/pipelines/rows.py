@@ -15,8 +15,9 @@ from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.noise_levels import with_declared, without_dead
-from steelyard.logs.alignment import Aligned, AlignOptions, align
+from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog
+from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options

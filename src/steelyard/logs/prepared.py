@@ -1,0 +1,135 @@
+"""A timed recording made ready for alignment: each stream as a function of its own time, in S."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array, Mask
+from steelyard.errors import BadDescription
+from steelyard.logs.conditioning import sampling_rate
+from steelyard.logs.felt import Felt
+from steelyard.logs.imu import Imu, imu
+from steelyard.logs.kinematics import Kinematics, kinematics
+from steelyard.logs.recording import Recording, Stream
+
+
+@dataclass(frozen=True)
+class AlignOptions:
+    """How to align.
+
+    cutoff_hz         [Hz] common low-pass; above it an arm and its load do not move as one body
+    max_delay_s       [s] widest delay looked for (no more than a tenth of the log)
+    estimate_delays   look for delays that were not given; False counts them as none
+    leave_out_taps    leave the rows of taps out
+    smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
+    place             (3,) [m] in S, the point whose position, velocity or acceleration the poses give
+    turn              (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
+    """
+
+    cutoff_hz: float = 40.0
+    max_delay_s: float = 0.25
+    estimate_delays: bool = True
+    leave_out_taps: bool = True
+    smallest_delay_s: float = 0.5e-3
+    place: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Prepared:
+    """A timed recording, each stream as a function of its own time.
+
+    clock, felt     (N,) raw samples of the wrench on the object
+    known, unknown  delays that were given, and the streams whose delay is sought
+    cutoff          [Hz] common low-pass, None where one stream tells everything on one clock
+    """
+
+    recording: Recording
+    options: AlignOptions
+    clock: Array
+    felt: Felt
+    cutoff: float | None
+    kinematics: Kinematics
+    imu: Imu | None
+    known: Mapping[str, float]
+    unknown: tuple[str, ...]
+
+    @property
+    def source(self) -> str:
+        """Where the acceleration of S comes from."""
+        return "specific_force" if self.imu is not None else self.kinematics.source
+
+    def wrench(self, delays: Mapping[str, float]) -> Array:
+        """Return the raw wrench (N, 6) in S; a delay that is not known counts as none."""
+        turned = self.kinematics.at(self.clock, delays).rotation if self.felt.world else None
+        return self.felt.in_sensor(turned)
+
+    def spans(self) -> dict[str, tuple[float, float]]:
+        """Return the first and last stamp of every stream that is used."""
+        spans = {n: self.kinematics.spans[n] for n in self.kinematics.streams}
+        if self.imu is not None:
+            spans[self.imu.name] = (self.imu.signal.start, self.imu.signal.end)
+        return spans
+
+    def covered(self, time: Array, delays: Mapping[str, float]) -> Mask:
+        """Return which times (N,) all streams cover."""
+        ok = np.ones(len(time), bool)
+        for name, (start, end) in self.spans().items():
+            stamp = time + delays.get(name, 0.0)
+            ok &= (stamp >= start - 1e-9) & (stamp <= end + 1e-9)
+        return ok
+
+
+def prepared(recording: Recording, options: AlignOptions) -> Prepared:
+    """Smooth the motion and low-pass the rest."""
+    source = _wrench_stream(recording)
+    lag = source.delay or 0.0
+    streams = tuple(replace(s, time=stamps_of(s) - lag, delay=0.0) if s is source else s for s in recording.streams)
+    wrench_stream = next(s for s in streams if s.name == source.name and "force" in s.channels)
+    cutoff = _cutoff(streams, wrench_stream, options)
+    moving = replace(kinematics(streams, recording.gravity, cutoff), place=np.array(options.place))
+    feeling = next((s for s in streams if "specific_force" in s.channels), None)
+    sensor = None
+    if feeling is not None and "linear_acceleration" not in moving.channels:
+        sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
+    used = {*moving.streams, *([sensor.name] if sensor is not None else [])}
+    if cutoff is None or source.delay is not None or "specific_force" in source.channels:
+        used -= {source.name}
+    known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
+    late = [s.name for s in recording.streams if s.name in used and s.delay is None]
+    sought = late if options.estimate_delays else []
+    felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
+    known = {n: d for n, d in known.items() if n not in sought}
+    return Prepared(
+        recording, options, stamps_of(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought)
+    )  # fmt: skip
+
+
+def _wrench_stream(recording: Recording) -> Stream:
+    for stream in recording.streams:
+        if "force" in stream.channels:
+            if "torque" not in stream.channels:
+                raise BadDescription(f"'{stream.name}' has force but no torque; give both in one stream.")
+            return stream
+    raise BadDescription("no stream has force; a log needs force and torque.")
+
+
+def stamps_of(stream: Stream) -> Array:
+    """Return the stamps (N,) [s] of a stream; raises BadDescription where it has none."""
+    if stream.time is None:
+        raise BadDescription(f"'{stream.name}' has no time.")
+    return stream.time
+
+
+def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) -> float | None:
+    """Return the common low-pass [Hz]: what the slower of wrench and quickest motion stream can follow."""
+    given = {"linear_acceleration", "angular_acceleration"}
+    if len(streams) == 1 and given <= set(wrench.channels):
+        return None
+    rates = {s.name: sampling_rate(stamps_of(s)) for s in streams if s is not wrench}
+    feeling = [rates[s.name] for s in streams if "specific_force" in s.channels and s is not wrench]
+    rate = min(sampling_rate(stamps_of(wrench)), feeling[0] if feeling else max(rates.values(), default=np.inf))
+    return min(options.cutoff_hz, 0.4 * rate)

@@ -1,0 +1,136 @@
+"""What is weighed: the rows of a log, and all that is known beforehand of their load, its tool, its object, or both."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from steelyard.errors import BadValue, CannotAnswer, NoMasses
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.fit import BREAKDOWNS, Bias
+from steelyard.identify.placement import contradicted
+from steelyard.identify.shape_error import MEASURED
+from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
+from steelyard.logs.log import MotionLog
+from steelyard.parts.parts import Parts
+from steelyard.pipelines.choice import Placed, estimator_for
+from steelyard.pipelines.options import Options
+from steelyard.sanity import impossible_density, maybe_hollow
+from steelyard.spatial import Pose
+
+if TYPE_CHECKING:
+    from steelyard.pipelines.shape_in_parts import Shape
+
+# [m] No robot holds a part that fills a cube of this edge; one of a centimetre in millimetres does.
+LARGEST = 2.0
+
+
+@dataclass(frozen=True)
+class Load:
+    """Rows to fit, and all that is known beforehand of what they weigh.
+
+    log      the rows
+    bias     what the sensor's bias may be
+    options  what the caller chose
+    shape    the object's parts in S, in every cut that the log may choose from; None where they are not known
+    tool     a result of the gripper that is in the log; None where there is none to take away
+    """
+
+    log: MotionLog
+    bias: Bias
+    options: Options
+    shape: Placed | None
+    tool: Estimate | None
+
+    def estimate(self) -> Estimate:
+        """Return what was held: the tool still in it unless there is a shape."""
+        estimator, notes = estimator_for(self.options, self.log, self.bias, self.shape, self.tool)
+        estimate = estimator.identify(self.log)
+        if self.shape is not None and not estimate.evidence.rank:
+            raise CannotAnswer(
+                "The data fix nothing of the body, not even its mass: the wrench does not follow the orientations. "
+                "Check their unit, form and clock; the shape alone weighs nothing."
+            )
+        estimate = replace(estimate, notes=(*notes, *estimate.notes))
+        if self.shape is None:
+            return estimate
+        parts, prior, error = self.shape
+        light = maybe_hollow(error, estimate.mass, float(parts[0].volume.sum()))
+        return replace(self, shape=(parts, prior, light[0])).estimate().noted(light[1]) if light else estimate
+
+    def followed(self) -> tuple[Load, Estimate]:
+        """Return what was held, with the load, which has lost a shape that cannot follow what the log alone can say."""
+        try:
+            return self, self.estimate()
+        except (NoMasses, *BREAKDOWNS):
+            if self.shape is None:
+                raise
+            alone = replace(self, shape=None)
+            return alone, alone.estimate()
+
+    def of(self, log: MotionLog) -> Estimate:
+        """Return what other rows weigh, with the same known beforehand."""
+        return replace(self, log=log).estimate()
+
+    def drifting(self) -> Load:
+        """Return the load with a bias that may grow in time."""
+        return replace(self, bias=replace(self.bias, drift=True))
+
+    def without_tool(self, estimate: Estimate) -> Estimate:
+        """Return the object alone."""
+        if self.tool is None:
+            return estimate
+        if self.shape is not None:
+            return estimate.noted(f"a tool of {self.tool.mass:.4g} kg was taken away; each run had a bias of its own")
+        prior = bias_prior(self.tool) if self.bias.free else None
+        if prior is None:
+            return without_tool(estimate, self.tool, shared=False).noted("the tool's run tells nothing about the bias")
+        same, p = shares_bias(self.tool, estimate)
+        if not same:
+            return without_tool(estimate, self.tool, shared=False).with_findings(different_bias(p))
+        again = replace(self, bias=replace(self.bias, prior=prior)).estimate()
+        shared = without_tool(again, self.tool, shared=True)
+        return shared.noted(f"one sensor bias is shared with the tool's run (p = {p:.2g})")
+
+
+def placed(parts: Parts | Shape | None, pose: Pose | None, std: tuple[float, float] | None) -> Placed | None:
+    """Return cuts into parts in the sensor's frame, the weight that each has beforehand, and how wrong they may be."""
+    if parts is None:
+        return None
+    if pose is None:
+        raise BadValue(
+            "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
+        )
+    grasp = std or (0.0, 0.0)
+    if isinstance(parts, Parts):
+        _require_metres(parts)
+        error = MEASURED.at_least(parts.com_std, parts.stretch, parts.turn_std)
+        return (parts.in_frame(pose),), None, error.placed(*grasp, pose.position)
+    cuts = parts.cuts()
+    in_sensor = tuple(cut.in_frame(pose) for cut in cuts.parts)
+    return in_sensor, cuts.prior, parts.error.placed(*grasp, pose.position)
+
+
+def looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed, followed: bool) -> Estimate:
+    """Return the estimate with what its densities give away, and a shape that was not followed, before all findings."""
+    dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts)
+    lost = () if followed else (contradicted(estimate, max(shape[0], key=len)),)
+    return replace(estimate, findings=(*dense, *lost, *estimate.findings))
+
+
+def _volume(parts: Parts | Shape, placed: Placed) -> tuple[float, float]:
+    """Return the volume of a shape [m^3] and its standard deviation, as a share of it."""
+    std = placed[2].stretch if isinstance(parts, Parts) else parts.solid.volume_std
+    return float(placed[0][0].volume.sum()), std
+
+
+def _require_metres(parts: Parts) -> None:
+    """Raise BadValue where the parts are too large for any robot: their mesh is in millimetres."""
+    size = float(np.cbrt(parts.volume.max()))
+    if size > LARGEST:
+        raise BadValue(
+            f"the largest part has a volume of {parts.volume.max():.3g} m^3, a cube of {size:.3g} m; a held object's "
+            f"must be below {LARGEST:g} m. The mesh is probably in millimetres: scale it by 0.001."
+        )

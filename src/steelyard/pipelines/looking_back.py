@@ -1,0 +1,82 @@
+"""After the fit: what the rows, beside the answer, say of drift, units, sensor and motion."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.findings import Finding
+from steelyard.identify.estimate import Estimate
+from steelyard.logs.alignment import Aligned
+from steelyard.logs.recording import Recording
+from steelyard.pipelines.load import Load
+from steelyard.pipelines.options import DRIFT_ALLOWED
+from steelyard.pipelines.rows import FitRows
+from steelyard.sanity import (
+    after,
+    allow_softness,
+    drift_of,
+    examine_body,
+    examine_masses,
+    examine_sensor,
+    examine_wrench_unit,
+)
+
+# Where an acceleration comes from that does not see the arm's structure bend.
+ENCODERS = ("position", "linear_velocity")
+
+
+def looked_back(
+    load: Load, estimate: Estimate, rows: FitRows, recording: Recording, before: tuple[Finding, ...]
+) -> tuple[Load, Estimate, tuple[Finding, ...]]:
+    """Return load and estimate, fitted anew with a bias that drifts where the rows surely show one, and what they show.
+
+    before  what was found before the fit
+    """
+    drift = drift_of(load.log)
+    late = after(load.log, estimate, rows.aligned, recording, drift)
+    steady = load.bias.free and not load.bias.drift
+    if steady and drift and drift.sure and not _has(late, "base-tilted"):
+        load, estimate = load.drifting().followed()
+        estimate = estimate.noted(f"{DRIFT_ALLOWED}, as the log shows (most surely {drift.surest_words})")
+        late = after(load.log, estimate, rows.aligned, recording, drift)
+    if not rows.unmeasured:
+        late = (*late, *examine_masses(load.log, (*before, *late)))
+    if load.shape is None:
+        late = examine_wrench_unit(load.log, estimate, load.of, before, late)
+    if any(f.left_in for f in before):
+        # With a cause left in, rows only seem to lie in one plane.
+        late = tuple(f for f in late if f.code != "nearly-planar")
+    return load, estimate, late
+
+
+def of_sensor_and_body(
+    load: Load, estimate: Estimate, rows: FitRows, recording: Recording, known: tuple[Finding, ...]
+) -> tuple[Estimate, tuple[Finding, ...]]:
+    """Return the estimate, its bars wide enough for what sensor and arm do to it, and findings about them.
+
+    known  all that was found so far
+    """
+    estimate, found = examine_sensor(load.log, recording, estimate, known, load.bias.drift)
+    if load.shape is None:
+        found = (*found, *examine_body(estimate, (*known, *found)))
+        if rows.aligned.acceleration_from in ENCODERS:
+            estimate = allow_softness(load.log, estimate)
+    return _with_gain(estimate, rows.aligned), found
+
+
+def _has(findings: tuple[Finding, ...], code: str) -> bool:
+    return any(finding.code == code for finding in findings)
+
+
+def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
+    """Return the estimate with the gain error of the accelerometer that alone measured a - g, where there was one.
+
+    f = m (a - g): a reading too small by a share makes mass and first moment too large by the same share.
+    """
+    if aligned.acceleration_from != "specific_force":
+        return estimate
+    share = max((m.scale_std for m in aligned.mounts.values()), default=0.0)
+    slope = np.concatenate([estimate.parameters.vector[:4], np.zeros(6)])
+    return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))

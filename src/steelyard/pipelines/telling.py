@@ -1,0 +1,84 @@
+"""What an answer says of what was noticed on the way: causes before what follows from them, and what helps here."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING
+
+from steelyard.errors import CannotAnswer
+from steelyard.findings import AT_REST, BARE, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
+from steelyard.identify.estimate import Estimate
+from steelyard.identify.problem import ADD_POSES
+from steelyard.logs.recording import Recording
+from steelyard.parts.parts import Parts
+from steelyard.pipelines.load import Load
+from steelyard.pipelines.rows import FitRows
+
+if TYPE_CHECKING:
+    from steelyard.pipelines.shape_in_parts import Shape
+
+# Findings after which motion or wrench are no body's.
+MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
+# Findings of what a load and a bias share: a tared sensor has no bias.
+OF_BIAS = {"nearly-planar"}
+# Units that are named after the fit, and so were not put right before it.
+OF_UNITS = {"force-unit", "length-in-mm"}
+
+
+@dataclass(frozen=True)
+class Noticed:
+    """Findings by when they were made: before the fit, of the rows after it, and of the sensor beside the answer."""
+
+    before: tuple[Finding, ...]
+    late: tuple[Finding, ...]
+    of_sensor: tuple[Finding, ...]
+
+
+def noticed_before(found: tuple[Finding, ...], recording: Recording, rows: FitRows) -> tuple[Finding, ...]:
+    """Return what was found before the fit, in words for who has no description, and the point that poses are of."""
+    found = found if recording.described else tuple(finding.instead(BARE) for finding in found)
+    return found if rows.place is None else (*found, rows.place.finding)
+
+
+@contextmanager
+def beside(findings: tuple[Finding, ...]) -> Iterator[None]:
+    """Say with a refusal what was noticed before: it is the likely cause."""
+    try:
+        yield
+    except CannotAnswer as error:
+        if not findings:
+            raise
+        said = " ".join(f"{f.message} {f.remedy}" for f in findings)
+        if any(f.left_in for f in findings):
+            # More poses would be as wrong: what was noticed says what to do.
+            lost = str(error).partition(ADD_POSES)[0].rstrip()
+            raise CannotAnswer(f"Noticed before the fit: {said} As the log was read: {lost}") from None
+        raise CannotAnswer(f"{error} Noticed before the fit: {said}") from None
+
+
+def told(estimate: Estimate, noticed: Noticed, rows: FitRows, load: Load, parts: Parts | Shape | None) -> Estimate:
+    """Return the estimate with all findings: what is wrong with the log stands before what follows from it."""
+    before, late, of_sensor = noticed.before, noticed.late, noticed.of_sensor
+    if any(finding.code == "sensor-turned" for finding in of_sensor):
+        before = tuple(f for f in before if f.code != "sensor-turned")  # the fit tells it better
+    if not (parts is None or isinstance(parts, Parts)):
+        before = (*before, *(finding.instead(WEIGHED if load.shape else {}) for finding in parts.findings))
+        estimate = estimate.noted(*parts.notes)
+    # In a wrong unit that was left in, rows only seem touched.
+    touched = () if any(f.code in OF_UNITS for f in late) else rows.touched
+    found = (*before, *late, *of_sensor, *estimate.findings, *rows.aligned.findings, *touched)
+    found = tuple(f for f in found if load.bias.free or f.code not in OF_BIAS)
+    return replace(estimate, findings=()).with_findings(*found)
+
+
+def remedied(estimate: Estimate, rows: FitRows) -> Estimate:
+    """Return the estimate with remedies that help where motion or wrench are no body's, unmeasured, or all at rest."""
+    if "weight-compensated" in estimate.codes():
+        estimate = estimate.without_inertia("What a controller leaves of a weight has no inertia of its own.")
+    if estimate.codes() & (MISREAD if rows.place is None else MISREAD - {"motion-mismatch"}):
+        return estimate.with_remedies(UNEXPLAINED)
+    if rows.unmeasured or rows.log.still.all():
+        return estimate.with_remedies(UNMEASURED if rows.unmeasured else AT_REST)
+    return estimate
