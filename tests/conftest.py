@@ -8,6 +8,9 @@ from pathlib import Path
 import pytest
 from hypothesis import settings
 
+from steelyard.threads import one_blas_thread
+
+one_blas_thread()
 settings.register_profile("steelyard", derandomize=True, max_examples=25, deadline=None, database=None)
 settings.load_profile("steelyard")
 

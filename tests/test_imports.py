@@ -28,6 +28,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "check": set(),
     "findings": set(),
     "whole_files": set(),
+    "threads": set(),
     "spatial": set(),
     "inertia": {"spatial"},
     "logs": {"inertia", "spatial"},
@@ -52,7 +53,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     },
 }  # fmt: skip
 MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live"}
-MAY_IMPORT["bench"] = MAY_IMPORT["api"] | {"api"}
+MAY_IMPORT["bench"] = MAY_IMPORT["api"] | {"api", "threads"}
 MAY_IMPORT["cli"] = MAY_IMPORT["bench"] | {"bench", ""}
 MAY_IMPORT[""] = MAY_IMPORT["cli"] | {"cli"}  # the package itself: `import steelyard as sy`
 MAY_IMPORT["__main__"] = {"cli"}

@@ -4,19 +4,18 @@ from __future__ import annotations
 
 import os
 import statistics
-import sys
 import time
 from collections.abc import Callable
 
+from steelyard.threads import BLAS
+
 REPEATS = 20
-_THREAD_VARIABLES = ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS", "NUMBA_NUM_THREADS")
 
 
-def one_blas_thread() -> bool:
-    """Ask BLAS, OpenMP and Numba for one thread; return whether NumPy, not loaded yet, can still hear it."""
-    for name in _THREAD_VARIABLES:
+def one_thread() -> None:
+    """Ask BLAS, OpenMP and Numba for one thread, whatever else was asked for; BLAS hears it until NumPy is loaded."""
+    for name in (*BLAS, "NUMBA_NUM_THREADS"):
         os.environ[name] = "1"
-    return "numpy" not in sys.modules
 
 
 def thread_ms(call: Callable[[], object], repeats: int = REPEATS, warm: int = 2) -> float:

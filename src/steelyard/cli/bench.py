@@ -7,7 +7,7 @@ from typing import Any
 
 import click
 
-from steelyard.bench.timing import one_blas_thread
+from steelyard.bench.timing import one_thread
 from steelyard.cli.console import print_json, progress_bar, say
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON
@@ -20,7 +20,7 @@ _FOLDERS = click.option(
 @click.group(cls=Group, context_settings=HELP)
 def bench() -> None:
     """Make every number that the README and BENCHMARK.md claim again: a command per table."""
-    one_blas_thread()
+    one_thread()
 
 
 @bench.command()

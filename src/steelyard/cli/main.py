@@ -11,6 +11,7 @@ from steelyard import __version__
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP
 from steelyard.errors import SteelyardError
+from steelyard.threads import one_blas_thread
 
 # Verb -> (module and function, one line of help).
 VERBS: dict[str, tuple[str, str]] = {
@@ -61,6 +62,7 @@ def cli() -> None:
 
 def main(arguments: list[str] | None = None) -> None:
     """Run the command line; one clear line on stderr for every error that is ours."""
+    one_blas_thread()
     try:
         cli(arguments, prog_name="steelyard")
     except SteelyardError as error:
