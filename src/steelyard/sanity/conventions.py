@@ -22,6 +22,7 @@ from steelyard.check import Array
 from steelyard.findings import REMEDIES, Finding, percent
 from steelyard.logs.misread import MISREAD, Misread
 from steelyard.logs.recording import Recording
+from steelyard.sanity.axis_words import direction_words
 from steelyard.sanity.blind_tilt import blind_tilt
 from steelyard.sanity.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.glance import Glance, glance, in_other_axes
@@ -314,10 +315,9 @@ def _level(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     if tilt is None or not _plain(tilt, reading.fit):
         return recording, ()
     code = "base-tilted" if tilt.angle < STEEP else "gravity-frame"
-    along = ", ".join(f"{v:.3f}" for v in tilt.gravity / np.linalg.norm(tilt.gravity) + 0.0)
     message = (
         f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
-        f"given, along ({along}) of W; the answer uses the direction found{tilt.blind_words}."
+        f"given, along ({direction_words(tilt.gravity)}) of W; the answer uses the direction found{tilt.blind_words}."
     )
     return replace(recording, gravity=tilt.gravity), (Finding.of(code, message),)
 
