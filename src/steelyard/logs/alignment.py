@@ -29,6 +29,9 @@ from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
 _FEWEST_ROWS = 12
+# [s] No delay beyond the first, nor beyond a tenth of the log, is looked for; one below the second, or below three of
+# its standard deviations, counts as none.
+_LONGEST_DELAY_S, _SMALLEST_DELAY_S = 0.25, 0.5e-3
 _INTERPOLATION = 0.01  # of a sampling step
 
 
@@ -36,20 +39,14 @@ _INTERPOLATION = 0.01  # of a sampling step
 class AlignOptions:
     """How to align.
 
-    cutoff_hz         [Hz] common low-pass; above it an arm and its load do not move as one body
-    max_delay_s       [s] widest delay looked for (no more than a tenth of the log)
-    estimate_delays   look for delays that were not given; False counts them as none
-    leave_out_taps    leave the rows of taps out
-    smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
-    place             (3,) [m] in S, the point whose position, velocity or acceleration the poses give
-    turn              (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
+    cutoff_hz        [Hz] common low-pass; above it an arm and its load do not move as one body
+    estimate_delays  look for delays that were not given; False counts them as none
+    place            (3,) [m] in S, the point whose position, velocity or acceleration the poses give
+    turn             (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
     """
 
     cutoff_hz: float = 40.0
-    max_delay_s: float = 0.25
     estimate_delays: bool = True
-    leave_out_taps: bool = True
-    smallest_delay_s: float = 0.5e-3
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
 
@@ -195,7 +192,7 @@ def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) 
 
 def _align_timed(given: _Prepared) -> Aligned:
     """Find clocks and mounts on rows without taps, then make the log."""
-    taps = _taps(given) if given.options.leave_out_taps else np.zeros((0, 2))
+    taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
     straight = felt.rows(~touched).turned_back(given.options.turn)
@@ -250,8 +247,7 @@ def _rows(given: _Prepared) -> tuple[Array, Felt]:
     spans = list(given.spans().values())
     start = max((s for s, _ in spans), default=float(time[0]))
     end = min((e for _, e in spans), default=float(time[-1]))
-    reach = given.options.max_delay_s
-    shared = (time >= start - reach) & (time <= end + reach)
+    shared = (time >= start - _LONGEST_DELAY_S) & (time <= end + _LONGEST_DELAY_S)
     if start > end or not shared.any():
         raise CannotAnswer(
             "the streams share no time: "
@@ -272,7 +268,7 @@ def _rows(given: _Prepared) -> tuple[Array, Felt]:
 
 def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
-    reach = min(given.options.max_delay_s, 0.1 * float(time[-1] - time[0]))
+    reach = min(_LONGEST_DELAY_S, 0.1 * float(time[-1] - time[0]))
     ok = given.covered(time, given.known)
     if given.unknown:
         everyone = {**given.known, **dict.fromkeys(given.unknown, 0.0)}
@@ -287,11 +283,10 @@ def _clocks(given: _Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[st
     question = Question(time[pick], felt.rows(pick), given.kinematics, given.imu, given.unknown, given.known, reach)
     clocks = refine(question, {**given.known, **scan(question)})
     clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
-    least = given.options.smallest_delay_s
     late = given.unknown
     while True:
         # A delay must stay significant in the fit that is told of in the end.
-        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
+        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(_SMALLEST_DELAY_S, 3 * clocks.delays_std_s[n]))
         if sure == late:
             return clocks, late
         late, none = sure, {n: 0.0 for n in given.unknown if n not in sure}
