@@ -10,7 +10,7 @@ from steelyard.shape import sight_lines
 from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.depth_images import pixel_of
-from steelyard.shape.middle import middle_mean, quantile
+from steelyard.shape.medians import middle_mean, quantile
 from steelyard.shape.table_plane import table_planes
 from steelyard.shape.volume import enclose
 

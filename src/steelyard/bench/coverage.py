@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.asked import Progress, require_one
-from steelyard.bench.pool import spread
+from steelyard.bench.pool import batches, spread
 from steelyard.check import Array
 from steelyard.errors import SteelyardError
 from steelyard.identify.noise_aware import NoiseAware
@@ -19,7 +19,6 @@ from steelyard.simulate import scenarios, simulate_log
 from steelyard.simulate.noise import Spectrum
 
 HALF_WIDTH = 1.96
-BATCH = 20
 ENTRIES = ("mass", "com_x", "com_y", "com_z", "i_xx", "i_xy", "i_xz", "i_yy", "i_yz", "i_zz")
 KINDS = {"mass": slice(0, 1), "com": slice(1, 4), "inertia": slice(4, 10)}
 BIAS_STD = np.repeat([0.2, 5.0], 3)
@@ -96,8 +95,7 @@ def run(
 
 def _fitted(case: Case, jobs: list[tuple[int, str]], workers: int) -> Iterator[list[Outcome | str]]:
     """Yield the outcomes of the jobs in order, a batch at a time."""
-    batches = [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)]
-    yield from spread(partial(_fit_all, case), batches, workers)
+    yield from spread(partial(_fit_all, case), batches(jobs), workers)
 
 
 def _fit_all(case: Case, jobs: Sequence[tuple[int, str]]) -> list[Outcome | str]:

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.asked import Progress, require_one
-from steelyard.bench.coverage import BATCH, HALF_WIDTH, object_scale, rms_error, widths
+from steelyard.bench.coverage import HALF_WIDTH, object_scale, rms_error, widths
 from steelyard.bench.held_object_cases import Case, load_case, noisy_rows
 from steelyard.bench.part_timing import TIMING, timings
-from steelyard.bench.pool import spread
+from steelyard.bench.pool import batches, spread
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
@@ -93,8 +93,7 @@ def run(
 
 def _fitted(jobs: list[Job], workers: int) -> Iterator[list[Outcome | str]]:
     """Yield the outcomes of the jobs in order, a batch at a time."""
-    batches = [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)]
-    yield from spread(_fit_all, batches, workers)
+    yield from spread(_fit_all, batches(jobs), workers)
 
 
 def _fit_all(jobs: Sequence[Job]) -> list[Outcome | str]:

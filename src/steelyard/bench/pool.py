@@ -11,6 +11,11 @@ Job = TypeVar("Job")
 Row = TypeVar("Row")
 
 
+def batches(jobs: Sequence[Job], size: int = 20) -> list[Sequence[Job]]:
+    """Return the jobs in order, `size` at a time: for calls that each are done sooner than they are handed over."""
+    return [jobs[k : k + size] for k in range(0, len(jobs), size)]
+
+
 def spread(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int) -> Iterator[Row]:
     """Yield what `call` makes of every job, in their order."""
     if workers == 1:

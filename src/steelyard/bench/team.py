@@ -155,7 +155,7 @@ def trial(job: tuple[str, int, Sequence[str]]) -> list[dict[str, Any]]:
 
 def score(made: TeamTrial, found: TeamEstimate) -> dict[str, Any]:
     """Return the errors of one answer; inertia is None where it was not identified."""
-    turned, moved, share = grasp_errors(made.truth, _poses(made.log, found))
+    turned, moved, share = grasp_errors(made.truth, poses_found(made.log, found))
     body, moments = made.truth.body, found.principal_moments
     return {
         "rotation_deg": turned,
@@ -176,7 +176,8 @@ def grasp_errors(truth: TeamTruth, found: Pose) -> tuple[float, float, float]:
     return float(angle.mean()), float(1000 * gap.mean()), float(100 * (gap / far[others]).mean())
 
 
-def _poses(log: TeamLog, found: TeamEstimate) -> Pose:
+def poses_found(log: TeamLog, found: TeamEstimate) -> Pose:
+    """Return the grasps (N,) in R of every robot of the log."""
     matrices: Array = np.array([found.grasps[name].pose.matrix() for name in log.names])
     return Pose.from_matrix(matrices)
 

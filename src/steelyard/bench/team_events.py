@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.pool import spread
+from steelyard.bench.team import poses_found
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Presence, Slip, TeamNoise, TeamScene, case
-from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
@@ -36,13 +36,9 @@ RULES = (
 )
 
 
-def _grasps(log: TeamLog, found: TeamEstimate) -> Pose:
-    return Pose.from_matrix(np.array([found.grasps[name].pose.matrix() for name in log.names]))
-
-
 def _position(made: TeamTrial, found: TeamEstimate) -> float:
     """Return the mean error [mm] of the grasps that are not the reference's."""
-    apart = np.linalg.norm(_grasps(made.log, found).position - made.truth.grasps.position, axis=1)
+    apart = np.linalg.norm(poses_found(made.log, found).position - made.truth.grasps.position, axis=1)
     return float(1000 * apart[1:].mean())
 
 

@@ -57,9 +57,7 @@ def _errors(found: TeamEstimate, made: ThreeOmnids) -> dict[str, Any]:
     """Return the mean errors of the grasps other than the reference."""
     import numpy as np
 
-    from steelyard.report.team_sections import errors
-
-    off = [errors(found.grasps[n], X) for n, X in made.grasps.items() if n != found.reference]
+    off = [found.grasps[n].away_from(X) for n, X in made.grasps.items() if n != found.reference]
     gap, turn = np.mean(off, axis=0).tolist()
     return {"position_mm": gap, "rotation_deg": turn}
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, cast
 
@@ -67,14 +67,12 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
             )
         page = _of_team(title or f"{result.stem}: what the team carries", estimate, log, data, others, said)
     else:
-        facts = None if truth is None else _Facts.read(truth, estimate)
+        facts = _Facts() if truth is None else _Facts.read(truth, estimate)
         of_log, residuals = (None, None) if log is None else _from_log(log, data, tool, estimate)
-        placed = _given_pose(pose_in_sensor) or of_log or (None if facts is None else facts.X_SO)
+        placed = _given_pose(pose_in_sensor) or of_log or facts.X_SO
         drawing, names = (None, {}) if parts is None and scan is None else _scene(parts, scan, placed, estimate)
-        known = None if facts is None else facts.truth
-        names = names if facts is None else {**names, **facts.names}
         heading = title or f"{result.stem}: what the robot holds"
-        page = Report(heading, estimate, drawing, residuals, others, known, names, said)
+        page = Report(heading, estimate, drawing, residuals, others, facts.truth, {**names, **facts.names}, said)
     write_report(page, output)
     scene = page.scene
     drawn = 0 if scene is None else len(scene.bodies)
@@ -92,11 +90,11 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
 
 @dataclass(frozen=True, eq=False)
 class _Facts:
-    """What truth.json says of the object, and of those of its parts that are the result's."""
+    """What truth.json says of the object, and of those of its parts that are the result's; nothing without one."""
 
-    truth: Truth
-    names: Mapping[int, str]
-    X_SO: Pose
+    truth: Truth | None = None
+    names: Mapping[int, str] = field(default_factory=dict)
+    X_SO: Pose | None = None
 
     @classmethod
     def read(cls, path: Path, estimate: Estimate) -> _Facts:

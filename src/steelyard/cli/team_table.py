@@ -97,6 +97,5 @@ def _clock(estimate: TeamEstimate, name: str) -> str:
 
 def _off(grasp: GraspEstimate, truth: Pose) -> str:
     """Return distance and angle from the true grasp."""
-    gap = 1e3 * float(np.linalg.norm(grasp.pose.position - truth.position))
-    turn = float(np.rad2deg((truth.rotation.inverse() @ grasp.pose.rotation).angle()))
+    gap, turn = grasp.away_from(truth)
     return f"{gap:.2f} mm, {turn:.3f}°"

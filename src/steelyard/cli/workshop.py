@@ -5,7 +5,7 @@ from __future__ import annotations
 import time
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -14,6 +14,9 @@ from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
 from steelyard.findings import counted
+
+if TYPE_CHECKING:
+    from steelyard.workshop.tools import Tool
 
 
 @click.group(cls=Group, context_settings=HELP)
@@ -68,8 +71,6 @@ def build(
 ) -> None:
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
     from steelyard.io.images import require_images
-    from steelyard.io.object_writing import write_object, write_object_views
-    from steelyard.simulate.workshop import known_object, scan_of, sensed
     from steelyard.workshop.catalogue import FAMILIES, build_graded, require
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED
@@ -88,16 +89,8 @@ def build(
     rows: list[dict[str, Any]] = []
     for done, (name, k) in enumerate(jobs, start=1):
         tool = build_tool(name, (seed, k) if variants else None)
-        known = known_object(tool, seed, motion)
-        known = replace(known, name=f"{tool.name}-s{seed}-{k}" if variants else tool.name)
-        log = () if noise == "none" or known.track is None else sensed(known.track.columns(), noise, seed, known.name)
-        write_object(known, folder / known.name, *log)
-        if views:
-            write_object_views(*scan_of(known, seed), folder / known.name / "views")
-        rows.append({
-            "name": known.name, "mass_kg": float(known.truth.mass), "parts": len(known.parts), "half": known.half,
-            "findings": [finding.code for finding in known.findings],
-        })  # fmt: skip
+        called = f"{tool.name}-s{seed}-{k}" if variants else tool.name
+        rows.append(_written(tool, called, folder, seed, motion, noise, views))
         if progress:
             progress(done, len(jobs))
     seconds = time.perf_counter() - begun
@@ -115,3 +108,19 @@ def build(
             f"Try: steelyard identify {one / 'log.toml'} --scan {one / 'views'} "
             f"--pose-in-sensor {one / 'views' / 'object.toml'}"
         )
+
+
+def _written(tool: Tool, name: str, folder: Path, seed: int, motion: str, noise: str, views: bool) -> dict[str, Any]:
+    """Write the object folder of one tool; return what is told of it."""
+    from steelyard.io.object_writing import write_object, write_object_views
+    from steelyard.simulate.workshop import known_object, scan_of, sensed
+
+    known = replace(known_object(tool, seed, motion), name=name)
+    log = () if noise == "none" or known.track is None else sensed(known.track.columns(), noise, seed, name)
+    write_object(known, folder / name, *log)
+    if views:
+        write_object_views(*scan_of(known, seed), folder / name / "views")
+    return {
+        "name": name, "mass_kg": float(known.truth.mass), "parts": len(known.parts), "half": known.half,
+        "findings": [finding.code for finding in known.findings],
+    }  # fmt: skip

@@ -1,7 +1,7 @@
 """The size-based errors as the published code computes them: for the table only, never to judge by.
 
 The code of "The Sum of Its Parts" keeps the centre-of-mass error in an array of integers, so that each axis loses what
-is behind the point, and divides by the box of its own estimated shape, which is thicker than the object.
+is behind the decimal point, and divides by the box of its own estimated shape, which is thicker than the object.
 """
 
 from __future__ import annotations

@@ -38,7 +38,7 @@ class SolidScore:
     iou: float
 
 
-def true_solid(known: KnownObject | TriangleMesh, samples: int = SAMPLES, seed: int = 0) -> TrueSolid:
+def true_solid(known: KnownObject | TriangleMesh, samples: int = SAMPLES) -> TrueSolid:
     """Return the truth to score solids of an object against; a surface turned inside out bounds a void."""
     mesh = known.mesh if isinstance(known, KnownObject) else known
     middle = mesh.vertices.mean(0)
@@ -46,7 +46,7 @@ def true_solid(known: KnownObject | TriangleMesh, samples: int = SAMPLES, seed: 
     along = (mesh.vertices[np.unique(mesh.triangles)] - middle) @ axes.T
     low, high = along.min(0), along.max(0)
     pad = _PAD * float(np.linalg.norm(high - low))
-    drawn = np.random.default_rng(seed).uniform(low - pad, high + pad, (samples, 3))
+    drawn = np.random.default_rng(0).uniform(low - pad, high + pad, (samples, 3))
     points = drawn @ axes + middle
     return TrueSolid(float(part_moments(mesh)[:, 0].sum()), points, winding_of(mesh.corners, points) > 0)
 

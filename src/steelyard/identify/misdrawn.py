@@ -1,4 +1,4 @@
-"""How wrong the masses of parts are whose borders a scan drew a little off."""
+"""How far off the masses of parts are where a scan drew the borders between parts in slightly wrong places."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The body nearest to what a log says that is still much like a shape: of each second moment a share stays."""
+"""The body nearest to what a log says among those that keep a share of every second moment of a given shape."""
 
 from __future__ import annotations
 

@@ -14,6 +14,7 @@ from steelyard.identify.regressor import design, residual_map
 from steelyard.identify.rest import RIPPLE
 from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
+from steelyard.logs.noise import robust_std
 
 # Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
 # and an axis that looks quiet by chance would be over-weighted.
@@ -171,7 +172,7 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
         miss = np.diag(K @ moments.scatter[group] @ K.T) / (rows * (1 - lost))
         if c in resting and rows >= FEWEST_FOR_MEDIAN:
             residual = features(log.rows(log.noise_class == c)) @ K.T
-            left = np.minimum(np.square(1.4826 * np.median(np.abs(residual), axis=0)) / (1 - lost), miss)
+            left = np.minimum(np.square(robust_std(residual)) / (1 - lost), miss)
         elif c in resting:
             left = miss
         else:

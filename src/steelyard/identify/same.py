@@ -66,8 +66,7 @@ def compare(
 
 def _quantities(body: InertialParameters, covariance: Array, any_grasp: bool) -> tuple[Array, Array, tuple[str, ...]]:
     """Return what is compared, its covariance and its names."""
-    J = np.zeros((10, 10))
-    J[0, 0], J[1:] = 1, forms.com_jacobian(body.vector)
+    J = forms.people_jacobian(body.vector)
     values = np.concatenate([[body.mass], body.com, forms.upper(body.inertia_com)])
     people = J @ covariance @ J.T + np.diag(np.square(EXACT * natural_sizes(body.vector.copy())))
     if not any_grasp:

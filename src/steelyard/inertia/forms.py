@@ -141,3 +141,10 @@ def com_jacobian(phi: Array) -> Array:
     out[..., 3:, 0] = 0.5 * np.einsum("...ka,...a->...k", slope, h) / m**2
     out[..., 3:, 1:4] = -slope / m[..., None]
     return out
+
+
+def people_jacobian(phi: Array) -> Array:
+    """Return d (mass, com, inertia about the CoM) / d phi, shape (..., 10, 10)."""
+    out = np.zeros((*phi.shape[:-1], 10, 10))
+    out[..., 0, 0], out[..., 1:, :] = 1, com_jacobian(phi)
+    return out

@@ -22,7 +22,7 @@ from steelyard.io.table_header import Columns, Header
 
 _WIDEST = 4096
 # What reading an array of a damaged NPZ raises.
-DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
+_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
 
 
 @dataclass(frozen=True)
@@ -66,10 +66,26 @@ class ArrayTable:
         return out
 
 
+def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs") -> dict[str, Any]:
+    """Return arrays of an NPZ file by name, all where none is named; raises BadFile where one is missing or damaged.
+
+    of  begins what is said of the names where one of them is missing
+    """
+    ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
+    try:
+        with np.load(path, allow_pickle=False) as archive:
+            missing = [name for name in names if name not in archive]
+            if missing:
+                raise BadFile(f'{path}: array "{missing[0]}" is missing. {of} {", ".join(names)}.')
+            return {name: archive[name] for name in names or archive.files}
+    except _DAMAGED as error:
+        raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+
+
 def _numeric(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
     try:
         array: np.ndarray[Any, np.dtype[Any]] = archive[key]
-    except DAMAGED as error:
+    except _DAMAGED as error:
         raise BadFile(f'{path}: array "{key}" is damaged ({error}). Save the file again.') from None
     require_numbers(path, key, array)
     return array
@@ -100,7 +116,7 @@ def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
             version = npy.read_magic(member)
             read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
             shape, _, dtype = read(member)
-    except DAMAGED:
+    except _DAMAGED:
         raise BadFile(f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.') from None
     size = archive.getinfo(name).file_size
     if dtype.hasobject:

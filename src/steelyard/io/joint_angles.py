@@ -1,4 +1,4 @@
-"""Whether joint angles are those of an Omnid, in the unit that was said: else columns or units are others."""
+"""Whether joint angles can be those of an Omnid in the unit that was said; if not, columns or units are wrong."""
 
 from __future__ import annotations
 

@@ -11,7 +11,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.array_table import DAMAGED, ArrayTable
+from steelyard.io.array_table import read_arrays
 from steelyard.io.in_file import in_file
 from steelyard.logs.log import Integers, Noise
 from steelyard.logs.moments import SIZE, Moments
@@ -36,15 +36,7 @@ def read_moments(path: Path | str) -> Moments:
     path = Path(path)
     if not path.is_file():
         raise BadFile(f"{path}: no such file.")
-    ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            missing = [name for name in _NAMES if name not in archive]
-            if missing:
-                raise BadFile(f'{path}: array "{missing[0]}" is missing. Moments have {", ".join(_NAMES)}.')
-            arrays = {name: archive[name] for name in _NAMES}
-    except DAMAGED as error:
-        raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+    arrays = read_arrays(path, _NAMES, "Moments have")
     return in_file(path, lambda: _moments(arrays))
 
 

@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.io.array_table import DAMAGED, ArrayTable, require_numbers
+from steelyard.io.array_table import ArrayTable, read_arrays, require_numbers
 from steelyard.io.in_file import in_file
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
@@ -155,26 +155,13 @@ def read_track(path: Path | str) -> Track:
     path = Path(path)
     down = set(_DOWN.values()) <= set(ArrayTable.open(path).header.groups)
     names = {**MOTION, **(_DOWN if down else {})}
-    arrays = _loaded(path, tuple(names.values()))
+    arrays = _arrays(path, tuple(names.values()))
     return in_file(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))
 
 
 def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
     """Return named arrays of an NPZ file; raises BadFile where one is missing or no array of numbers."""
-    ArrayTable.open(path)  # refuses pickles by their header
-    return _loaded(path, names)
-
-
-def _loaded(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return named arrays of an NPZ file whose headers are known to be good."""
-    with np.load(path, allow_pickle=False) as archive:
-        missing = [name for name in names if name not in archive]
-        if missing:
-            raise BadFile(f'{path}: array "{missing[0]}" is missing. It needs {", ".join(names)}.')
-        try:
-            found = {name: archive[name] for name in names}
-        except DAMAGED as error:
-            raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+    found = read_arrays(path, names)
     for name, values in found.items():
         require_numbers(path, name, values)
     return found

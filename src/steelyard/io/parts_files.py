@@ -19,7 +19,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.array_table import DAMAGED, ArrayTable
+from steelyard.io.array_table import read_arrays
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers
@@ -201,14 +201,7 @@ def _arrays(path: Path) -> dict[str, Array]:
         raise BadFile(
             f"{path}: holds {size / 1024**2:.0f} MiB, more than the {MOST_BYTES // 1024**2} MiB that are read."
         )
-    ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
-    found = {}
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            for name in archive.files:
-                found[name] = archive[name]
-    except DAMAGED as error:
-        raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+    found = read_arrays(path)
     for name, array in found.items():
         kinds, wanted = ("U", "text") if name == "names" else ("fiub", "real numbers")
         if array.dtype.kind not in kinds:

@@ -31,6 +31,9 @@ from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
 _FEWEST_ROWS = 12
+# [s] No delay beyond the first, nor beyond a tenth of the log, is looked for; one below the second, or below three of
+# its standard deviations, counts as none.
+_LONGEST_DELAY_S, _SMALLEST_DELAY_S = 0.25, 0.5e-3
 _INTERPOLATION = 0.01  # of a sampling step
 
 
@@ -80,7 +83,7 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
 
 def _align_timed(given: Prepared, rates: bool = False) -> Aligned:
     """Find clocks and mounts on rows without taps, then make the log; `rates`: look for clocks that run fast, too."""
-    taps = _taps(given) if given.options.leave_out_taps else np.zeros((0, 2))
+    taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
     straight = felt.rows(~touched).turned_back(given.options.turn)
@@ -139,8 +142,7 @@ def _rows(given: Prepared) -> tuple[Array, Felt]:
     spans = list(given.spans().values())
     start = max((s for s, _ in spans), default=float(time[0]))
     end = min((e for _, e in spans), default=float(time[-1]))
-    reach = given.options.max_delay_s
-    shared = (time >= start - reach) & (time <= end + reach)
+    shared = (time >= start - _LONGEST_DELAY_S) & (time <= end + _LONGEST_DELAY_S)
     if start > end or not shared.any():
         raise CannotAnswer(
             "the streams share no time: "
@@ -161,7 +163,7 @@ def _rows(given: Prepared) -> tuple[Array, Felt]:
 
 def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
-    reach = min(given.options.max_delay_s, 0.1 * float(time[-1] - time[0]))
+    reach = min(_LONGEST_DELAY_S, 0.1 * float(time[-1] - time[0]))
     ok = given.covered(time, given.known)
     if given.unknown:
         everyone = {**given.known, **dict.fromkeys(given.unknown, 0.0)}
@@ -176,11 +178,10 @@ def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str
     question = Question(time[pick], felt.rows(pick), given.kinematics, given.imu, given.unknown, given.known, reach)
     clocks = refine(question, {**given.known, **scan(question)})
     clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
-    least = given.options.smallest_delay_s
     late = given.unknown
     while True:
         # A delay must stay significant in the fit that is told of in the end.
-        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(least, 3 * clocks.delays_std_s[n]))
+        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(_SMALLEST_DELAY_S, 3 * clocks.delays_std_s[n]))
         if sure == late:
             return clocks, late
         late, none = sure, {n: 0.0 for n in given.unknown if n not in sure}

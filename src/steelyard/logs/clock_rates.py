@@ -17,6 +17,7 @@ import numpy as np
 from steelyard.check import Array, Integers
 from steelyard.logs.delays import Question, features
 from steelyard.logs.kinematics import Delays
+from steelyard.logs.noise import robust_std
 from steelyard.logs.recording import Recording
 from steelyard.logs.runs import picked
 
@@ -123,7 +124,7 @@ class _Linear:
     @property
     def spread(self) -> Array:
         """Spread (C,) of the residual, not drawn by rows far off."""
-        return np.asarray(1.4826 * np.median(np.abs(self.residual), axis=0) + 1e-12)
+        return robust_std(self.residual) + 1e-12
 
     def unexplained(self, values: Array) -> Array:
         """Return what the features leave of values (N, C)."""

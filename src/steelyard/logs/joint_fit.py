@@ -11,6 +11,7 @@ from steelyard.check import Array
 from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.log import MotionLog
+from steelyard.logs.noise import robust_std
 from steelyard.spatial import Rotation, lever_acceleration
 
 _BLOCKS = 20
@@ -229,7 +230,7 @@ def _descend(
             break
     r = _residual(question, layout, theta)
     least = _first_scales(question, layout)
-    seen = np.clip(1.4826 * np.median(np.abs(r), axis=0), 0.3 * least, 3 * least)
+    seen = np.clip(robust_std(r), 0.3 * least, 3 * least)
     seen[6:] *= np.sqrt(_memory(r[:, 6:]))
     seen[:6] = np.where(np.isfinite(sigma[:6]), seen[:6], np.inf)
     return theta, _weights(r, seen, power), seen
@@ -259,7 +260,7 @@ def _first_scales(question: Question, layout: _Layout) -> Array:
     """Return starting scales (k,): what free linear fits of the channels leave over, infinite for dead channels."""
     motion, wrench, force = question.seen(layout.delays(layout.start, question))
     residual = free_residual(wrench, features(motion, force))
-    scales = 1.4826 * np.median(np.abs(residual), axis=0)
+    scales = robust_std(residual)
     if force is not None and motion.gravity is not None:
         steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
         scales = np.append(scales, 1.4826 * np.median(np.abs(free_residual(force, steady)), axis=0).mean() * np.ones(3))

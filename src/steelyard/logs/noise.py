@@ -13,9 +13,13 @@ from steelyard.spatial import cross_matrix
 _FEWEST_ROWS = 30
 
 
+def robust_std(values: Array) -> Array:
+    """Return the standard deviation (k,) of normal values (N, k) about zero, from the median of their sizes."""
+    return np.asarray(1.4826 * np.median(np.abs(values), axis=0))
+
+
 def classes(still: Mask, alpha_variance: Array) -> Integers:
-    """Return a class (N,) per row: still rows, and moving rows binned by factors of four of their variance
-    (N,)."""
+    """Return a class (N,) per row: still rows, and moving rows binned by factors of four of their variance (N,)."""
     base = float(np.median(alpha_variance)) or 1.0
     bins = np.clip(np.rint(np.log(np.maximum(alpha_variance, 1e-30) / base) / np.log(4.0)), -1, 3).astype(np.int64)
     label = np.where(still, -2, bins)
@@ -31,11 +35,9 @@ def levels(
     index: Integers, alpha_variance: Array, acceleration_variance: Array, residual: Array, body: Array,
     least: Array, declared: Mapping[str, float],
 ) -> tuple[Noise, ...]:  # fmt: skip
-    """Return one Noise per class from the variances of the motion (N,) and the wrench residual (N, 6) of a
-    body (10,).
+    """Return one Noise per class from the variances of the motion (N,) and the wrench residual (N, 6) of a body (10,).
 
-    The wrench carries what the residual shows beyond the noise of the motion, at least `least` (6,) [(N
-    m)^2, N^2].
+    The wrench carries what the residual shows beyond the noise of the motion, at least `least` (6,) [(N m)^2, N^2].
     Declared standard deviations (force, torque, acceleration, angular_acceleration) win.
     """
     mass_matrix = _mass_matrix(body)
@@ -46,7 +48,7 @@ def levels(
         for name, part in (("angular_acceleration", slice(0, 3)), ("acceleration", slice(3, 6))):
             if name in declared:
                 motion[part] = declared[name] ** 2
-        seen = (1.4826 * np.median(np.abs(residual[rows]), axis=0)) ** 2
+        seen = robust_std(residual[rows]) ** 2
         explained = np.einsum("ij,j,ij->i", mass_matrix, motion, mass_matrix)
         wrench = np.maximum(seen - explained, np.maximum(least, 0.01 * seen))
         for name, part in (("torque", slice(0, 3)), ("force", slice(3, 6))):

@@ -20,20 +20,14 @@ from steelyard.logs.recording import Recording, Stream
 class AlignOptions:
     """How to align.
 
-    cutoff_hz         [Hz] common low-pass; above it an arm and its load do not move as one body
-    max_delay_s       [s] widest delay looked for (no more than a tenth of the log)
-    estimate_delays   look for delays that were not given; False counts them as none
-    leave_out_taps    leave the rows of taps out
-    smallest_delay_s  [s] a delay below this, or below three of its standard deviations, counts as none
-    place             (3,) [m] in S, the point whose position, velocity or acceleration the poses give
-    turn              (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
+    cutoff_hz        [Hz] common low-pass; above it an arm and its load do not move as one body
+    estimate_delays  look for delays that were not given; False counts them as none
+    place            (3,) [m] in S, the point whose position, velocity or acceleration the poses give
+    turn             (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
     """
 
     cutoff_hz: float = 40.0
-    max_delay_s: float = 0.25
     estimate_delays: bool = True
-    leave_out_taps: bool = True
-    smallest_delay_s: float = 0.5e-3
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
 

@@ -8,6 +8,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.parts.groups import root
 from steelyard.parts.skin import Skin
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES, TetMesh
@@ -115,14 +116,6 @@ def _absorbed(piece: Integers, size: Array, pairs: Integers, pull: Array, least:
 
 
 @numba.njit(cache=True, nogil=True)
-def _root(parent: Any, k: int) -> int:
-    while parent[k] != k:
-        parent[k] = parent[parent[k]]
-        k = parent[k]
-    return k
-
-
-@numba.njit(cache=True, nogil=True)
 def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> Any:
     count = piece.max() + 1
     parent, total = np.arange(count), np.zeros(count)
@@ -132,14 +125,14 @@ def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> A
         # The ends of every contact, by cluster.
         start = np.zeros(count + 1, np.int64)
         for e in range(len(pairs)):
-            a, b = _root(parent, piece[pairs[e, 0]]), _root(parent, piece[pairs[e, 1]])
+            a, b = root(parent, piece[pairs[e, 0]]), root(parent, piece[pairs[e, 1]])
             if a != b:
                 start[a + 1] += 1
                 start[b + 1] += 1
         start = np.cumsum(start)
         fill, far, weight = start[:-1].copy(), np.empty(start[-1], np.int64), np.empty(start[-1])
         for e in range(len(pairs)):
-            a, b = _root(parent, piece[pairs[e, 0]]), _root(parent, piece[pairs[e, 1]])
+            a, b = root(parent, piece[pairs[e, 0]]), root(parent, piece[pairs[e, 1]])
             if a != b:
                 far[fill[a]], far[fill[b]] = b, a
                 weight[fill[a]] = weight[fill[b]] = pull[e]
@@ -161,7 +154,7 @@ def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> A
         joined = False
         for a in range(count):
             if goal[a] >= 0:
-                p, q = _root(parent, a), _root(parent, goal[a])
+                p, q = root(parent, a), root(parent, goal[a])
                 if p != q:
                     parent[max(p, q)] = min(p, q)
                     total[min(p, q)] += total[max(p, q)]
@@ -170,7 +163,7 @@ def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> A
             break
     label = np.empty(len(piece), np.int64)
     for t in range(len(piece)):
-        label[t] = _root(parent, piece[t])
+        label[t] = root(parent, piece[t])
     return label
 
 

@@ -15,6 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.parts.groups import root
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
@@ -72,14 +73,6 @@ def _distance(feature: Array, normal: float, i: int, j: int) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _root(parent: Any, i: int) -> int:
-    while parent[i] != i:
-        parent[i] = parent[parent[i]]
-        i = parent[i]
-    return int(i)
-
-
-@numba.njit(cache=True, nogil=True)
 def _first_threshold(feature: Array, normal: float, near: Any) -> float:
     """Return the median over points of the least dissimilarity to a neighbour, above zero."""
     least = np.empty(len(near))
@@ -119,7 +112,7 @@ def _fuse(feature: Array, normal: float, near: Any, count: int, threshold: float
             member = i
             while member >= 0 and left > count:
                 for k in near[member]:
-                    j = _root(parent, k)
+                    j = root(parent, k)
                     if met[j] == visit:
                         continue
                     met[j] = visit
@@ -134,7 +127,7 @@ def _fuse(feature: Array, normal: float, near: Any, count: int, threshold: float
                 member = following[member]
         threshold *= 2
     for i in range(n):
-        parent[i] = _root(parent, i)
+        parent[i] = root(parent, i)
     return parent
 
 

@@ -1,4 +1,4 @@
-"""Numbers as people read them: two figures of the standard deviation, a minus that is one, units that suit the size."""
+"""Numbers as people read them: two figures of the standard deviation, a true minus sign, units that suit the size."""
 
 from __future__ import annotations
 

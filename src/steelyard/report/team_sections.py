@@ -94,14 +94,8 @@ def _late(seen: TeamEstimate, name: str) -> Html:
     return measured(1e3 * seen.clock_offsets_s.get(name, 0.0), 1e3 * std, "ms")
 
 
-def errors(grasp: GraspEstimate, true: Pose) -> tuple[float, float]:
-    """Return distance [mm] and angle [deg] of a grasp from the true one."""
-    turn = (true.rotation.inverse() @ grasp.pose.rotation).angle()
-    return 1e3 * float(np.linalg.norm(grasp.pose.position - true.position)), float(np.rad2deg(turn))
-
-
 def _away(grasp: GraspEstimate, true: Pose) -> str:
-    gap, turn = errors(grasp, true)
+    gap, turn = grasp.away_from(true)
     return f"{general(gap, 2)} mm, {general(turn, 2)}°"
 
 
@@ -111,7 +105,7 @@ def _rivals(report: Report, seen: TeamEstimate) -> list[Html]:
     rows = []
     for name, rival in report.rivals.items():
         if true and isinstance(rival, TeamEstimate):
-            off = np.array([[errors(each.grasps[n], X) for n, X in true.items()] for each in (seen, rival)]).mean(1)
+            off = np.array([[each.grasps[n].away_from(X) for n, X in true.items()] for each in (seen, rival)]).mean(1)
             rows.append(
                 f"{name}: {general(float(off[1, 0]), 2)} mm and {general(float(off[1, 1]), 2)}° on average, "
                 f"{general(float(off[1, 0] / max(off[0, 0], 1e-12)), 2)} times as far."

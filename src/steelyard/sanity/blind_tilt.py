@@ -10,6 +10,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.glance import Glance
 from steelyard.sanity.static_fit import beside, solve
 from steelyard.spatial import Rotation
@@ -34,10 +35,9 @@ def blind_tilt(view: Glance, gravity: Array, blind: Array) -> tuple[Finding, ...
     size = float(np.linalg.norm(gravity))
     across = float(np.linalg.norm(gravity - blind * (blind @ gravity))) / size
     tilt = abs(np.arccos(min(across, 1.0)) - np.arccos(min(across * float(gain[0]), 1.0)))
-    axis = ", ".join(f"{v:.2f}" for v in blind * np.sign(blind[np.abs(blind).argmax()]) + 0.0)
     message = (
         f"Gravity sweeps {abs(gain[0] - 1) * 100:.1f} ± {spread[0] * 100:.1g} % {'more' if gain[0] > 1 else 'less'} in "
         f"the accelerometer than its direction in W says: a tilt of about {np.degrees(tilt):.0f} degrees toward or "
-        f"from ({axis}) of W, unless the accelerometer's gain is off; the answer does not assume this."
+        f"from ({axis_words(blind)}) of W, unless the accelerometer's gain is off; the answer does not assume this."
     )
     return (Finding.of("base-tilted", message),)

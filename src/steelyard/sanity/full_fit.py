@@ -13,6 +13,7 @@ from steelyard.check import Array, Integers
 from steelyard.identify.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
+from steelyard.logs.noise import robust_std
 from steelyard.logs.runs import picked
 from steelyard.spatial import cross_matrix
 
@@ -117,7 +118,7 @@ def _weights(rows: Rows, solution: Array) -> Array:
     out, heard = np.empty_like(miss), ~rows.log.dead
     for kind in np.unique(rows.log.noise_class):
         at = rows.log.noise_class == kind
-        variance = (1.4826 * np.median(np.abs(miss[at]), 0)) ** 2 + 0.01 * miss[at].var(0)
+        variance = robust_std(miss[at]) ** 2 + 0.01 * miss[at].var(0)
         mean = (variance * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1)
         out[at] = heard / np.maximum(np.repeat(mean, 3), _SMALLEST**2)
     return out

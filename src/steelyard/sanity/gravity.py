@@ -8,6 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.axis_words import direction_words
 from steelyard.sanity.full_fit import Rows
 from steelyard.spatial import Rotation
 
@@ -26,8 +27,8 @@ class FittedGravity:
     @property
     def words(self) -> str:
         """Say how far and where to."""
-        along = ", ".join(f"{v:.3f}" for v in self.gravity / np.linalg.norm(self.gravity) + 0.0)
-        return f"{np.degrees(self.angle):.1f} ± {np.degrees(self.angle_std):.1g} degrees (along ({along}) of W)"
+        size = f"{np.degrees(self.angle):.1f} ± {np.degrees(self.angle_std):.1g} degrees"
+        return f"{size} (along ({direction_words(self.gravity)}) of W)"
 
 
 def fitted_gravity(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> FittedGravity | None:

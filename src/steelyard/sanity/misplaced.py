@@ -14,6 +14,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.full_fit import Rows
 from steelyard.sanity.sensor_matrix import sensor_matrix
 from steelyard.sanity.torques import UNITS
@@ -90,8 +91,7 @@ class Misplaced:
         """Say along which axis the point may lie anywhere."""
         if self.blind is None:
             return ""
-        axis = ", ".join(f"{v:.2f}" for v in self.blind * np.sign(self.blind[np.abs(self.blind).argmax()]) + 0.0)
-        return f"; where it is along ({axis}) of S, turns about that axis alone do not show"
+        return f"; where it is along ({axis_words(self.blind)}) of S, turns about that axis alone do not show"
 
     def widened(self, estimate: Estimate) -> Estimate:
         """Return the estimate with bars that hold how well the point is known."""

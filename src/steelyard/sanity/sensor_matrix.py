@@ -17,6 +17,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.people import parameter_jacobian
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.full_fit import Rows
 from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.spatial import Rotation, cross_matrix
@@ -193,7 +194,7 @@ def _turn(found: SensorMatrix, stream: Stream) -> tuple[Finding, ...]:
 
 def _gains(found: SensorMatrix) -> tuple[Finding, ...]:
     gains, axes = np.linalg.eigh(found.stretch)
-    along = [", ".join(f"{v:.2f}" for v in axis * np.sign(axis[np.abs(axis).argmax()]) + 0.0) for axis in axes.T]
+    along = [axis_words(axis) for axis in axes.T]
     message = (
         f"Forces along ({along[2]}) of S read {100 * (gains[2] - gains[0]):.2g} % more than along ({along[0]}), "
         "whatever is held: gains of the sensor's axes differ, or one leaks into another. Error bars hold this, and a "

@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.glance import Glance, Seen
 from steelyard.sanity.static_fit import beside, fit, leave_out, solve
 from steelyard.spatial import Rotation, cross_matrix
@@ -39,8 +40,7 @@ class GlanceTilt:
         """Say which part of a tilt stays unseen."""
         if self.blind is None:
             return ""
-        axis = ", ".join(f"{v:.2f}" for v in self.blind * np.sign(self.blind[np.abs(self.blind).argmax()]) + 0.0)
-        return f"; a tilt toward ({axis}) of W cannot be seen in this motion"
+        return f"; a tilt toward ({axis_words(self.blind)}) of W cannot be seen in this motion"
 
 
 @dataclass(frozen=True, eq=False)

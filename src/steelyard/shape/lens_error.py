@@ -1,4 +1,4 @@
-"""What of the lens explains how its views have the table: focal length and principal point.
+"""Which error of the lens explains where its views see the table: in the focal length, or in the principal point.
 
 Every levelled view says where the table lies as its camera measures it: a direction and a distance. A focal length
 that is wrong tilts that by half sin(2 e) of its share at an elevation e, a principal point by cos(e)^2, a camera

@@ -117,11 +117,17 @@ class Region(NamedTuple):
         inner = (slice(_BRIM, -_BRIM),) * 2
         return bool(self.stands.sum() > self.stands[inner].sum())
 
+    def cells_under(self, points: Array) -> tuple[tuple[Any, Any], Any]:
+        """Return the cells i, j (N,) under points (N, 3), the nearest beyond the map, and which points are over it."""
+        i, j = np.floor((points[:, :2] - self.low) / self.pitch).astype(int).T
+        rows, columns = self.mask.shape
+        within = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
+        return (i.clip(0, rows - 1), j.clip(0, columns - 1)), within
+
     def holds(self, points: Array) -> Any:
         """Whether points (N, 3) lie over its cells."""
-        i, j = np.floor((points[:, :2] - self.low) / self.pitch).astype(int).T
-        within = (i >= 0) & (j >= 0) & (i < self.mask.shape[0]) & (j < self.mask.shape[1])
-        return within & self.mask[i.clip(0, self.mask.shape[0] - 1), j.clip(0, self.mask.shape[1] - 1)]
+        cells, within = self.cells_under(points)
+        return within & self.mask[cells]
 
 
 def scene_of(views: Views) -> Scene:
@@ -235,8 +241,7 @@ def _held(scene: Scene, shape: tuple[int, ...], low: Array, pitch: float) -> tup
 def lost_share(xyz: Array, region: Region) -> float:
     """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
     covered = np.zeros_like(region.stands)
-    i, j = np.floor((xyz[:, :2] - region.low) / region.pitch).astype(int).T
-    covered[i.clip(0, len(covered) - 1), j.clip(0, covered.shape[1] - 1)] = True
+    covered[region.cells_under(xyz)[0]] = True
     covered = ndimage.binary_dilation(covered, np.ones((3, 3)), iterations=_NEAR)
     return float((region.stands & ~covered).sum() / region.stands.sum())
 
@@ -284,8 +289,7 @@ def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tup
     table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
     level, rough = 0.0, 0.1 * scene.sigma
     object_cells = ndimage.binary_erosion(mask, np.ones((3, 3)), iterations=3)
-    cell = np.floor((xyz[:, :2] - region.low) / region.pitch).astype(int)
-    around = table & ~object_cells[cell[:, 0].clip(0, mask.shape[0] - 1), cell[:, 1].clip(0, mask.shape[1] - 1)]
+    around = table & ~object_cells[region.cells_under(xyz)[0]]
     if around.sum() >= 20:
         level = float(np.median(xyz[around, 2]))
         rough = float(np.subtract(*np.percentile(xyz[around, 2], (75, 25)))) / 1.35

@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.middle import middle_mean, quantile
+from steelyard.shape.medians import middle_mean, quantile
 
 UPWARD = 0.7  # least upward component of the normal of a surface that faces up
 _NOTHING, _SURFACE, _PAST = 0.0, 1.0, 2.0  # what a view says of a point

@@ -1,4 +1,4 @@
-"""Hulls that stand in where the kernel gives up inside a compiled loop: Qhull's.
+"""Hulls by Qhull that stand in where the kernel gives up inside a compiled loop.
 
 A compiled loop cannot call Qhull. It notes the first set of points that the kernel gives back and runs to its end with
 whatever comes of that; then Qhull makes the hull of that set and the loop runs again, which meets the same sets in the

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.shape.middle import quantile
+from steelyard.shape.medians import quantile
 from steelyard.shape.views import TablePlane
 from steelyard.spatial import Pose, Rotation
 

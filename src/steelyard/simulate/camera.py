@@ -14,6 +14,7 @@ from steelyard.spatial import Pose, Rotation
 D435 = Intrinsics(640, 480, 615.0, 615.0, 320.0, 240.0)
 VIEWS = 127  # the paper's scan
 SWEEP = 330.0  # angle around the target that a pass covers [deg]
+ELEVATIONS = (25.0, 45.0, 70.0)  # of the passes above the horizontal [deg]
 
 
 @dataclass(frozen=True)
@@ -50,21 +51,19 @@ def wrist_arc(
     distance: float,
     count: int = VIEWS,
     *,
-    elevations: tuple[float, ...] = (25.0, 45.0, 70.0),
     start: float = 0.0,
 ) -> Pose:
     """Return camera poses X_WC (count,) that look at `target` (3,) [m]: to and fro around it, each pass higher up.
 
-    distance    from the target [m]
-    elevations  of the passes above the horizontal [deg]
-    start       azimuth where the first pass begins [deg]
+    distance  from the target [m]
+    start     azimuth where the first pass begins [deg]
     """
-    along = np.linspace(0, len(elevations), count, endpoint=False)
+    along = np.linspace(0, len(ELEVATIONS), count, endpoint=False)
     leg = along.astype(int)
     part = along - leg
     part = np.where(leg % 2, 1 - part, part)
     azimuth = np.radians(start + SWEEP * part)
-    elevation = np.radians(np.array(elevations)[leg] + 6 * np.sin(4 * azimuth))  # an arm does not draw circles
+    elevation = np.radians(np.array(ELEVATIONS)[leg] + 6 * np.sin(4 * azimuth))  # an arm does not draw circles
     out = np.stack([np.cos(elevation) * np.cos(azimuth), np.cos(elevation) * np.sin(azimuth), np.sin(elevation)], 1)
     return looking(target + distance * out, target)
 

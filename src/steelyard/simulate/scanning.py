@@ -12,7 +12,7 @@ from scipy.spatial import ConvexHull
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import Colours, TriangleMesh, part_moments
-from steelyard.shape.views import Intrinsics, TablePlane, Views
+from steelyard.shape.views import Intrinsics, Views
 from steelyard.simulate.camera import D435, VIEWS, DepthNoise, disturbed, wrist_arc
 from steelyard.spatial import Pose, Rotation, unit_vectors
 
@@ -49,9 +49,7 @@ def scan_mesh(
     noise: DepthNoise | None = DepthNoise(),  # noqa: B008  (a frozen value)
     pose_std: tuple[float, float] = (0.0, 0.0),
     intrinsics: Intrinsics = D435,
-    elevations: tuple[float, ...] = (25.0, 45.0, 70.0),
     depth_unit: float = 0.001,
-    table_known: bool = False,
     X_WO: Pose | None = None,
     aim: tuple[float, float, float] | None = None,
     distance: float | None = None,
@@ -60,7 +58,6 @@ def scan_mesh(
 
     noise       None for an ideal camera (still in whole depth units)
     pose_std    error of the reported poses [mm, deg]
-    table_known whether the views carry the table's plane
     X_WO        where the mesh lies; left out, it rests on its most stable side, turned by chance
     aim         where in W all cameras look, left out the middle of the mesh
     distance    of the cameras from there [m], left out such that all of the mesh fits into the images
@@ -72,7 +69,7 @@ def scan_mesh(
     low, high = placed.bounds
     target = np.array([*(low + high)[:2] / 2, 0.4 * high[2]] if aim is None else aim)
     distance = distance or max(_CLOSEST, _FILL * float(np.linalg.norm(high - low)))
-    X_WC = wrist_arc(target, distance, count, elevations=elevations, start=rng.uniform(0, 360))
+    X_WC = wrist_arc(target, distance, count, start=rng.uniform(0, 360))
     size = (intrinsics.height, intrinsics.width)
     depth, rgb = np.zeros((count, *size), np.uint16), np.zeros((count, *size, 3), np.uint8)
     exact = np.zeros_like(depth)
@@ -85,10 +82,9 @@ def scan_mesh(
             rgb[k] = _grainy(rgb[k], noise.rgb, rng)
         depth[k] = np.minimum(np.round(z / depth_unit), 65535)
     reported = disturbed(X_WC, *pose_std, rng) if any(pose_std) else X_WC
-    table = TablePlane(np.array([0.0, 0.0, 1.0]), 0.0) if table_known else None
     return Scanned(
-        Views(depth, rgb, intrinsics, reported, depth_unit, table),
-        Views(exact, None, intrinsics, X_WC, depth_unit, table),
+        Views(depth, rgb, intrinsics, reported, depth_unit),
+        Views(exact, None, intrinsics, X_WC, depth_unit),
         X_WO,
         X_WC,
     )

@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
-from steelyard.inertia.forms import com_jacobian
+from steelyard.inertia.forms import people_jacobian
 from steelyard.inertia.parameters import frame_change
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
@@ -69,9 +69,7 @@ def known(body: InertialParameters, covariance: Array, units: Array) -> Mask:
     """Return which (10,) of mass, centre of mass and inertia about it are known: two standard deviations are below
     SHOWN of what a body of this mass and size can have, `units` (10,).
     """
-    jacobian = np.zeros((10, 10))
-    jacobian[0, 0] = 1
-    jacobian[1:] = com_jacobian(body.vector)
+    jacobian = people_jacobian(body.vector)
     std = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
     scale = units / np.concatenate([[1.0], np.full(3, units[0]), np.ones(6)])
     scale[0] = min(scale[0], abs(float(body.mass)))

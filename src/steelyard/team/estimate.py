@@ -41,6 +41,11 @@ class GraspEstimate:
         """Standard deviations (3,) of the position [m]."""
         return self.std[3:]
 
+    def away_from(self, true: Pose) -> tuple[float, float]:
+        """Return distance [mm] and angle [deg] from the true grasp."""
+        turn = (true.rotation.inverse() @ self.pose.rotation).angle()
+        return 1e3 * float(np.linalg.norm(self.pose.position - true.position)), float(np.rad2deg(turn))
+
 
 @dataclass(frozen=True, eq=False)
 class BodyEstimate:

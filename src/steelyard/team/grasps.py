@@ -38,10 +38,6 @@ class Grasps:
         """Return X_{first second}: the second grasp seen from the first."""
         return self[first].inverse() @ self[second]
 
-    def seen_from(self, reference: str) -> Grasps:
-        """Return the same grasps in another reference grasp."""
-        return Grasps(self.names, self[reference].inverse() @ self.poses, reference)
-
     def total_wrench(self, wrench: Array) -> Array:
         """Return the sum (T, 6) [N m, N] over the team of wrenches (N, T, 6) given at the grasps, at R's origin."""
         turn, place = self.poses.rotation.matrix, self.poses.position

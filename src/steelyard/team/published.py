@@ -16,7 +16,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
-from steelyard.inertia.forms import com_jacobian
+from steelyard.inertia.forms import people_jacobian
 from steelyard.logs.team_conditioning import all_conditioned
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_rows import TeamRows
@@ -188,10 +188,7 @@ def _assembled(
     people[1:4, 1:4] = rest.com_covariance
     people[4:, 4:] = turning.covariance if turning else (rest.mass * reach**2) ** 2 * np.eye(6)
     body = InertialParameters.from_com(rest.mass, rest.com, turning.matrix if turning else np.zeros((3, 3)))
-    jacobian = np.zeros((10, 10))
-    jacobian[0, 0] = 1
-    jacobian[1:] = com_jacobian(body.vector)
-    back = np.linalg.inv(jacobian)
+    back = np.linalg.inv(people_jacobian(body.vector))
     evidence = Evidence(
         rank=10 if known else 4,
         condition=turning.condition if turning else float(1 / max(np.sin(rest.tilt), 1e-9)),

@@ -1,4 +1,4 @@
-"""What a joint fit leaves, explained by more: columns that residuals may move along, the payload's motion taken out.
+"""What a joint fit leaves, explained by further parameters: ways in which residuals may move beside the payload.
 
 Of residuals e_i (T, 6) of robot i, e_i = sum_c columns_c theta_c + what any motion of the payload makes of all robots +
 noise. Sums over stretches of the rows are kept apart, so that the scatter of their scores tells standard deviations

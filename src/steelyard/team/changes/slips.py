@@ -41,6 +41,11 @@ class Slip:
     angle: float
     score: float
 
+    @classmethod
+    def of(cls, robot: int, row: int, step: Array, score: float) -> Slip:
+        """Return the slip by a step (6,), rotation vector and position."""
+        return cls(robot, row, float(np.linalg.norm(step[3:])), float(np.linalg.norm(step[:3])), score)
+
 
 @dataclass(frozen=True, eq=False)
 class SlipAt:
@@ -68,8 +73,7 @@ class SlipAt:
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
         full = step[row] if drifts else apart[after].mean(0) - apart[before].mean(0)
-        angle, distance = float(np.linalg.norm(full[:3])), float(np.linalg.norm(full[3:]))
-        slip = Slip(self.slip.robot, row, distance, angle, float(score[row]))
+        slip = Slip.of(self.slip.robot, row, full, float(score[row]))
         return replace(self, time=float(middle), slip=slip, step=full)
 
     def applied(self, parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
@@ -165,10 +169,10 @@ def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool 
     for i in range(count):
         score, step = _steps(apart[:, i], seen[:, i], width, gap, noise[i])
         row = int(np.argmax(score))
-        angle, distance = float(np.linalg.norm(step[row, :3])), float(np.linalg.norm(step[row, 3:]))
-        large = distance > LEAST_M or angle > LEAST_RAD
-        if score[row] > threshold and large and (best is None or score[row] > best.score):
-            best = Slip(i, row, distance, angle, float(score[row]))
+        slip = Slip.of(i, row, step[row], float(score[row]))
+        large = slip.distance > LEAST_M or slip.angle > LEAST_RAD
+        if slip.score > threshold and large and (best is None or slip.score > best.score):
+            best = slip
     return best
 
 

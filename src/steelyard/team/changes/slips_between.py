@@ -48,8 +48,14 @@ def step_between(found: SlipAt, parts: Sequence[Stretch], apart: Array) -> SlipA
     means, recording = _windows(parts, apart[:, found.slip.robot], found.slip.robot)
     after = recording >= found.recording
     step = means[after].mean(0) - means[~after].mean(0)
-    angle, distance = float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:]))
-    return replace(found, slip=replace(found.slip, angle=angle, distance=distance), step=step)
+    slip = found.slip
+    return replace(found, slip=Slip.of(slip.robot, slip.row, step, slip.score), step=step)
+
+
+def as_large_as_slips(slip: Slip) -> bool:
+    """Tell whether a step between recordings is larger than errors, and no farther than a grasp slips."""
+    large = slip.distance > LEAST_M or slip.angle > LEAST_RAD
+    return large and slip.distance < MOST_M and slip.angle < MOST_RAD
 
 
 def _windows(parts: Sequence[Stretch], apart: Array, robot: int) -> tuple[Array, Array]:
@@ -72,7 +78,6 @@ def _step(means: Array, recording: Array, first: int, robot: int, chance: float)
     if freedom < WINDOWS - 2:
         return None
     step = means[after].mean(0) - means[~after].mean(0)
-    angle, distance = float(np.linalg.norm(step[:3])), float(np.linalg.norm(step[3:]))
     left = means - np.where(after[:, None], means[after].mean(0), means[~after].mean(0))
     sides = sum(1 / len(np.unique(recording[side])) for side in (after, ~after))
     spread = left.T @ left / freedom * sides
@@ -80,5 +85,5 @@ def _step(means: Array, recording: Array, first: int, robot: int, chance: float)
         score = float(step @ np.linalg.solve(spread, step)) * (freedom - 5) / (6 * freedom)
     except np.linalg.LinAlgError:
         return None
-    large = (distance > LEAST_M or angle > LEAST_RAD) and distance < MOST_M and angle < MOST_RAD
-    return Slip(robot, 0, distance, angle, score) if large and score > fdtri(6, freedom - 5, 1 - chance) else None
+    slip = Slip.of(robot, 0, step, score)
+    return slip if as_large_as_slips(slip) and score > fdtri(6, freedom - 5, 1 - chance) else None

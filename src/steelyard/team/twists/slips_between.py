@@ -17,7 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.team.adjoint import adjoint_inverse, log
 from steelyard.team.changes.slips import Slip, SlipAt
-from steelyard.team.changes.slips_between import CHANCE, LEAST_M, LEAST_RAD, MOST_M, MOST_RAD
+from steelyard.team.changes.slips_between import CHANCE, as_large_as_slips
 from steelyard.team.twists.fit import TwistFit
 from steelyard.team.twists.rows import TwistStretch
 
@@ -63,8 +63,7 @@ def _step(before: TwistFit, after: TwistFit, reference: int, chance: float) -> t
     steps = np.linalg.solve(information, pull[..., None])[..., 0]
     scores = (steps * pull).sum(1)
     robot = int(np.argmax(scores))
-    angle, distance = float(np.linalg.norm(steps[robot, :3])), float(np.linalg.norm(steps[robot, 3:]))
-    large = (distance > LEAST_M or angle > LEAST_RAD) and distance < MOST_M and angle < MOST_RAD
-    if not large or scores[robot] < 2 * gammainccinv(3.0, chance):
+    slip = Slip.of(robot, 0, steps[robot], float(scores[robot]))
+    if not as_large_as_slips(slip) or slip.score < 2 * gammainccinv(3.0, chance):
         return None
-    return Slip(robot, 0, distance, angle, float(scores[robot])), steps[robot]
+    return slip, steps[robot]

@@ -1,0 +1,162 @@
+"""Readings: the log as given beside the ways in which rotation, gravity or axes of the wrench are commonly misread.
+
+A rival is claimed only where it
+
+* leaves less than a quarter of the force variance that the log as given leaves, and no more of the torque's;
+* explains at least half of the force variance, by a mass of the right sign beyond five jackknife standard deviations;
+* leaves less than half of what a freely tilted gravity would leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding, percent
+from steelyard.logs.misread import MISREAD, Misread
+from steelyard.logs.recording import Recording
+from steelyard.sanity.glance import Glance, glance, in_other_axes
+from steelyard.sanity.static_fit import StaticFit, fit
+from steelyard.sanity.tilt import GlanceTilt, tilt_of, turned_sensor
+
+# A rival leaves less than this share of the force variance that the log as given leaves.
+MUCH_BETTER = 0.25
+# A reading that leaves less than the first share of the force variance has rotation and gravity right but for a tilt;
+# one that leaves less than the second has the tilt right, too: two degrees leave more.
+GOOD, LEVEL = 0.03, 2e-4
+# Constant forces seem to turn with the sensor where a bias lies along gravity; torques then do not.
+TORQUES_TOO = 0.3
+# Beyond this no base is crooked [rad].
+STEEP = np.radians(60.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One way to read the recording: words for what would be wrong, gravity, rotations, its fit, how they were misread.
+
+    `misread` is None where the rotations are as given; `view` is what is seen where the wrench is in other axes.
+    """
+
+    words: str
+    gravity: Array
+    rotation: Array | None
+    fit: StaticFit
+    misread: Misread | None = None
+    view: Glance | None = None
+
+
+def reading_of(
+    view: Glance, words: str, gravity: Array, rotation: Array | None, misread: Misread | None = None
+) -> Reading:
+    """Return a reading with the better of two fits: with the measured acceleration and without."""
+    found = fit(view.seen(gravity, rotation), view.block)
+    if view.acceleration is not None:
+        still = fit(replace(view, acceleration=None).seen(gravity, rotation), view.block)
+        found = min(found, still, key=lambda f: f.force_share)
+    return Reading(words, gravity, rotation, found, misread)
+
+
+def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | None:
+    """Return the rival that beats the reading as given, if there is one."""
+    if view.rotation is None or given.fit.force_share < GOOD:
+        return None
+    free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
+    bar = MUCH_BETTER * given.fit.force_share
+    able = [
+        r
+        for r in (*_rivals(view, given.gravity), *_in_other_axes(recording, given))
+        if r.fit.force_share < min(bar, 0.5)
+        and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
+        and r.fit.sign != 0
+        and _varies(view, r)
+        and _beats_tilt(r, free)
+        and (r.view is None or r.fit.torque_share < TORQUES_TOO)
+    ]
+    # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
+    best = min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
+    return best if best is not None and not _outdone(best, view, given.gravity) else None
+
+
+def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
+    """Yield the ways in which rotation or gravity are commonly misread."""
+    R = view.rotation
+    if R is None:
+        return
+    for misread in MISREAD:
+        meant = misread.right(R)
+        if meant is not None:
+            yield reading_of(view, misread.words, gravity, meant, misread)
+    size = float(np.linalg.norm(gravity))
+    for axis in range(3):
+        if abs(gravity[axis]) < 0.8 * size:
+            for sign in (-1, 1):
+                words = f"gravity points along {'+' if sign > 0 else '-'}{'xyz'[axis]} of W"
+                yield reading_of(view, words, sign * size * np.eye(3)[axis], R)
+
+
+def _in_other_axes(recording: Recording, given: Reading) -> Iterator[Reading]:
+    """Yield the reading of the wrench in W where it was said to be in S, and in S where it was said to be in W."""
+    view = None if any(recording.dead) else glance(in_other_axes(recording))
+    if view is not None and given.rotation is not None:
+        words = f"the wrench is in the axes of {'W (the base), not of S' if view.world else 'S, not of W (the base)'}"
+        yield replace(reading_of(view, words, given.gravity, given.rotation), view=view)
+
+
+def _outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
+    """Tell whether a turned sensor explains much more than the reading does, even with gravity tilted.
+
+    In turns about one axis a turn of S is a tilt and a change of sign, too; then the reading holds.
+    """
+    free = tilt_of(reading.view or view, reading.gravity, reading.rotation, reading.fit.mass)
+    left = min(reading.fit.force_share, 1.0 if free is None or free.angle > STEEP else free.force_share)
+    turned = turned_sensor(view, gravity, 1) if left > LEVEL else None
+    return turned is not None and turned.force_share < MUCH_BETTER * left
+
+
+def sign_of(view: Glance, reading: Reading) -> int:
+    """Return the sign of the mass, 0 where it is not sure or a turn of S explains a negative one much better."""
+    return 0 if reading.fit.sign < 0 and _outdone(reading, view, reading.gravity) else reading.fit.sign
+
+
+def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
+    """Tell whether a freely tilted gravity explains no more (an axis: much more) than the rival does."""
+    if free is None:
+        return True
+    if rival.misread is not None or rival.view is not None:
+        return rival.fit.force_share < 0.5 * free.force_share
+    return rival.fit.force_share < 2 * free.force_share + 1e-3
+
+
+def _varies(view: Glance, reading: Reading) -> bool:
+    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
+    pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation).pull
+    return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
+
+
+def rival_finding(best: Reading, given: Reading) -> Finding:
+    """Return what is said of the rival that is taken instead of the reading as given."""
+    message = (
+        f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.fit.force_share)} of the force variance is "
+        f"left unexplained instead of {percent(given.fit.force_share)}. The answer assumes this."
+    )
+    if best.view is not None:
+        remedy = f'Set frame = "{"W" if best.view.world else "S"}" in force and torque of this stream.'
+        return Finding("gravity-frame", message, remedy)
+    return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
+
+
+def as_read(recording: Recording, best: Reading) -> Recording:
+    """Return the recording with its rotations, gravity and axes of the wrench as the reading has them."""
+    if best.view is not None:
+        return in_other_axes(recording)
+    if best.misread is None:
+        return replace(recording, gravity=best.gravity)
+    streams = []
+    for stream in recording.streams:
+        if (read := stream.channels.get("rotation")) is not None and (meant := best.misread.right(read)) is not None:
+            stream = replace(stream, channels={**stream.channels, "rotation": meant})
+        streams.append(stream)
+    return replace(recording, streams=tuple(streams))

@@ -1,0 +1,199 @@
+"""The payload of a team by its wrenches, once the motion has shown where everybody holds it."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.findings import Finding
+from steelyard.inertia import InertialParameters
+from steelyard.logs.team_log import TeamLog
+from steelyard.spatial import Pose
+from steelyard.team.assembled import assembled, team_size
+from steelyard.team.changes.odd_recording import without_odd
+from steelyard.team.clocks.errors import ClockErrors, Errors
+from steelyard.team.consistent import consistent
+from steelyard.team.estimate import TeamEstimate
+from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
+from steelyard.team.misread.forces import with_one_reading
+from steelyard.team.misread.length_units import require_metres
+from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign
+from steelyard.team.misread.torques import with_torque_sign
+from steelyard.team.payload.balance import require_balance
+from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
+from steelyard.team.payload.doubt import weight_by_gains
+from steelyard.team.payload.fit import fit_payload
+from steelyard.team.payload.model import Group, unit_bias
+from steelyard.team.payload.motion_noise import motion_noise
+from steelyard.team.payload.spectra import band_edges, gathered
+from steelyard.team.poses.covariance import Spread
+from steelyard.team.team_findings import (
+    bad_robots,
+    gains,
+    late_clocks,
+    lost_directions,
+    open_parameters,
+    unseen_gains,
+    unsettled,
+)
+from steelyard.team.unexplained import unexplained
+
+# Below this chi^2 per degree of freedom the motion is no measurement.
+LEAST_CHI2 = -0.1
+# Forces are not compared along the axes of grasps whose rotation is known no better than this [rad]: what that leaves
+# of their sum is as much as a misreading.
+COMPARABLE = 0.1
+# The mass is open where so much of it lies along what is not shown: mostly it is all of it or next to nothing.
+UNWEIGHED = 0.5
+# Findings that say already why forces do not fit.
+TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """What the motion of a team shows, before anything is weighed.
+
+    log           with clocks put right
+    grasps        (N,) in R, known to within `spread`     noise  (N, 2) of each robot
+    late          how late each clock is [s], beside what `begun` says of single recordings
+    left          last step of the fit [standard deviations]
+    rows          of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
+    order         how often the motion that they come from is differentiated: twice for poses, once for twists
+    down          (3,) gravity in R, None where nobody tells it
+    """
+
+    log: TeamLog
+    grasps: Pose
+    spread: Spread
+    noise: Array
+    late: Mapping[str, float]
+    begun: ClockErrors
+    left: float
+    findings: tuple[Finding, ...]
+    rows: list[tuple[BodyRows, Array]]
+    path: Array
+    order: int
+    down: Array | None
+
+
+def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz: float) -> TeamEstimate:
+    """Return the answer; raises CannotAnswer where the wrenches leave it open.
+
+    wrists, highest_hz, and with_gain for `gains`: as of `JointTeam`
+    """
+    log, grasps, spread = seen.log, seen.grasps, seen.spread
+    require_metres(log.names, grasps)
+    placed = balance_frame(grasps).inverse() @ grasps
+    require_balance(log, [body for body, _ in seen.rows], placed)
+    groups = _groups(seen.rows, seen.path, highest_hz, seen.order)
+    size = team_size(grasps, spread)
+    known = spread.turn(size) < COMPARABLE
+    groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
+    six_axis = np.array([not log.force_only(name) for name in log.names])
+    C = unit_bias(D, six_axis, size)
+    payload = fit_payload(groups, D, C, size, with_gain)
+    payload, odd = without_odd(payload, groups, D, C, size, with_gain)
+    _require_one_clock(payload.chi2)
+    if not any(one.code == "payload-not-rigid" for one in seen.findings):
+        _require_mass(payload.lost)
+    team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
+    team = clocked(team, seen.begun.first(log))
+    told = any(one.code in TOLD for one in (*seen.findings, *read))
+    found = (
+        *seen.findings,
+        *read,
+        *odd,
+        *(() if told else unexplained(payload, D, log.names)),
+        *lost_directions(team.grasps, seen.down),
+        *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
+        *seen.begun.findings(log),
+        *bad_robots(log.names, seen.noise),
+        *(gains(payload.gain, payload.gainless) if known else ()),
+        *open_parameters(team.identified, team.evidence.rank),
+    )
+    said = (*unsettled(seen.left), *unseen_gains(team, weight_by_gains(groups, D)))
+    return replace(team, findings=found, notes=(*team.notes, *said))
+
+
+def _with_forces_read(
+    groups: tuple[Group, ...], D: Array, names: Sequence[str], known: bool
+) -> tuple[tuple[Group, ...], Array, list[Finding]]:
+    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', and why.
+
+    known  whether grasps' rotations are: forces along axes that nobody knows are not compared
+    """
+    if known:
+        groups, read, doubtful = with_one_reading(groups, D, names)
+    else:
+        read, doubtful = (), np.zeros(len(names), np.bool_)
+    D, signs = with_one_sign(groups, D, names, doubtful)
+    found = [*(one for one in read if not (signs and one.code == "wrench-unexplained")), *signs]
+    odd, D = with_torque_sign(groups, D) if known else (None, D)
+    if odd is not None:
+        whole = sign_finding(names[odd])
+        found = [*(one for one in found if one != whole), torque_sign_finding(names[odd], whole in found)]
+    return groups, D, found
+
+
+def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float], size: float) -> TeamEstimate:
+    """Return the estimate less a point mass at every grasp named; raises CannotAnswer where nothing is left.
+
+    size  of the team [m]
+    """
+    if not wrists:
+        return team
+    places = np.array([team.grasps[name].pose.position for name in wrists])
+    points = InertialParameters.from_point_masses(np.array(list(wrists.values())), places)
+    left = team.parameters - points
+    require_lift(float(left.mass), WITHOUT_WRISTS)
+    # What is left of a body less points need be none: masses that are too large take more than there is.
+    units = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)]) * float(left.mass)
+    return replace(team, parameters=InertialParameters(consistent(left.vector, team.covariance, units)))
+
+
+def _require_one_clock(chi2: float) -> None:
+    """Raise CannotAnswer where noise of the motion would explain more of the wrench than there is."""
+    if chi2 < LEAST_CHI2:
+        raise CannotAnswer(
+            f"motion and forces do not belong together: what noise of the motion makes of them is more than all that "
+            f"was measured (chi^2 per degree of freedom {chi2:.3g}). Check units of time and rates of the streams."
+        )
+
+
+def _require_mass(lost: Array) -> None:
+    """Raise CannotAnswer where the mass lies along directions (10, L) that the rows do not show: it would be zero."""
+    if np.linalg.norm(lost[0]) > UNWEIGHED:
+        raise CannotAnswer(
+            "motion and forces do not show the mass: noise of the motion is as large as what it tells beside a bias of "
+            "the forces. Turn the payload about two axes, farther or faster, or measure the motion better."
+        )
+
+
+def clocked(team: TeamEstimate, first: Errors) -> TeamEstimate:
+    """Return the estimate with how late every clock is with what it was off by in the first recording."""
+    late = {n: seconds + first[n].late if n in first else seconds for n, seconds in team.clock_offsets_s.items()}
+    std = {
+        n: float(np.hypot(doubt, first[n].late_std)) if n in first else doubt
+        for n, doubt in team.clock_offset_std_s.items()
+    }
+    return replace(team, clock_offsets_s=late, clock_offset_std_s=std)
+
+
+def _groups(made: list[tuple[BodyRows, Array]], noise: Array, highest_hz: float, order: int) -> tuple[Group, ...]:
+    """Return the recordings with complete wrenches in two groups, at rest and in motion; order 2: poses, 1: twists."""
+    out = []
+    for still in (True, False):
+        some = [(body, left) for body, left in made if body.runs and body.still == still]
+        if not some:
+            continue
+        rows, residuals = zip(*some, strict=True)
+        edges = band_edges(rows, highest_hz)
+        spectra = tuple(gathered(r, edges, highest_hz) for r in rows)
+        shaped = motion_noise(rows, residuals, noise, edges, highest_hz, order)
+        out.append(Group(spectra, shaped, np.ones((len(edges), 6))))
+    require_runs(out)
+    return tuple(out)
