@@ -12,6 +12,8 @@ from steelyard.errors import BadValue
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
+# What NumPy and Python raise where numbers degenerate: a fit that has diverged, or data of no body.
+BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
 _IDENTITY = np.eye(3)
 _ORTHONORMAL = 1e-6  # how far R^T R of a rotation may be from the identity, entry by entry
 

@@ -6,11 +6,12 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from steelyard.bench import coverage, tables, timing
+from steelyard.bench import coverage, tables
 from steelyard.bench.coverage import HALF_WIDTH, Outcome, object_scale, summary
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue
 from steelyard.simulate import scenarios
+from steelyard.threads import BLAS
 
 
 def made_up(count, stretch=1.0, identified=10):
@@ -79,7 +80,7 @@ def test_no_seed_is_refused():
 
 
 def test_command_prints_one_json_object(monkeypatch):
-    for name in timing._THREAD_VARIABLES:
+    for name in (*BLAS, "NUMBA_NUM_THREADS"):
         monkeypatch.setenv(name, "1")
     done = CliRunner().invoke(
         bench, ["coverage", "--json", "--seeds", "2", "--spectrum", "2hz", "--motion", "dyn_fast"]

@@ -11,6 +11,7 @@ from steelyard.bench.methods import Method, choose, own_methods
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters
+from steelyard.threads import BLAS
 
 ROW = {
     "object", "motion", "noise", "seed", "method", "mass_pct", "com_mm", "com_pct", "inertia_pct",
@@ -134,7 +135,7 @@ def test_unknown_method_is_refused(no_peers):
 
 
 def test_command_prints_one_json_object(no_peers, monkeypatch):
-    for name in timing._THREAD_VARIABLES:
+    for name in (*BLAS, "NUMBA_NUM_THREADS"):
         monkeypatch.setenv(name, "1")
     options = "identify --json --seeds 1 --objects hammer --motions stop_go --noise moderate --methods noise-aware"
     done = CliRunner().invoke(bench, [*options.split(), "--million", "0"])

@@ -7,12 +7,13 @@ import pytest
 from box_tools import write_tools
 from click.testing import CliRunner
 
-from steelyard.bench import part_coverage, timing
+from steelyard.bench import part_coverage
 from steelyard.bench.coverage import HALF_WIDTH
 from steelyard.bench.part_coverage import Outcome, summary
 from steelyard.bench.part_tables import part_coverage_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue
+from steelyard.threads import BLAS
 
 
 @pytest.fixture(scope="module")
@@ -56,7 +57,7 @@ def test_choices_are_checked(folder):
 
 
 def test_command_prints_one_json_object_with_times(folder, monkeypatch):
-    for name in timing._THREAD_VARIABLES:
+    for name in (*BLAS, "NUMBA_NUM_THREADS"):
         monkeypatch.setenv(name, "1")
     call = ["part-coverage", "--data", str(folder), "--seeds", "2", "--noise", "high", "--workers", "1", "--json"]
     done = CliRunner().invoke(bench, call)

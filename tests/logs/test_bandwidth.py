@@ -11,6 +11,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.simulate import hammer
+from steelyard.spatial import Pose, Rotation
 
 
 def swinging(hz, size=4.0, seed=0):
@@ -39,6 +40,24 @@ def test_swinging_is_left_out(hz, at):
     ]
     assert np.median(np.diff(aligned.log.time)) == pytest.approx(1 / (2.5 * at), rel=0.2)
     assert fitted(aligned.log)[0] == pytest.approx(float(BODY.mass), rel=2e-3)
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_a_slip_comes_once_and_is_no_swinging(seed):
+    """A step of the wrench at one time is loud at all frequencies; a swing comes back after every stop."""
+    made = recording(Swing(seed, 40.0), seed=seed, imu=False, position=True)
+    wrench = made.streams[0]
+    moved = BODY.in_frame(Pose(Rotation.identity(), np.array([0.0, 0.01, 0.0]))).vector - BODY.vector
+    share = np.clip((wrench.time - 17.0) / 0.15, 0.0, 1.0)[:, None]
+    more = share * Swing(seed, 40.0).log(wrench.time).predicted(moved)
+    channels = {"force": wrench.channels["force"] + more[:, 3:], "torque": wrench.channels["torque"] + more[:, :3]}
+    slipped = replace(made, streams=(replace(wrench, channels=channels), *made.streams[1:]))
+    assert not lowered(align(slipped))
+    found = identify(slipped)
+    (said,) = (f.message for f in found.findings if f.code == "load-changed")
+    assert said.startswith("At 17.")
+    assert "moved by 10 mm" in said
+    assert np.abs(found.com - BODY.com - [0.0, 0.01, 0.0]).max() < 1e-4
 
 
 @pytest.mark.parametrize("seed", range(4))

@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 
 from sanity.held_poses import BODY, of_the_tip, recorded
+from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog
@@ -135,3 +136,39 @@ def test_a_sound_log_shows_no_other_point(motion: str, noise: str) -> None:
 def test_rows_at_rest_show_no_point() -> None:
     log = made("stop_go", "low", 0)
     assert misplaced(log.rows(log.still)) is None
+
+
+def told_of(recording: Recording) -> str:
+    """Return what is said of a recording, with an answer or a refusal."""
+    try:
+        found = identify(recording)
+    except CannotAnswer as error:
+        return str(error)
+    return " ".join(f.message for f in found.findings)
+
+
+@pytest.mark.parametrize("motion", ["paper", "slow"])
+@pytest.mark.parametrize(
+    ("torque", "force", "said"),
+    [
+        (-1.0, 1.0, "The torques have the sign opposite to that of the forces"),
+        (1.0, 1 / 9.80665, "as when forces in kgf are read as N"),
+    ],
+)
+def test_a_point_where_a_unit_or_a_sign_puts_it_is_no_tip(torque: float, force: float, said: str, motion: str) -> None:
+    made = recorded(motion, 1)
+    (stream,) = made.streams
+    channels = {**stream.channels, "torque": torque * stream.channels["torque"]}
+    channels["force"] = force * stream.channels["force"]
+    told = told_of(replace(made, streams=(replace(stream, channels=channels),)))
+    assert said in told
+    assert "the positions were those of a point" not in told
+
+
+def test_a_gain_of_the_forces_is_said_to_be_in_no_bar() -> None:
+    notes = [n for n in identify(recorded("paper", 0)).notes if "no gain of the sensor" in n]
+    moved = 0.01 * float(BODY.mass)
+    assert notes == [
+        f"error bars hold no gain of the sensor: forces 1 % too large would move the mass by {moved:.2g} kg, "
+        "and no log shows it; weigh a known mass once"
+    ]

@@ -173,7 +173,7 @@ def test_forces_in_kgf_leave_no_body_and_are_named(made: Recording) -> None:
     """Ten free numbers fit: a tenth of the mass ten times as far out. But no mass has so little inertia there."""
     found = sy.identify(forces(made, np.eye(3) / 9.80665))
     (unit,) = (f for f in found.findings if f.code == "force-unit")
-    assert "9.81 times, as when forces in kgf are read as N" in unit.message
+    assert "times too small beside the torques, as when forces in kgf are read as N" in unit.message
     assert not found.codes() & {"wrench-unexplained", "motion-mismatch"}
 
 

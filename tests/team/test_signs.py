@@ -11,9 +11,10 @@ from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
-from steelyard.team.joint import JointTeam, _require_one_clock
+from steelyard.team.joint import JointTeam
 from steelyard.team.mass_and_com import require_lift
 from steelyard.team.published import PublishedTeam
+from steelyard.team.weighed import _require_one_clock
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 

@@ -9,7 +9,7 @@ from typing import Literal
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import conclude
 from steelyard.identify.correlated import score_variance
@@ -51,9 +51,6 @@ class Bias:
         """Whether a bias is estimated."""
         return self.kind == "free"
 
-
-# What the linear algebra raises where it breaks down.
-BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
 
 Solver = Callable[[Problem], Solution]
 

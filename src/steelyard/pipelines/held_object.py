@@ -20,7 +20,7 @@ from steelyard.pipelines.load import Load, looked_at, placed
 from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import rows_to_fit
-from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, told
+from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, told, uncalibrated
 from steelyard.sanity import examine
 from steelyard.spatial import Pose
 
@@ -63,7 +63,7 @@ def identify(
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     estimate = replace(remedied(estimate, rows), delays_s=dict(rows.aligned.delays_s))
     aligning = () if rows.unmeasured else rows.aligned.notes
-    return _with_bias_as(estimate.noted(*recording.notes, *aligning), recording)
+    return _with_bias_as(estimate.noted(*recording.notes, *aligning, *uncalibrated(estimate)), recording)
 
 
 @within_numbers()

@@ -7,9 +7,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
+from steelyard.check import BREAKDOWNS
 from steelyard.errors import BadValue, CannotAnswer, NoMasses
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import BREAKDOWNS, Bias
+from steelyard.identify.fit import Bias
 from steelyard.identify.placement import contradicted
 from steelyard.identify.shape_error import MEASURED
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool

@@ -45,6 +45,7 @@ class FitRows:
     unmeasured  note on rows that were left out since their acceleration is not known
     touched     findings about time in which a hand or another load spoiled the wrench
     place       the point whose positions the recording has, where it is not the origin of S
+    units       findings that forces and torques do not belong together, where such a point would be no point
     """
 
     log: MotionLog
@@ -53,6 +54,7 @@ class FitRows:
     unmeasured: tuple[str, ...]
     touched: tuple[Finding, ...]
     place: Misplaced | None = None
+    units: tuple[Finding, ...] = ()
 
     @property
     def delayed(self) -> bool:
@@ -71,7 +73,9 @@ def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Opti
     rows = _rows(recording, before, options, how)
     if rows.unmeasured:
         return rows
-    place = examine_place(rows.log, before, options.drift)
+    place, units = examine_place(rows.log, before, options.drift)
+    if units:
+        return replace(rows, units=units)
     if place is not None:
         place = replace(place, measured=rows.aligned.acceleration_from == MEASURED)
         rows, how = _placed(place, recording, before, options)

@@ -23,6 +23,8 @@ if TYPE_CHECKING:
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Findings of what a load and a bias share: a tared sensor has no bias.
 OF_BIAS = {"nearly-planar"}
+# A gain of the forces that no calibration rules out, and the share of it below which a bar of the mass says too much.
+GAIN, TIGHT = 0.01, 0.5
 # Units that are named after the fit, and so were not put right before it.
 OF_UNITS = {"force-unit", "length-in-mm"}
 
@@ -37,9 +39,9 @@ class Noticed:
 
 
 def noticed_before(found: tuple[Finding, ...], recording: Recording, rows: FitRows) -> tuple[Finding, ...]:
-    """Return what was found before the fit, in words for who has no description, and the point that poses are of."""
+    """Return what was found before the fit, in words for who has no description, and what the rows to fit show."""
     found = found if recording.described else tuple(finding.instead(BARE) for finding in found)
-    return found if rows.place is None else (*found, rows.place.finding)
+    return (*found, *rows.units, *(() if rows.place is None else (rows.place.finding,)))
 
 
 @contextmanager
@@ -71,6 +73,17 @@ def told(estimate: Estimate, noticed: Noticed, rows: FitRows, load: Load, parts:
     found = (*before, *late, *of_sensor, *estimate.findings, *rows.aligned.findings, *touched)
     found = tuple(f for f in found if load.bias.free or f.code not in OF_BIAS)
     return replace(estimate, findings=()).with_findings(*found)
+
+
+def uncalibrated(estimate: Estimate) -> tuple[str, ...]:
+    """Return a note on gains, which no log shows, where the bar of the mass is far below what a usual one would do."""
+    if float(estimate.std[0]) > TIGHT * GAIN * estimate.mass:
+        return ()
+    moved = GAIN * estimate.mass
+    return (
+        f"error bars hold no gain of the sensor: forces {100 * GAIN:.0f} % too large would move the mass by "
+        f"{moved:.2g} kg, and no log shows it; weigh a known mass once",
+    )
 
 
 def remedied(estimate: Estimate, rows: FitRows) -> Estimate:

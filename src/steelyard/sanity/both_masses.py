@@ -24,8 +24,8 @@ TOO_MUCH = 0.7
 HEAVIEST = 100.0
 # Accelerations are too large by more than this factor where both masses together explain all but so much.
 TOO_LARGE, CLOSELY = 2.0, 0.05
-# Nobody is wrong by a larger factor about a rate.
-WRONG_RATE = 12.0
+# Nobody is wrong by a larger factor about a rate; masses that are this much unlike are worth a word about one.
+WRONG_RATE, CLOCK = 12.0, 1.2
 # Both masses together explain all but this share of the force variance.
 EXPLAINED = 0.5
 TAKEN_AWAY = "the controller, or the sensor's driver, takes the weight of a payload away. The answer is what it leaves."
@@ -43,7 +43,7 @@ def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, A
 def clock_words(moved: float, weighed: float) -> str:
     """Say which clock or unit of positions makes a weighed mass [kg] look as another by acceleration; "" if none."""
     ratio = max(moved, weighed) / max(min(moved, weighed), 1e-300)
-    if not TOO_LARGE < ratio < WRONG_RATE**2:
+    if not CLOCK < ratio < WRONG_RATE**2:
         return ""
     clock, size = ("fast", "large") if weighed > moved else ("slow", "small")
     rate = about(float(np.sqrt(ratio)))

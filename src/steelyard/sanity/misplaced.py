@@ -17,7 +17,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.full_fit import Rows
 from steelyard.sanity.sensor_matrix import sensor_matrix
-from steelyard.sanity.torques import UNITS
+from steelyard.sanity.torques import UNITS, compared
 from steelyard.sanity.two_masses import ELSEWHERE, noise_share, two_masses
 from steelyard.spatial import cross_matrix
 
@@ -61,18 +61,24 @@ class Misplaced:
 
     @property
     def sure(self) -> bool:
-        """Whether it is another point than the origin of S beyond doubt, and one that poses may be of."""
+        """Whether it is another point than the origin of S beyond doubt."""
         far = float(np.linalg.norm(self.place))
         least = APART + NOISE * self.noise * float(np.linalg.norm(self.com))
         seen = bool((np.abs(self.place) > SURE * self.std).any()) and self.noise < CALM
-        return seen and least < far < FARTHEST and self.left < LEFT and not self._of_a_unit
+        return seen and least < far < FARTHEST and self.left < LEFT
 
     @property
-    def _of_a_unit(self) -> bool:
-        """Whether it lies where the wrong unit of force or torque puts it."""
-        ways = np.array([1 - factor for factor in (*(factor for factor, _ in UNITS), 1e3, 1e-3)])
+    def of_a_unit(self) -> bool:
+        """Whether it lies where the wrong unit of force or torque, or the other sign of torques, puts it."""
+        ways = np.array([1 - factor for factor in (-1.0, *(factor for factor, _ in UNITS), 1e3, 1e-3)])
         gaps = np.linalg.norm(self.place - ways[:, None] * self.com, axis=1)
         return bool((gaps < NEAR * np.linalg.norm(self.place)).any())
+
+    @property
+    def larger(self) -> tuple[float, float]:
+        """How many times larger the first moment by the force is than by the torque, with its standard deviation."""
+        square = float(self.com @ self.com)
+        return 1 - float(self.place @ self.com) / square, float(np.linalg.norm(self.com * self.std)) / square
 
     @property
     def finding(self) -> Finding:
@@ -134,20 +140,23 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
     return Misplaced(place, std, left, moved, phi[1:4] / phi[0], noise_share(log), blind)
 
 
-def examine_place(log: MotionLog, known: tuple[Finding, ...], drift: bool = False) -> Misplaced | None:
-    """Return the point whose acceleration the log gives where it is not S and is the best cause.
+def examine_place(
+    log: MotionLog, known: tuple[Finding, ...], drift: bool = False
+) -> tuple[Misplaced | None, tuple[Finding, ...]]:
+    """Return the point whose acceleration the log gives where it is not S and is the best cause, or `force-unit`.
 
-    Two masses, or a turned sensor, must leave more of the residual.
+    Two masses, or a turned sensor, must leave more of the residual. A point where another unit or sign puts it is none.
 
     known  what was found before: where the motion or the wrench is no body's, no point is looked for
     """
     if {f.code for f in known} & ELSEWHERE:
-        return None
+        return None, ()
     found = misplaced(log, drift)
     if found is None or not found.sure:
-        return None
-    rivals = (two_masses(log), sensor_matrix(log, drift))
-    return found if all(r is None or found.left < r.left for r in rivals) else None
+        return None, ()
+    if any(r is not None and found.left >= r.left for r in (two_masses(log), sensor_matrix(log, drift))):
+        return None, ()
+    return (None, compared(*found.larger)) if found.of_a_unit else (found, ())
 
 
 def _lever(log: MotionLog) -> Array:

@@ -21,7 +21,10 @@ from steelyard.sanity.load_change import SHORTEST, longer_side, slip_words
 GRID, FEWEST = 40, 12
 # Of the squared residual of one body with a drift, a slip leaves no more than this share, and takes so many times as
 # much away as a bias that jumps at that time, and as a gravity that is tilted.
-LEFT, BESIDE_JUMP, BESIDE_TILT = 0.8, 5.0, 2.0
+LEFT, BESIDE_JUMP, BESIDE_TILT = 0.9, 1.5, 2.0
+# A bias that jumps as well takes no more beyond it than this share of what it takes: 0.015 beside slips, from 0.15 on
+# beside what only looks like one.
+JUMP_TOO = 0.1
 # It must be this sure by leaving out stretches, no less, and no more: who loses an object has not slipped [m].
 SURE, SMALLEST, LARGEST = 12.0, 1e-3, 0.1
 RANK = 1e-9  # of the largest eigenvalue: what is below is not told
@@ -56,10 +59,13 @@ def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | N
     if when is None:
         return None
     late = (np.asarray(rows.log.time) > when)[:, None, None]
-    steady, jumped = rows.solve(), rows.solve(late * np.eye(6))
-    found = rows.solve(rows.columns[:, :, _FIRST] * late, jackknife=True)
+    jump, moment = np.broadcast_to(late * np.eye(6), (len(late), 6, 6)), rows.columns[:, :, _FIRST] * late
+    steady, jumped = rows.solve(), rows.solve(jump)
+    found = rows.solve(moment, jackknife=True)
     taken = steady.left - found.left
     if found.left > LEFT * steady.left or taken < BESIDE_JUMP * (steady.left - jumped.left) or found.solution[0] <= 0:
+        return None
+    if found.left - rows.solve(np.concatenate([moment, jump], 2)).left > JUMP_TOO * taken:
         return None
     if rotation is not None and gravity is not None:
         tilted = rows.solve(rows.tilting(steady.solution[:10], rotation[pick], gravity))

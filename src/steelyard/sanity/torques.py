@@ -6,6 +6,8 @@ shows h, too: how it follows the turning, beside the h of the torque, tells sign
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from steelyard.check import Array
@@ -59,12 +61,12 @@ def examine_torques(
     ordered = _ordered(view, seen, turned, share, felt) if share > BAD else ()
     if ordered or share >= WELL or seen.lever is None:
         return recording, ordered
-    compared = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
-    if compared is None:
+    ratio = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
+    if ratio is None:
         return recording, ()
-    if abs(compared[0] / 1000 - 1) < NEAR + 3 * compared[1] / 1000:
-        return _in_newton_metres(recording, *compared)
-    return recording, _compared(*compared)
+    if abs(ratio[0] / 1000 - 1) < NEAR + 3 * ratio[1] / 1000:
+        return _in_newton_metres(recording, *ratio)
+    return recording, compared(*ratio)
 
 
 def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[Recording, tuple[Finding, ...]]:
@@ -105,8 +107,8 @@ def _ratio(felt: Array, spread: float, moment: Array) -> tuple[float, float] | N
     return (ratio, spread / size) if along else None
 
 
-def _compared(ratio: float, std: float) -> tuple[Finding, ...]:
-    """Return what the ratio of first moments by force and by torque says of each other's sign and unit."""
+def compared(ratio: float, std: float) -> tuple[Finding, ...]:
+    """Return what the ratio of first moments by force and by torque says of each other's sign and unit, if anything."""
     if abs(ratio + 1) < 0.1 + 3 * std:
         text = (
             "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
@@ -120,7 +122,7 @@ def _compared(ratio: float, std: float) -> tuple[Finding, ...]:
                 f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {words}. The "
                 "answer does not assume this: mass or centre of mass is wrong by as much."
             )
-            return (Finding.of("force-unit", text),)
+            return (replace(Finding.of("force-unit", text), left_in=True),)
     return ()
 
 

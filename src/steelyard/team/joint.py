@@ -9,8 +9,6 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from steelyard import check
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
@@ -115,7 +113,7 @@ class JointTeam:
         """
         try:
             log, team, begun = self._fitted(log, PoseTeam.of)
-        except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+        except (CannotAnswer, BadValue, *check.BREAKDOWNS):
             require_well_read(log)
             raise
         log, team, yields = stiffened(log, team, lambda stiff: PoseTeam.of(stiff, self.clocks))
@@ -143,7 +141,7 @@ class JointTeam:
             return None
         try:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
-        except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+        except (CannotAnswer, BadValue, *check.BREAKDOWNS):
             return None
         team = clocked(team, begun.first(log))
         found = [

@@ -12,7 +12,7 @@ from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
@@ -96,7 +96,7 @@ def _without_slips(log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit]
         before, again = team, edited(edit, [*slips, found])
         try:
             team = fitted(again)
-        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+        except (BadValue, CannotAnswer, *BREAKDOWNS):
             break
         # Recordings that differ for another reason than a slip still do.
         if before.rough and found.between and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER):

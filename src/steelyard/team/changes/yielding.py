@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.log import Integers
@@ -106,7 +106,7 @@ def stiffened(log: TeamLog, team: PoseTeam, of: Callable[[TeamLog], PoseTeam]) -
         corrected = found.corrected(log)
         try:
             known, stiff, fit = found, corrected, of(corrected)
-        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+        except (BadValue, CannotAnswer, *BREAKDOWNS):
             break
     # A payload that is not rigid, or poses that are misread, may go with what robots push, too.
     if team.rough and float(np.log(team.fit.noise / fit.fit.noise).mean()) < np.log(BETTER):

@@ -11,7 +11,7 @@ from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
@@ -51,7 +51,7 @@ def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
     try:
         moved = lags.corrected(log)
         again = of(moved)
-    except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+    except (BadValue, CannotAnswer, *BREAKDOWNS):
         return log, team, NOTHING
     if float(np.log(team.fit.noise / again.fit.noise).sum()) < np.log(BETTER):
         return log, team, NOTHING

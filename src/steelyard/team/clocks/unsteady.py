@@ -14,7 +14,7 @@ from typing import Protocol, TypeVar
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
@@ -66,7 +66,7 @@ def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
         try:
             moved = wrong.corrected(log)
             team = of(moved)
-        except (BadValue, CannotAnswer, np.linalg.LinAlgError):
+        except (BadValue, CannotAnswer, *BREAKDOWNS):
             break
         log, errors = moved, errors + wrong
     return log, team, errors

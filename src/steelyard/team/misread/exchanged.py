@@ -11,7 +11,7 @@ from itertools import combinations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
@@ -78,5 +78,5 @@ def _noise(parts: tuple[Stretch, ...], names: tuple[str, ...], reference: int) -
     data = TeamMotion(*all_poses(parts))
     try:
         return fit_poses(data, first_team(data, reference, names), reference, close=ROUGHLY).noise
-    except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+    except (CannotAnswer, BadValue, *BREAKDOWNS):
         return None

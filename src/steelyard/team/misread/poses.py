@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.team_log import TeamLog
@@ -234,7 +234,7 @@ class _Judge:
         size = _size(data)
         try:
             noise = self._noise(data, exact)
-        except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+        except (CannotAnswer, BadValue, *BREAKDOWNS):
             noise = np.full_like(size, np.nan)
         fits = bool(np.isfinite(noise).all())
         return _Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)

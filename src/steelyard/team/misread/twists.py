@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from steelyard.check import BREAKDOWNS
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
@@ -43,7 +44,7 @@ def _tried(log: TeamLog) -> Iterator[tuple[float, float, str, str]]:
                 share = TwistTeam.of(
                     log.with_recordings(*(_scaled(r, name, size) for r in log.recordings)), False
                 ).share
-            except (CannotAnswer, BadValue, np.linalg.LinAlgError):
+            except (CannotAnswer, BadValue, *BREAKDOWNS):
                 continue
             yield float(np.sqrt((share**2).mean())), float(share.max()), name, unit
 

@@ -100,8 +100,10 @@ def unit(grasp: Integers, noise: Array, rows: int) -> Array:
 def _root(H: Array) -> Array:
     """Return F with F F^T the inverse of H, or the pseudo-inverse where H is singular, as without any row of a robot.
 
-    Cholesky where its pivots leave no doubt.
+    Cholesky where its pivots leave no doubt. Raises LinAlgError where H is no information, as of steps that diverged.
     """
+    if not (np.diag(H) >= 0).all():
+        raise np.linalg.LinAlgError("the information is negative: the fit has diverged")
     scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     try:
         factor = np.linalg.cholesky(H * np.outer(scale, scale))

@@ -13,7 +13,7 @@ from itertools import pairwise
 import numpy as np
 from scipy.special import gammainccinv
 
-from steelyard.check import Array
+from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import CannotAnswer
 from steelyard.team.adjoint import adjoint_inverse, log
 from steelyard.team.changes.slips import Slip, SlipAt
@@ -38,7 +38,7 @@ def slip_between(
         sides = [[parts[k] for k in moving if (k < first) == before] for before in (True, False)]
         try:
             before, after = (fitted(side) for side in sides)
-        except (CannotAnswer, np.linalg.LinAlgError):
+        except (CannotAnswer, *BREAKDOWNS):
             continue
         found = _step(before, after, reference, CHANCE / (parts[0].seen.shape[1] * (len(moving) - 1)))
         if found is not None and (best is None or found[0].score > best.slip.score):
