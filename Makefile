@@ -9,7 +9,7 @@ setup: $(VENV)/.dev
 demo: $(VENV)/.core
 	$(BIN)/steelyard demo
 test: $(VENV)/.dev
-	$(BIN)/python -m pytest
+	$(BIN)/python -m pytest -n auto --maxprocesses 4
 check: $(VENV)/.dev
 	$(BIN)/ruff check src tests
 	$(BIN)/ruff format --check src tests

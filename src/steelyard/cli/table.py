@@ -66,21 +66,21 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
     body = estimate.parameters
     values = np.concatenate([[body.mass], body.com, body.inertia_com[np.triu_indices(3)]])
     names = ["mass", "com x", "com y", "com z", *INERTIA]
-    large = bool(np.abs(values[4:]).max() >= LARGE_INERTIA)
+    told = np.abs(values[4:])[np.asarray(estimate.identified[4:])]
+    large = bool(told.max(initial=0.0) >= LARGE_INERTIA)
     scales = np.repeat([1.0, 1e3, 1.0 if large else 1e6], [1, 3, 6])
     units = ["kg"] + ["mm"] * 3 + ["kg m²" if large else "kg mm²"] * 6
+    jackknife = estimate.evidence.jackknife_people
     rows = []
     for k, name in enumerate(names):
-        if k >= 4 and not estimate.identified[4:].all():
+        if k >= 4 and not estimate.identified[k]:
             continue
-        known = "" if truth is None else f"truth {truth[k] * scales[k]:.{decimals(estimate.std[k] * scales[k])}f}"
-        rows.append((name, plus_minus(values[k] * scales[k], estimate.std[k] * scales[k], units[k]), known))
-    jackknife = estimate.evidence.jackknife_people
-    if jackknife is not None and truth is None:
-        rows = [
-            (row[0], row[1], f"leave-one-out ± {spread(j * s)}")
-            for row, j, s in zip(rows, jackknife, scales, strict=False)
-        ]
+        beside, std = "", float(estimate.std[k] * scales[k])
+        if truth is not None:
+            beside = f"truth {truth[k] * scales[k]:.{decimals(std)}f}"
+        elif jackknife is not None:
+            beside = f"leave-one-out ± {spread(float(jackknife[k] * scales[k]))}"
+        rows.append((name, plus_minus(values[k] * scales[k], std, units[k]), beside))
     return rows
 
 
@@ -91,9 +91,11 @@ def columns(rows: Sequence[tuple[str, ...]]) -> str:
 
 
 def _inertia_note(estimate: Estimate) -> list[str]:
-    if estimate.identified[4:].all():
+    """Return which entries of the inertia are not told, if any."""
+    weak = [name for name, known in zip(INERTIA, estimate.identified[4:], strict=True) if not known]
+    if not weak:
         return []
-    return ["  inertia    not identified by these data"]
+    return [f"  {'inertia' if len(weak) == len(INERTIA) else ', '.join(weak)}    not identified by these data"]
 
 
 def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> list[str]:

@@ -49,13 +49,16 @@ def _signs(report: Report) -> Html:
     """Return what ± means on this page, and the signs of the intervals where a truth is drawn on them."""
     stated = bool((report.estimate.std > 0).any())
     drawn = interval_signs() if stated and report.truth is not None else []
-    return tag("p", tag("span", "± is one standard deviation."), *drawn, class_="signs") if stated else Html("")
+    if not stated:
+        return Html("")
+    what = "± is one standard deviation: of noise, not of the sensor's calibration."
+    return tag("p", tag("span", what), *drawn, class_="signs")
 
 
 def _big(value: float, std: float) -> str:
     """Return the class of a large number by how many digits have to stand in one line."""
     digits = len(str(round(value))) + places_of(value, std)
-    return "big" if digits <= 5 else "big long" if digits <= 7 else "big longer"
+    return "big" if digits <= 5 else "big long" if digits <= 6 else "big longer"
 
 
 def _place(seen: Estimate) -> str:
