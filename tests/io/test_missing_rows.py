@@ -141,7 +141,7 @@ def test_more_than_a_tenth_is_refused(tmp_path: Path) -> None:
     where = WHERE.format(1, "a.csv")
     assert str(caught.value) == (
         f"{where}, force: 7 of 60 rows are NaN, infinite or empty: rows 1, 11, 21, 31, 41, ... "
-        "Delete those rows, or record again."
+        "Record again, or delete those rows if they are missing by chance."
     )
     with pytest.raises(BadValue) as caught:
         read(tmp_path, toml, a=with_gaps(rows(60), *at, (60, "qw", "nan")))

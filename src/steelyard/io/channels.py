@@ -73,7 +73,7 @@ def unfit_text(rows: np.ndarray[Any, np.dtype[np.int64]], count: int, where: str
         )
     return (
         f"{where}: {len(rows)} of {count} rows are NaN, infinite or empty: {rows_text(rows)}. "
-        "Delete those rows, or record again."
+        "Record again, or delete those rows if they are missing by chance."
     )
 
 
