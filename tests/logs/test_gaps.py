@@ -6,8 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_recordings import Swing, recording
 
 from steelyard.errors import CannotAnswer
+from steelyard.logs.alignment import align
 from steelyard.logs.outliers import bursts
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity import examine
@@ -31,3 +33,17 @@ def test_a_few_rows_cannot_answer(rows: int) -> None:
         examine(recording)
     table = replace(recording.streams[0], time=None, poses=True)
     examine(replace(recording, streams=(table,)))
+
+
+@pytest.mark.parametrize(("stream", "gaps"), [("wrench.csv", 1), ("pose.csv", 2)])
+def test_rows_that_are_missing_for_a_while_are_noted(stream: str, gaps: int) -> None:
+    whole = recording(Swing(0), imu=False, position=True, quiet=True)
+    assert not [note for note in align(whole).notes if "no rows" in note]
+
+    def cut(s: Stream) -> Stream:
+        lost = (s.time > 4) & (s.time < 5) | (gaps > 1) & (s.time > 8) & (s.time < 8.5)
+        return replace(s, time=s.time[~lost], channels={name: v[~lost] for name, v in s.channels.items()})
+
+    streams = (cut(s) if s.name == stream else s for s in whole.streams)
+    (note,) = [note for note in align(replace(whole, streams=tuple(streams))).notes if "no rows" in note]
+    assert note.startswith(f"'{stream}' has no rows for 1{' s at' if gaps == 1 else '.5 s in 2 gaps, the first at'} ")

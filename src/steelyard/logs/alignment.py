@@ -78,7 +78,7 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
         raise BadDescription(f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock.")
     steady, notes = with_steady_stamps(recording)
     aligned = _align_timed(prepared(steady, options or AlignOptions()), rates=True)
-    return replace(aligned, notes=(*notes, *aligned.notes)) if notes else aligned
+    return replace(aligned, notes=(*notes, *say.gaps(recording.streams), *aligned.notes))
 
 
 def _align_timed(given: Prepared, rates: bool = False) -> Aligned:

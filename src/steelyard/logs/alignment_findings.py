@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 import numpy as np
 
@@ -11,10 +11,12 @@ from steelyard.findings import Finding
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
 from steelyard.logs.imu import Imu, Mounting
+from steelyard.logs.recording import Stream
 from steelyard.spatial import Rotation
 
 _TURNED = np.radians(5)
 _LOOSE_M, _LOOSE_RAD = 0.1, 0.1
+_GAP_S, _GAP_STEPS = 0.25, 10  # a step of a clock that is longer than both is a gap worth a note
 _THIRD = 0.1  # of its size: below this, gravity hardly sweeps a third direction
 
 
@@ -52,6 +54,21 @@ def _delayed(name: str, delay: float, std: float, own: bool) -> Finding:
     given = f"delay = {{ value = {1e3 * delay:.2f}, unit = 'ms' }}"
     remedy = f"Describe the motion as a second [[stream]] of this file, with {given}."
     return Finding("stream-delayed", text, remedy)
+
+
+def gaps(streams: Sequence[Stream]) -> tuple[str, ...]:
+    """Return a note on each timed stream that has no rows for a while."""
+    out = []
+    for stream in streams:
+        if stream.time is None or len(stream.time) < 2:
+            continue
+        steps = np.diff(stream.time)
+        long = np.flatnonzero(steps > max(_GAP_S, _GAP_STEPS * float(np.median(steps))))
+        if len(long):
+            many = f" in {len(long)} gaps, the first" if len(long) > 1 else ""
+            first = float(stream.time[long[0]] - stream.time[0])
+            out.append(f"'{stream.name}' has no rows for {steps[long].sum():.2g} s{many} at {first:.4g} s")
+    return tuple(out)
 
 
 def swings(rigid: float) -> str:
