@@ -22,8 +22,8 @@ from steelyard.logs.recording import Recording
 from steelyard.logs.runs import picked
 
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
-# one delay leaves, and is off by no more than a clock or a rate that was noted down may be [s/s].
-SURE, LEFT, LARGEST = 8.0, 0.95, 0.05
+# one delay leaves, is off at the ends by so much [s], and by no more than a clock or a noted rate may be [s/s].
+SURE, LEFT, LEAST_S, LARGEST = 8.0, 0.95, 5e-5, 0.05
 # The first stretch is at least this long on either side of the middle [s]; each is twice as long as the one before.
 _FIRST_S, _STEPS = 4.0, 4
 # Rows that are enough, and blocks of them whose scores tell standard deviations.
@@ -78,7 +78,8 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
     every = _rows(question, picked(len(time), _ROWS))
     if not _better(every, start, found):
         return {}
-    return {n: f for n, f in found.items() if abs(f.rate) > SURE * f.rate_std and abs(f.rate) < LARGEST}
+    least = LEAST_S / full
+    return {n: f for n, f in found.items() if max(SURE * f.rate_std, least) < abs(f.rate) < LARGEST}
 
 
 def put_right(recording: Recording, rates: Mapping[str, ClockRate]) -> Recording:
