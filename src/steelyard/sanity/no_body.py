@@ -58,7 +58,10 @@ def examine_body(estimate: Estimate, known: tuple[Finding, ...]) -> tuple[Findin
     chi2 = estimate.evidence.chi2_per_dof
     if chi2 is None or chi2 <= UNEXPLAINED or {f.code for f in known} & (ELSEWHERE | TOLD):
         return ()
-    text = f"{_much(chi2)}: one rigid body does not explain this wrench, and the error bars do not hold."
+    text = (
+        f"{_much(chi2)}: one rigid body does not explain this wrench to its noise; the error bars hold only what "
+        "leaving parts of the log out shows."
+    )
     return (Finding.of("wrench-unexplained", text),)
 
 
