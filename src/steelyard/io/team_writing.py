@@ -79,6 +79,7 @@ def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings
     said = "".join(f"# {line}\n" for line in heading.splitlines())
     text = [f"{said}[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
     text[0] += _gravity(log.robots[0]) if len(level) == 1 else ""
+    taken: set[str] = set()
     for robot in log.robots:
         by_joints = any(robot.name in each for each in joints)
         text.append(_robot(robot, by_joints) + (_gravity(robot) if len(level) > 1 else ""))
@@ -87,11 +88,19 @@ def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings
                 text.append(_recording(recording) + "  away = true   # it holds nothing then\n")
             if robot.name not in recording.tracks:
                 continue
-            name = re.sub(r"[^\w.-]+", "-", f"{robot.name}-{recording.name}") + (".csv.gz" if packed else ".csv")
+            name = _own_name(f"{robot.name}-{recording.name}", taken) + (".csv.gz" if packed else ".csv")
             columns = _columns(recording.tracks[robot.name], joints[k].get(robot.name) if by_joints else None)
             text.append(_recording(recording) + _stream(f"{folder.name}/{name}", columns))
             _write_table(folder / name, recording.tracks[robot.name].time, columns, packed)
     write_text(path, "\n".join(text))
+
+
+def _own_name(said: str, taken: set[str]) -> str:
+    """Return the name of a file for what is `said`, and add it to those taken; a number makes it another than they."""
+    plain = re.sub(r"[^\w.-]+", "-", said)
+    name = next(n for n in (plain, *(f"{plain}-{k}" for k in range(2, len(taken) + 3))) if n.casefold() not in taken)
+    taken.add(name.casefold())
+    return name
 
 
 def _robot(robot: TeamRobot, by_joints: bool) -> str:
