@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,7 @@ from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.io.array_table import ArrayTable, read_arrays, require_numbers
+from steelyard.io.documents import load_json
 from steelyard.io.in_file import in_file
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
@@ -79,22 +79,17 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
 
 def read_truth(path: Path) -> dict[str, Any]:
     """Return truth.json with the entries every object needs; raises BadFile."""
-    try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadFile(f"{path}: expected a JSON file; {error}.") from None
     needed = {
         "mass_kg": (), "com_mesh_m": (3,), "inertia_com_mesh_kgm2": (3, 3), "T_mesh_from_grasp": (4, 4),
         "reference_extents_sensor_m": (3,),
     }  # fmt: skip
-    if not isinstance(facts, dict):
-        raise BadFile(f"{path}: expected one JSON object with {', '.join(needed)}.")
+    facts = load_json(path, "the truth of an object", f"It needs {', '.join(needed)}.")
     for key, shape in needed.items():
         if key not in facts:
             raise BadFile(f'{path}: "{key}" is missing. It needs {", ".join(needed)}.')
         try:
             found = np.asarray(facts[key], float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise BadFile(f'{path}: "{key}" must be numbers.') from None
         if found.shape != shape or not np.isfinite(found).all():
             raise BadFile(f'{path}: "{key}" must be finite numbers of shape {shape}; got {found.shape}.')
