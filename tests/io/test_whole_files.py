@@ -146,3 +146,14 @@ def test_robots_whose_names_differ_in_marks_alone_have_tables_of_their_own(tmp_p
         for name in recording.tracks:
             forces = (each.tracks[name].channels["force"] for each in (recording, read))
             np.testing.assert_allclose(*forces, atol=1e-6)
+
+
+def test_robots_and_recordings_of_any_name_are_written_as_valid_toml(tmp_path: Path) -> None:
+    log, names = three_omnids(0).log, ("🤖", 'the "left" one', "\x7f\\é")
+    log = log.renamed(dict(zip(log.names, names, strict=True)))
+    log = log.with_recordings(*(replace(each, name=f"🔨 {each.name}") for each in log.recordings))
+    path = write_team(log, tmp_path / "team.toml")
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert said["team"]["reference"] == log.reference
+    assert tuple(robot["name"] for robot in said["robot"]) == names
+    assert [each.name for each in read_team(path).recordings] == [each.name for each in log.recordings]

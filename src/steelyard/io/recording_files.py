@@ -8,6 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
+from steelyard.io.example import columns_text
 from steelyard.io.toml_string import toml_string
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Pose, Rotation
@@ -78,7 +79,7 @@ def _described(stream: Stream) -> str:
         if quantity not in _COLUMNS:
             raise BadFile(f"{stream.name}: cannot write {quantity}; this writer knows {', '.join(_COLUMNS)}.")
         names, unit = _COLUMNS[quantity]
-        lines.append(f"{quantity} = {{ columns = [{', '.join(f'{n!r}' for n in names)}], {unit} }}".replace("'", '"'))
+        lines.append(f"{quantity} = {{ columns = {columns_text(names)}, {unit} }}")
     return "\n".join(lines) + "\n"
 
 

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.io.example import columns_text
+from steelyard.io.toml_string import toml_string
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
@@ -77,7 +78,7 @@ def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings
     folder.mkdir(exist_ok=True)
     level = {_gravity(robot) for robot in log.robots}
     said = "".join(f"# {line}\n" for line in heading.splitlines())
-    text = [f"{said}[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
+    text = [f"{said}[team]\nreference = {toml_string(log.reference)}   # the answer is given in its grasp frame\n"]
     text[0] += _gravity(log.robots[0]) if len(level) == 1 else ""
     taken: set[str] = set()
     for robot in log.robots:
@@ -104,7 +105,7 @@ def _own_name(said: str, taken: set[str]) -> str:
 
 
 def _robot(robot: TeamRobot, by_joints: bool) -> str:
-    lines = ["[[robot]]", f"name = {json.dumps(robot.name)}"]
+    lines = ["[[robot]]", f"name = {toml_string(robot.name)}"]
     if by_joints:
         lines.append('model = "omnid"')
     if robot.base != "still":
@@ -118,7 +119,7 @@ def _gravity(robot: TeamRobot) -> str:
 
 
 def _recording(recording: TeamRecording) -> str:
-    return f'  [[robot.recording]]\n  kind = "{recording.kind}"\n  name = {json.dumps(recording.name)}\n'
+    return f'  [[robot.recording]]\n  kind = "{recording.kind}"\n  name = {toml_string(recording.name)}\n'
 
 
 def _columns(track: Track, joints: JointReadings | None) -> dict[str, Array]:
@@ -145,12 +146,12 @@ def _with_gaps(values: Array, track: Track, channel: str) -> Array:
 def _stream(path: str, columns: Mapping[str, Array]) -> str:
     lines = [
         "    [[robot.recording.stream]]",
-        f"    path = {json.dumps(path)}",
+        f"    path = {toml_string(path)}",
         '    time = { columns = ["t"], unit = "s" }',
     ]
     for name in columns:
         names, said, _ = _COLUMNS[name]
-        lines.append(f"    {name} = {{ columns = {json.dumps(names)}, {said} }}")
+        lines.append(f"    {name} = {{ columns = {columns_text(names)}, {said} }}")
     if "force" in columns and "torque" not in columns:
         lines.append('    torque = "zero"   # a passive gimbal')
     return "\n".join(lines) + "\n"
