@@ -28,7 +28,7 @@ REMEDIES: dict[str, str] = {
     "clock-missing": "Record a time column, or give time = { rate = .. }, so that delay and noise can be judged.",
     "rows-duplicated": "Log each sensor sample once; repeated rows were left out.",
     "channel-stuck": "Check the cable and the driver of this channel.",
-    "channel-saturated": "Lower the load or widen the sensor's range; clipped rows were left out.",
+    "channel-saturated": "Lower the load, move more gently, or take a sensor with a wider range.",
     "bias-drift": "Warm the sensor up, tare just before the run, or record shorter runs.",
     "outliers": "Nothing to do if knocks were expected; the rows were left out.",
     "contact": "Keep people and fixtures off the object, then record again; the touched time was left out.",

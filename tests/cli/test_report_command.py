@@ -4,7 +4,9 @@
 
 from __future__ import annotations
 
+import html
 import json
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -71,6 +73,15 @@ def test_everything_at_once(capsys: pytest.CaptureFixture[str], folder: Path) ->
     # The result is exact, so what is left over is the made noise and no more.
     rms = [float(page.split(f'<b class="{axis}">{axis}</b>')[1].split()[0]) for axis in "xyz"]
     assert 0 < max(rms) < 1.2 * hammer.FORCE_STD
+
+
+def test_the_page_tells_the_command_as_a_shell_takes_it(
+    capsys: pytest.CaptureFixture[str], folder: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(sys, "argv", ["/usr/bin/steelyard", "report", "my result.json", "--title", "The 'new' $one"])
+    assert run(capsys, folder, "@result.json", "-o", "@out.html")[0] == 0
+    page = html.unescape((folder / "out.html").read_text(encoding="utf-8"))
+    assert """<dd>steelyard report 'my result.json' --title 'The '"'"'new'"'"' $one'</dd>""" in page
 
 
 def test_parts_of_a_segmentation_with_a_pose(capsys: pytest.CaptureFixture[str], folder: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import struct
+import zipfile
 from pathlib import Path
 
 import numpy as np
@@ -182,3 +183,14 @@ def test_parts_are_told_where_they_belong(tmp_path: Path) -> None:
     np.savez(tmp_path / "parts.npz", tets=np.zeros((1, 4), int))
     with pytest.raises(BadFile, match="which --parts takes"):
         read_cloud(tmp_path / "parts.npz")
+
+
+@pytest.mark.parametrize("name", ["readme.txt", "label", "xyz"])
+def test_other_members_of_an_npz_are_passed_over(tmp_path: Path, name: str) -> None:
+    path, points = tmp_path / "c.npz", np.arange(12.0).reshape(4, 3)
+    np.savez(path, xyz=points)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(name, "read me")
+    cloud = read_cloud(path)
+    np.testing.assert_array_equal(cloud.xyz, points)
+    assert cloud.label is None

@@ -7,6 +7,7 @@ from __future__ import annotations
 import json
 import pickle
 import shutil
+import zipfile
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -172,6 +173,17 @@ def change_array(name: str, key: str, value: object) -> Callable[[Path], None]:
     return edit
 
 
+def stray(name: str, key: str) -> Callable[[Path], None]:
+    """Put a text where the array `key` was."""
+
+    def edit(folder: Path) -> None:
+        change_array(name, key, None)(folder)
+        with zipfile.ZipFile(folder / name, "a") as archive:
+            archive.writestr(key, "read me")
+
+    return edit
+
+
 def pickled(folder: Path) -> None:
     np.savez(folder / "points.npz", xyz=np.array([Trap()], object), allow_pickle=True)
 
@@ -208,12 +220,19 @@ BAD: dict[str, tuple[Callable[[Path], None], str]] = {
     "no points": (lambda d: (d / "points.npz").unlink(), f"DIR: points.npz is missing. {FILES}"),
     "no motion": (lambda d: (d / "motion.npz").unlink(), f"DIR: motion.npz is missing. {FILES}"),
     "no truth": (lambda d: (d / "truth.json").unlink(), f"DIR: truth.json is missing. {FILES}"),
-    "not json": (lambda d: (d / "truth.json").write_text("mass = 1") and None, "DIR/truth.json: expected a JSON file; Expecting value: line 1 column 1 (char 0)."),
-    "json list": (lambda d: (d / "truth.json").write_text("[]") and None, f"DIR/truth.json: expected one JSON object with {KEYS}."),
+    "not json": (lambda d: (d / "truth.json").write_text("mass = 1") and None, f"DIR/truth.json: not the truth of an object: not valid JSON (Expecting value: line 1 column 1 (char 0)). It needs {KEYS}."),
+    "json list": (lambda d: (d / "truth.json").write_text("[]") and None, f"DIR/truth.json: not the truth of an object: expected one JSON object. It needs {KEYS}."),
     "no mass": (change_truth("mass_kg", None), f'DIR/truth.json: "mass_kg" is missing. It needs {KEYS}.'),
     "mass in words": (change_truth("mass_kg", "heavy"), 'DIR/truth.json: "mass_kg" must be numbers.'),
     "short com": (change_truth("com_mesh_m", [0, 1]), 'DIR/truth.json: "com_mesh_m" must be finite numbers of shape (3,); got (2,).'),
     "no rotation": (change_truth("T_mesh_from_grasp", (2 * np.eye(4) - np.diag([0, 0, 0, 1])).tolist()), "DIR/truth.json: rotation matrix must be orthonormal; it is off by 3 in R^T R (tolerance 1e-06)."),
+    "parts in words": (change_truth("parts", "two"), 'DIR/truth.json: "parts" must be a list of objects, one per part with its "label".'),
+    "parts of numbers": (change_truth("parts", [1, 2]), 'DIR/truth.json: "parts" must be a list of objects, one per part with its "label".'),
+    "volume in words": (change_part("solid_volume_m3", "small"), "DIR/truth.json: \"solid_volume_m3\" of a part must be a finite number; got 'small'."),
+    "mass of a part in words": (change_part("mass_kg", "light"), "DIR/truth.json: \"mass_kg\" of a part must be a finite number; got 'light'."),
+    "list for a label": (change_part("label", [1]), 'DIR/truth.json: "label" of a part must be a finite number; got [1].'),
+    "long number": (change_truth("mass_kg", 10**400), 'DIR/truth.json: "mass_kg" must be numbers.'),
+    "text beside arrays": (stray("points.npz", "label"), 'DIR/points.npz: array "label" is missing. It needs xyz, rgb, label.'),
     "negative volume in truth": (change_part("solid_volume_m3", -1e-6), "DIR/truth.json: part 1 has a volume of -1e-06 m^3; it must be above zero."),
     "zero volume in truth": (change_part("solid_volume_m3", 0.0), "DIR/truth.json: part 1 has a volume of 0 m^3; it must be above zero."),
     "negative mass": (change_part("mass_kg", -0.1), "DIR/truth.json: the masses of parts must be finite and not below zero."),
@@ -291,3 +310,9 @@ def test_a_folder_is_a_log_as_it_stands(good: Path, known: KnownObject) -> None:
     inertia = known.truth.inertia_com
     np.testing.assert_allclose(estimate.parameters.inertia_com, inertia, atol=2e-3 * inertia.max())
     assert {part.label for part in estimate.parts} == set(known.parts.label.tolist())
+
+
+def test_a_motion_that_is_not_there_is_named(tmp_path: Path) -> None:
+    with pytest.raises(BadFile) as caught:
+        read_track(tmp_path / "motion.npz")
+    assert str(caught.value) == f"{tmp_path}/motion.npz: cannot be read (No such file or directory)."

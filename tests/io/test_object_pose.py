@@ -34,9 +34,9 @@ def test_table_and_file_say_the_same(tmp_path: Path) -> None:
 
 
 BAD = {
-    "nowhere.toml": "No such file or directory: 'nowhere.toml'",
+    "nowhere.toml": "pose in sensor: nowhere.toml: cannot be read (No such file or directory). Give a TOML file",
     "{ position = [0, 0, 0] }": 'give both "rotation" and "position"',
-    "{ position = [0, 0 }": "pose in sensor: ",
+    "{ position = [0, 0 }": "pose in sensor: the table given: not valid TOML: Unclosed array (at line 1, column 37). ",
 }
 
 

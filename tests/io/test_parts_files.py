@@ -188,3 +188,12 @@ def test_volumes_of_another_solid_are_refused(saved: SavedParts, factors: tuple[
     whole = [*saved.parts.volume, saved.parts.volume[0]]
     with pytest.raises(BadValue, match="no cut of these parts has the"):
         saved.recut([volume * factor for volume, factor in zip(whole, factors, strict=False)])
+
+
+@pytest.mark.parametrize("name", ["readme.txt", "labels"])
+def test_other_members_of_the_archive_are_passed_over(saved: SavedParts, tmp_path: Path, name: str) -> None:
+    path = tmp_path / "p.npz"
+    write_parts(saved, path)
+    with zipfile.ZipFile(path, "a") as archive:
+        archive.writestr(name, "read me")
+    np.testing.assert_array_equal(read_parts(path).labels, saved.labels)

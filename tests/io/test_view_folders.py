@@ -142,7 +142,7 @@ WRONG: list[tuple[str, Callable[[Path], object], str]] = [
     ("no camera", lambda f: (f / "camera.json").unlink(), "this file is missing"),
     ("no fx", without("fx"), rf'camera.json: "fx" is missing\. It needs {CAMERA}\.$'),
     ("no fx, no cy", without("cy", "fx"), rf'camera.json: "fx", "cy" are missing\. It needs {CAMERA}\.$'),
-    ("camera a list", lambda f: (f / "camera.json").write_text("[]"), rf"expected one JSON object with {CAMERA}\.$"),
+    ("camera a list", lambda f: (f / "camera.json").write_text("[]"), rf"one JSON object\. It needs {CAMERA}\.$"),
     ("no x", headed("name,x,", "name,a,"), rf'poses.csv: "x" is missing among its columns\. It needs {COLUMNS}\.$'),
     ("no header", headed(COLUMNS.replace(" ", ""), "1,2"), rf"expected the columns {COLUMNS} and a row per view\.$"),
     ("no poses", lambda f: (f / "poses.csv").unlink(), "this file is missing"),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import tomllib
 from dataclasses import replace
 from pathlib import Path
 
@@ -105,3 +106,54 @@ def test_a_team_with_a_robot_that_cannot_be_written_leaves_what_was_there(tmp_pa
             write_team(log, goal, made.joints, heading="other")
     assert (names(tmp_path), path.read_bytes()) == (before, text)
     assert len(read_team(path).robots) == 3
+
+
+def recorded(*names: str) -> Recording:
+    channels = {"force": np.ones((3, 3)), "torque": np.ones((3, 3))}
+    return Recording(tuple(Stream(name, channels, np.arange(3.0)) for name in names), np.array([0, 0, -9.81]))
+
+
+@pytest.mark.parametrize(
+    "name",
+    [
+        "../../x.csv", "/tmp/x.csv", "a/../../x.csv", "..", "", ".", "..\\x.csv", "C:\\x.csv", "C:x.csv", "\\x.csv",
+        "a\0b.csv", "log.toml", "./log.toml",
+    ],
+)  # fmt: skip
+def test_a_stream_whose_name_leads_elsewhere_is_refused(name: str, tmp_path: Path) -> None:
+    with pytest.raises(BadValue) as caught:
+        write_recording(recorded("a.csv", name), tmp_path / "in/new")
+    assert str(caught.value) == (
+        f"stream {name!r} cannot be written: its name must be a path inside the folder, such as wrench.csv, "
+        "and not log.toml."
+    )
+    assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("name", ["kuka-1/2-baseline.csv", 'the "good" one.csv', "a\nb.csv", "\x7f.csv", "🔨.csv"])
+def test_a_stream_of_any_name_inside_the_folder_is_written_as_valid_toml(name: str, tmp_path: Path) -> None:
+    path = write_recording(recorded(name), tmp_path)
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert [stream["path"] for stream in said["stream"]] == [name]
+    assert (tmp_path / name).read_text().startswith("t,fx,fy,fz,tx,ty,tz\n")
+
+
+def test_robots_whose_names_differ_in_marks_alone_have_tables_of_their_own(tmp_path: Path) -> None:
+    log, names = three_omnids(0).log, ("a/b", "a b", "A-b")
+    log = log.renamed(dict(zip(log.names, names, strict=True)))
+    again = read_team(write_team(log, tmp_path / "team.toml"))
+    for recording, read in zip(log.recordings, again.recordings, strict=True):
+        for name in recording.tracks:
+            forces = (each.tracks[name].channels["force"] for each in (recording, read))
+            np.testing.assert_allclose(*forces, atol=1e-6)
+
+
+def test_robots_and_recordings_of_any_name_are_written_as_valid_toml(tmp_path: Path) -> None:
+    log, names = three_omnids(0).log, ("🤖", 'the "left" one', "\x7f\\é")
+    log = log.renamed(dict(zip(log.names, names, strict=True)))
+    log = log.with_recordings(*(replace(each, name=f"🔨 {each.name}") for each in log.recordings))
+    path = write_team(log, tmp_path / "team.toml")
+    said = tomllib.loads(path.read_text(encoding="utf-8"))
+    assert said["team"]["reference"] == log.reference
+    assert tuple(robot["name"] for robot in said["robot"]) == names
+    assert [each.name for each in read_team(path).recordings] == [each.name for each in log.recordings]

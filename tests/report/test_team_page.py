@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import html
 import json
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
 import pytest
 
+from steelyard.cli.team_table import team_table
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
@@ -111,3 +114,16 @@ def test_the_page_says_where_everybody_holds_and_how_far_off() -> None:
     for said in ("Where the robots hold", "3.0 mm, 0°", "the other: 0", "in the grasp frame of robot0", "robot2"):
         assert said in text, said
     assert "<b>Team" not in text
+
+
+def test_table_and_page_show_the_same_two_figures_of_a_spread() -> None:
+    turned = Pose(Rotation.from_rpy([0.0, np.deg2rad(-0.001), 1.0]), np.ones(3))
+    spread = np.diag([np.deg2rad(0.0999)] * 3 + [0.0999e-3] * 3) ** 2
+    seen = around(2)
+    name = next(n for n in seen.grasps if n != seen.reference)
+    seen = replace(seen, grasps={**seen.grasps, name: GraspEstimate(turned, spread)})
+    table, page = team_table(seen, "a team"), html.unescape(render(team_page("a team", seen)))
+    assert "(0.00, 0.00, 57.30) ± 0.10°" in table
+    assert "1000.00 ± 0.10 mm" in table
+    assert '<span class="v">0.00, 0.00, 57.30</span><span class="pm"> ± 0.10</span>' in page
+    assert '<span class="v">1000.00</span><span class="pm">\u202f±\u202f0.10</span>' in page

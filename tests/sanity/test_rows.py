@@ -12,7 +12,7 @@ from synthetic import Kind, write
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.coverage import coverage, directions
-from steelyard.sanity.rows import examine_rows
+from steelyard.sanity.rows import examine_rows, without_clipped, without_frozen
 
 
 @pytest.fixture
@@ -117,3 +117,51 @@ def test_directions() -> None:
     flat = np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1) * 9.8
     assert [f.code for f in coverage(flat)] == ["nearly-planar"]
     assert len(directions(flat)) >= 4
+
+
+def noisy(rows: int = 1000) -> Stream:
+    rng, time = np.random.default_rng(0), np.arange(rows) / 100
+    return Stream("a.csv", {"force": rng.normal(size=(rows, 3)), "torque": rng.normal(size=(rows, 3))}, time)
+
+
+def with_force_x(stream: Stream, values: np.ndarray) -> Stream:
+    force = stream.channels["force"].copy()
+    force[:, 0] = values
+    return replace(stream, channels={**stream.channels, "force": force})
+
+
+@pytest.mark.parametrize("rows", [900, 400])
+def test_so_many_clipped_rows_that_few_would_be_left_are_used_and_told(rows: int) -> None:
+    """With 40 % at the limit almost all rows are beside one."""
+    stream = noisy()
+    x = stream.channels["force"][:, 0]
+    limit = np.sort(x)[len(x) - rows]
+    clipped = with_force_x(stream, np.minimum(x, limit))
+    seen, (finding,) = without_clipped(clipped)
+    assert len(seen) == len(stream)
+    assert finding.message == (
+        f"Force x of 'a.csv' stops at {limit:.6g} in {rows} of 1000 rows; "
+        "so many cannot be left out, and these were used as they are."
+    )
+
+
+def test_so_many_frozen_rows_that_few_would_be_left_are_used_and_told() -> None:
+    stream = noisy()
+    channels = {name: values.copy() for name, values in stream.channels.items()}
+    for values in channels.values():
+        values[100:900] = 20.0
+    seen, (finding,) = without_frozen(replace(stream, channels=channels))
+    assert len(seen) == len(stream)
+    assert finding.message == (
+        "Every channel of 'a.csv' stands still in 800 of 1000 rows and jumps after; "
+        "so many cannot be left out, and these were used as they are."
+    )
+
+
+def test_a_clipped_last_row_takes_its_neighbour_and_not_the_first() -> None:
+    stream = noisy()
+    x = stream.channels["force"][:, 0].copy()
+    x[-20:] = 9.0
+    seen, (finding,) = without_clipped(with_force_x(stream, x))
+    np.testing.assert_array_equal(seen.time, stream.time[:-21])
+    assert finding.message == "Force x of 'a.csv' stops at 9 in 20 of 1000 rows; these rows were left out."

@@ -103,6 +103,14 @@ def test_one_robot_beyond_a_hinge_is_said_beside_the_answer() -> None:
     assert "'robot0' and 'robot1' hold one body, 'robot2' another" in messages(found, "payload-jointed")[0]
 
 
+def test_beside_a_hinge_the_reference_is_named_first() -> None:
+    """Whatever its number is: the answer is for its body."""
+    _, found = answered(replace(SCENE, hinge=hinged(2)), seed=1, reference=2)
+    (message,) = messages(found, "payload-jointed")
+    assert message.startswith("'robot2' hold one body, 'robot0' and 'robot1' another: between them is a hinge about (")
+    assert " mm of grasp 'robot0', which swung by " in message
+
+
 @pytest.mark.parametrize(
     "scene",
     [

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shlex
 import sys
 from collections.abc import Callable, Sequence
 from functools import cache
@@ -12,6 +13,11 @@ from typing import Any
 import click
 
 from steelyard.errors import BadFile, BadValue
+
+
+def command_line(*words: object) -> str:
+    """Return the line that runs a verb, quoted where a shell would take a word apart."""
+    return shlex.join(["steelyard", *map(str, words)])
 
 
 def print_json(value: Any) -> None:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from steelyard.cli.console import print_json, require_output, say, say_if_compiling
+from steelyard.cli.console import command_line, print_json, require_output, say, say_if_compiling
 from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
@@ -96,9 +96,9 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     if keep is None:
         say("Keep log, views, cloud and parts with --keep DIR.")
         return
-    say(f"Log, cloud and parts are in {keep}; try: steelyard identify {log} --parts {keep / 'parts.npz'}")
+    say(f"Log, cloud and parts are in {keep}; try: {command_line('identify', log, '--parts', keep / 'parts.npz')}")
     if views:
-        say(f"The views are in {views}; try: steelyard scan {views} -o {keep / 'cloud.ply'}")
+        say(f"The views are in {views}; try: {command_line('scan', views, '-o', keep / 'cloud.ply')}")
     else:
         say("The views are not kept: that needs pip install 'steelyard[images]'.")
 

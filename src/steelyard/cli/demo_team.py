@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, say, say_if_compiling
+from steelyard.cli.console import command_line, print_json, say, say_if_compiling
 
 if TYPE_CHECKING:
     from steelyard.logs.team_log import TeamLog
@@ -50,7 +50,7 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
         off = _errors(found, made)
         click.echo(f"  {name:5}   grasps off by {off['position_mm']:.2f} mm and {off['rotation_deg']:.3f}° on average")
     say(f"The page with the payload in 3D: {output}")
-    say(f"The files are in {keep}; try: steelyard team {written}" if keep else "Keep the files with --keep DIR.")
+    say(f"The files are in {keep}; try: {command_line('team', written)}" if keep else "Keep the files with --keep DIR.")
 
 
 def _errors(found: TeamEstimate, made: ThreeOmnids) -> dict[str, Any]:

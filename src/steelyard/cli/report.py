@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, cast
 
 import click
 
-from steelyard.cli.console import print_json, require_output, say, say_if_compiling
+from steelyard.cli.console import command_line, print_json, require_output, say, say_if_compiling
 from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
 
@@ -59,7 +59,7 @@ def report(result: Path, parts: Path | None, scan: Path | None, log: Path | None
     require_output(output, "a page", [".html", ".htm"], result, parts, scan, log, tool, truth)
     estimate = read_result(result)
     others = {name: read_result(path) for name, path in map(_rival, rivals)}
-    said = {"command": "steelyard " + " ".join(sys.argv[1:])}
+    said = {"command": command_line(*sys.argv[1:])}
     if isinstance(estimate, TeamEstimate):
         if any(given is not None for given in (parts, scan, truth, tool, pose_in_sensor)):
             raise BadValue(

@@ -10,24 +10,18 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
+from steelyard.report.numbers import decimals, places_of
 
 LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
 _MILLIONTH = 1e-6
 INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
-def decimals(std: float) -> int:
-    """Return how many decimals show two figures of a standard deviation."""
-    if not np.isfinite(std) or std <= 0:
-        return 4
-    return int(np.clip(1 - np.floor(np.log10(std)), 0, 9))
-
-
 def plus_minus(value: float, std: float, unit: str) -> str:
     """Return 'value ± std unit' with two figures of the standard deviation."""
     if not np.isfinite(std):
         return f"{value:.4g} ± ? {unit}"
-    places = decimals(std)
+    places = places_of(value, std)
     # Adding zero turns a minus zero, which rounding leaves, into a plain one.
     return f"{round(value, places) + 0.0:.{places}f} ± {spread(std)} {unit}"
 
@@ -75,12 +69,12 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
     for k, name in enumerate(names):
         if k >= 4 and not estimate.identified[k]:
             continue
-        beside, std = "", float(estimate.std[k] * scales[k])
+        value, std, beside = float(values[k] * scales[k]), float(estimate.std[k] * scales[k]), ""
         if truth is not None:
-            beside = f"truth {truth[k] * scales[k]:.{decimals(std)}f}"
+            beside = f"truth {truth[k] * scales[k]:.{places_of(value, std)}f}"
         elif jackknife is not None:
             beside = f"leave-one-out ± {spread(float(jackknife[k] * scales[k]))}"
-        rows.append((name, plus_minus(values[k] * scales[k], std, units[k]), beside))
+        rows.append((name, plus_minus(value, std, units[k]), beside))
     return rows
 
 
@@ -107,7 +101,7 @@ def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> l
         name, known = "", ""
         if part.label in truth:
             name, mass = truth[part.label]
-            known = f"truth {1e3 * mass:.{decimals(1e3 * part.std)}f}"
+            known = f"truth {1e3 * mass:.{places_of(1e3 * part.mass, 1e3 * part.std)}f}"
         mass_cell = plus_minus(1e3 * part.mass, 1e3 * part.std, "g")
         place = ", ".join(f"{round(1e3 * value) + 0}" for value in part.centroid)
         row = (

@@ -8,8 +8,8 @@ import click
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.cli.table import columns, decimals, estimate_table, plus_minus
-from steelyard.report.numbers import general, principal, rpy_deg
+from steelyard.cli.table import columns, estimate_table, plus_minus
+from steelyard.report.numbers import decimals, general, principal, rpy_deg
 from steelyard.spatial import Pose
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
@@ -84,8 +84,10 @@ def _grasp_lines(estimate: TeamEstimate, known: Known | None) -> list[str]:
 def _pose_cells(grasp: GraspEstimate) -> list[str]:
     place = [plus_minus(1e3 * p, 1e3 * s, "mm") for p, s in zip(grasp.pose.position, grasp.std_m, strict=True)]
     std = float(grasp.std_deg.max())
-    angles = ", ".join(f"{a:.{decimals(std)}f}" for a in rpy_deg(grasp.pose.rotation))
-    return [*place, f"({angles}) ± {std:.{decimals(std)}f}°"]
+    places = decimals(std)
+    # Adding zero turns a minus zero, which rounding leaves, into a plain one.
+    angles = ", ".join(f"{a:.{places}f}" for a in np.round(rpy_deg(grasp.pose.rotation), places) + 0.0)
+    return [*place, f"({angles}) ± {std:.{places}f}°"]
 
 
 def _clock(estimate: TeamEstimate, name: str) -> str:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, progress_bar, say, say_if_compiling
+from steelyard.cli.console import command_line, print_json, progress_bar, say, say_if_compiling
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON
 from steelyard.errors import BadValue
@@ -105,8 +105,10 @@ def build(
     if views:
         one = folder / rows[0]["name"]
         say(
-            f"Try: steelyard identify {one / 'log.toml'} --scan {one / 'views'} "
-            f"--pose-in-sensor {one / 'views' / 'object.toml'}"
+            "Try: "
+            + command_line(
+                "identify", one / "log.toml", "--scan", one / "views", "--pose-in-sensor", one / "views/object.toml"
+            )
         )
 
 

@@ -39,7 +39,7 @@ class ArrayTable:
         names: list[str] = []
         sources: list[tuple[str, int]] = []
         groups: dict[str, tuple[int, ...]] = {}
-        for key, shape in _shapes(path).items():
+        for key, shape in array_shapes(path).items():
             if len(shape) == 1:
                 names.append(key)
                 sources.append((key, 0))
@@ -59,7 +59,7 @@ class ArrayTable:
             for number in columns:
                 key, inner = self.sources[number]
                 if key not in arrays:
-                    arrays[key] = _numeric(self.path, key, archive)
+                    arrays[key] = numeric_array(self.path, key, archive)
                 column = arrays[key].reshape(len(arrays[key]), math.prod(arrays[key].shape[1:]))[:, inner]
                 keep = number in exact and column.dtype.kind in "iu"
                 out[number] = column.astype(np.int64 if keep else np.float64)
@@ -72,19 +72,20 @@ def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs") -> 
     of  begins what is said of the names where one of them is missing
     """
     ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
+    held = array_shapes(path)  # other members of the zip are passed over
+    if missing := [name for name in names if name not in held]:
+        raise BadFile(f'{path}: array "{missing[0]}" is missing. {of} {", ".join(names)}.')
     try:
         with np.load(path, allow_pickle=False) as archive:
-            missing = [name for name in names if name not in archive]
-            if missing:
-                raise BadFile(f'{path}: array "{missing[0]}" is missing. {of} {", ".join(names)}.')
-            return {name: archive[name] for name in names or archive.files}
+            return {name: archive[f"{name}.npy"] for name in names or held}
     except _DAMAGED as error:
         raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
 
 
-def _numeric(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
+def numeric_array(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return an array of an open NPZ file; raises BadFile where it is damaged or not of real numbers."""
     try:
-        array: np.ndarray[Any, np.dtype[Any]] = archive[key]
+        array: np.ndarray[Any, np.dtype[Any]] = archive[f"{key}.npy"]
     except _DAMAGED as error:
         raise BadFile(f'{path}: array "{key}" is damaged ({error}). Save the file again.') from None
     require_numbers(path, key, array)
@@ -97,12 +98,14 @@ def require_numbers(path: Path, key: str, array: Any) -> None:
         raise BadFile(f'{path}: array "{key}" must hold real numbers; it holds {array.dtype}.')
 
 
-def _shapes(path: Path) -> dict[str, tuple[int, ...]]:
-    """Return the shape of every array, refusing pickles by their header."""
+def array_shapes(path: Path) -> dict[str, tuple[int, ...]]:
+    """Return the shape of every array of an NPZ file, pickles refused by their header; raises BadFile."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = [name for name in archive.namelist() if name.endswith(".npy")]
             return {name.removesuffix(".npy"): _shape(path, archive, name) for name in members}
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
     except (zipfile.BadZipFile, RuntimeError):  # the latter of a zip of another make or version
         raise BadFile(
             f"{path}: expected an NPZ file (a zip of arrays); found something else. Save it with numpy.savez."

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.array_table import ArrayTable, require_numbers
+from steelyard.io.array_table import ArrayTable, array_shapes, numeric_array
 from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
 from steelyard.shape.cloud import Cloud
@@ -80,17 +80,9 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
     if "xyz" not in header.groups:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
-    found: list[Any] = []
+    held, wanted = array_shapes(path), ("xyz", _coloured(header.groups), "label", "normals", "seen")
     with np.load(path, allow_pickle=False) as archive:
-        for name in ("xyz", _coloured(header.groups), "label", "normals", "seen"):
-            try:
-                values = archive.get(name)
-            except Exception as error:  # zip, zlib and numpy each raise their own
-                raise BadFile(f'{path}: array "{name}" is damaged ({error}). Save the file again.') from None
-            if values is not None:
-                require_numbers(path, name, values)
-            found.append(values)
-    return tuple(found)
+        return tuple(numeric_array(path, name, archive) if name in held else None for name in wanted)
 
 
 def _coloured(names: Any) -> str:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -11,14 +10,13 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadDescription, BadFile
+from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.example import EXAMPLE
 from steelyard.io.object_pose import ObjectPose, parse_object_pose
 from steelyard.io.stream_entries import StreamSpec, parse_stream
 from steelyard.logs.recording import STANDARD_GRAVITY
 
-_LARGEST_DESCRIPTION = 4_000_000
 # [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
 _WEAKEST, _STRONGEST = 0.1, 100.0
 _LOUDEST = 1e6
@@ -57,19 +55,6 @@ class Description:
 def read_description(path: Path) -> Description:
     """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
     return parse_description(load_toml(path), path.name)
-
-
-def load_toml(path: Path) -> dict[str, Any]:
-    """Return the tables of a description; raises BadFile or BadDescription."""
-    size = path.stat().st_size
-    if size > _LARGEST_DESCRIPTION:
-        raise BadFile(f"{path}: a log description is a small TOML text; this file has {size} bytes.")
-    try:
-        return tomllib.loads(path.read_bytes().decode("utf-8-sig"))
-    except UnicodeDecodeError:
-        raise BadFile(f"{path}: expected a TOML text in UTF-8; found a binary file.") from None
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise BadDescription(f"{path}: not valid TOML: {error}.") from None
 
 
 def parse_description(values: Mapping[str, Any], name: str) -> Description:

@@ -83,7 +83,7 @@ class Entry:
     def number(self, key: str) -> float:
         """Return one finite number."""
         value: Any = self.values.get(key)
-        if not _is_number(value):
+        if not is_number(value):
             raise self.error(f'"{key}" must be a finite number; got {value!r}.')
         return float(value)
 
@@ -111,13 +111,14 @@ class Entry:
         """Return finite numbers, as many as one of `counts`."""
         value = self.values.get(key)
         wanted = " or ".join(str(count) for count in counts)
-        good = isinstance(value, list) and len(value) in counts and all(map(_is_number, value))
+        good = isinstance(value, list) and len(value) in counts and all(map(is_number, value))
         if not good:
             raise self.error(f'"{key}" must be a list of {wanted} finite numbers; got {value!r}.')
         return np.array(value, dtype=np.float64)
 
 
-def _is_number(value: object) -> bool:
+def is_number(value: object) -> bool:
+    """Return whether a value of a file is one finite number, and not true or false."""
     if isinstance(value, bool) or not isinstance(value, int | float):
         return False
     return math.isfinite(value) if isinstance(value, float) else abs(value) < _LARGEST_INTEGER

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
+
+from steelyard.io.toml_string import toml_string
 
 _HEAD = """\
 [log]
@@ -30,7 +31,7 @@ _WIDTH = 8
 
 def columns_text(names: Sequence[str]) -> str:
     """Return the list of names as TOML writes it."""
-    return f"[{', '.join(json.dumps(name, ensure_ascii=False) for name in names)}]"
+    return f"[{', '.join(toml_string(name) for name in names)}]"
 
 
 def example_of(path: str, lines: Mapping[str, str], numbered: bool = False) -> str:
@@ -40,7 +41,7 @@ def example_of(path: str, lines: Mapping[str, str], numbered: bool = False) -> s
     numbered  the file has no names: its columns are counted
     """
     attitude = next((name for name in _ATTITUDES if name in lines), "rotation")
-    rows = [("path", json.dumps(path, ensure_ascii=False))]
+    rows = [("path", toml_string(path))]
     for name in ("time", "force", "torque", attitude):
         mark = "put your columns here" + (", or leave the line out" if name == "time" else "")
         usual = _NUMBERED[name] if numbered else f"{_USUAL.get(name)}   # {mark}"

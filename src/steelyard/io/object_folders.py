@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,6 +12,8 @@ from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.io.array_table import ArrayTable, read_arrays, require_numbers
+from steelyard.io.documents import load_json
+from steelyard.io.entries import is_number
 from steelyard.io.in_file import in_file
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
@@ -24,6 +25,7 @@ from steelyard.shape.nesting import Solids, overlap_finding, solids_of
 from steelyard.spatial import Pose
 
 FILES = ("mesh.ply", "points.npz", "motion.npz", "truth.json")
+_PART_NUMBERS = ("solid_volume_m3", "mass_kg", "mass_fitted_kg")
 # The published folders keep the physical wrench (gravity down) beside one in a world whose gravity points up.
 _DOWN = {"gravity": "gravity_sensor_down", "force": "force_sensor_gdown", "torque": "torque_sensor_gdown"}
 
@@ -79,30 +81,35 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
 
 def read_truth(path: Path) -> dict[str, Any]:
     """Return truth.json with the entries every object needs; raises BadFile."""
-    try:
-        facts = json.loads(path.read_text(encoding="utf-8"))
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadFile(f"{path}: expected a JSON file; {error}.") from None
     needed = {
         "mass_kg": (), "com_mesh_m": (3,), "inertia_com_mesh_kgm2": (3, 3), "T_mesh_from_grasp": (4, 4),
         "reference_extents_sensor_m": (3,),
     }  # fmt: skip
-    if not isinstance(facts, dict):
-        raise BadFile(f"{path}: expected one JSON object with {', '.join(needed)}.")
+    facts = load_json(path, "the truth of an object", f"It needs {', '.join(needed)}.")
     for key, shape in needed.items():
         if key not in facts:
             raise BadFile(f'{path}: "{key}" is missing. It needs {", ".join(needed)}.')
         try:
             found = np.asarray(facts[key], float)
-        except (TypeError, ValueError):
+        except (TypeError, ValueError, OverflowError):
             raise BadFile(f'{path}: "{key}" must be numbers.') from None
         if found.shape != shape or not np.isfinite(found).all():
             raise BadFile(f'{path}: "{key}" must be finite numbers of shape {shape}; got {found.shape}.')
-    for row in facts.get("parts", []):
+    _require_parts(path, facts.get("parts", []))
+    return facts
+
+
+def _require_parts(path: Path, rows: Any) -> None:
+    """Raise BadFile where the parts of truth.json are no list of objects with a label, masses and a volume."""
+    if not isinstance(rows, list) or not all(isinstance(row, dict) for row in rows):
+        raise BadFile(f'{path}: "parts" must be a list of objects, one per part with its "label".')
+    for row in rows:
+        for key in ("label", *_PART_NUMBERS):
+            if row.get(key) is not None and not is_number(row[key]):
+                raise BadFile(f'{path}: "{key}" of a part must be a finite number; got {row[key]!r}.')
         volume = row.get("solid_volume_m3")
         if volume is not None and volume <= 0:
             raise BadFile(f"{path}: part {row.get('label')} has a volume of {volume:g} m^3; it must be above zero.")
-    return facts
 
 
 def _whole(facts: dict[str, Any]) -> InertialParameters:

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from steelyard.errors import BadDescription
+from steelyard.errors import BadDescription, BadInput
+from steelyard.io.documents import load_toml, parse_toml
 from steelyard.io.entries import Entry
 from steelyard.io.stream_entries import parse_pose
 from steelyard.spatial import Pose
@@ -64,12 +64,11 @@ def read_object_pose(text: str) -> ObjectPose:
     written = text.strip()
     try:
         if not written.startswith("{"):
-            written = Path(written).read_text(encoding="utf-8")
-            top = tomllib.loads(written)
+            top = load_toml(Path(written))
         else:
-            top = {"object": tomllib.loads(f"pose_in_sensor = {written}")}
-    except (OSError, UnicodeDecodeError, tomllib.TOMLDecodeError) as error:
-        raise BadDescription(f"pose in sensor: {error}. Give a TOML file with [object], or {_EXAMPLE}") from None
+            top = {"object": parse_toml(f"pose_in_sensor = {written}", "the table given")}
+    except BadInput as error:
+        raise BadDescription(f"pose in sensor: {error} Give a TOML file with [object], or {_EXAMPLE}") from None
     section = top.get("object", {})
     found = parse_object_pose(Entry(section if isinstance(section, dict) else {}, "pose in sensor, [object]"))
     if found is None:

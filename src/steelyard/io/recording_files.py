@@ -2,16 +2,19 @@
 
 from __future__ import annotations
 
-from pathlib import Path
+from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadFile
+from steelyard.errors import BadFile, BadValue
+from steelyard.io.example import columns_text
+from steelyard.io.toml_string import toml_string
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Pose, Rotation
 from steelyard.whole_files import whole_folder, write_text
 
+_DESCRIPTION = "log.toml"
 _COLUMNS = {
     "force": (("fx", "fy", "fz"), 'unit = "N"'),
     "torque": (("tx", "ty", "tz"), 'unit = "N*m"'),
@@ -25,8 +28,10 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     """Write every stream as CSV and the description as log.toml into `folder`; return the description's path.
 
     All of it or nothing is written; other files in the folder stay. Raises BadFile where the folder cannot be written
-    or a stream holds a quantity that this writer does not know.
+    or a stream holds a quantity that this writer does not know, BadValue where the name of a stream leads elsewhere.
     """
+    for stream in recording.streams:
+        _require_inside(stream.name)
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
     gravity = ", ".join(f"{g + 0.0:g}" for g in recording.gravity)
     text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
@@ -35,9 +40,21 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     text += [_described(stream) for stream in recording.streams]
     with whole_folder(folder) as new:
         for stream in recording.streams:
-            write_text(new / stream.name, _csv(stream))
-        write_text(new / "log.toml", "\n".join(text))
-    return folder / "log.toml"
+            path = new / stream.name
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_text(path, _csv(stream))
+        write_text(new / _DESCRIPTION, "\n".join(text))
+    return folder / _DESCRIPTION
+
+
+def _require_inside(name: str) -> None:
+    """Raise BadValue where a stream's name, as a path of any system, is none of a table inside the folder."""
+    for path in (PurePosixPath(name), PureWindowsPath(name)):
+        if path.anchor or not path.parts or ".." in path.parts or str(path) == _DESCRIPTION or "\0" in name:
+            raise BadValue(
+                f"stream {name!r} cannot be written: its name must be a path inside the folder, such as wrench.csv, "
+                f"and not {_DESCRIPTION}."
+            )
 
 
 def object_table(pose: Pose, std: tuple[float, float] | None = None, of: str = "the mesh's frame") -> str:
@@ -55,14 +72,14 @@ def object_table(pose: Pose, std: tuple[float, float] | None = None, of: str = "
 
 def _described(stream: Stream) -> str:
     """Return the [[stream]] table."""
-    lines = ["[[stream]]", f'path = "{stream.name}"']
+    lines = ["[[stream]]", f"path = {toml_string(stream.name)}"]
     if stream.time is not None:
         lines.append('time = { columns = ["t"], unit = "s" }')
     for quantity in stream.channels:
         if quantity not in _COLUMNS:
             raise BadFile(f"{stream.name}: cannot write {quantity}; this writer knows {', '.join(_COLUMNS)}.")
         names, unit = _COLUMNS[quantity]
-        lines.append(f"{quantity} = {{ columns = [{', '.join(f'{n!r}' for n in names)}], {unit} }}".replace("'", '"'))
+        lines.append(f"{quantity} = {{ columns = {columns_text(names)}, {unit} }}")
     return "\n".join(lines) + "\n"
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Any
 
@@ -13,10 +12,10 @@ from steelyard.errors import BadFile, BadInput
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
+from steelyard.io.documents import load_json
 from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
 from steelyard.io.team_results import team_of
 
-_LARGEST = 64_000_000
 _WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
 
 
@@ -28,7 +27,7 @@ def read_result(path: Path | str) -> Estimate:
     with grasps comes back as a TeamEstimate.
     """
     path = Path(path)
-    values = _load_json(path)
+    values = load_json(path, "a Steelyard result", _WRITE_ONE)
     team = "grasps" in values
     if not team and values.get("frame", "S") != "S":
         raise BadFile(f'{path}: a result must be given in the sensor frame "S"; found "{values["frame"]}".')
@@ -87,23 +86,6 @@ def _body(path: Path, values: dict[str, Any]) -> InertialParameters:
         return InertialParameters.from_com(mass, com, inertia)
     except BadInput as error:
         raise BadFile(f"{path}: {error}") from None
-
-
-def _load_json(path: Path) -> dict[str, Any]:
-    try:
-        size = path.stat().st_size
-        if size > _LARGEST:
-            raise BadFile(f"{path}: a result is a small JSON text; this file has {size} bytes.")
-        values = json.loads(path.read_text(encoding="utf-8-sig"))
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
-    except UnicodeDecodeError:
-        raise BadFile(f"{path}: not a Steelyard result: a binary file, where JSON was expected. {_WRITE_ONE}") from None
-    except (json.JSONDecodeError, RecursionError) as error:
-        raise BadFile(f"{path}: not a Steelyard result: not valid JSON ({error}). {_WRITE_ONE}") from None
-    if not isinstance(values, dict):
-        raise BadFile(f"{path}: not a Steelyard result: expected one JSON object. {_WRITE_ONE}")
-    return values
 
 
 def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:

@@ -8,7 +8,8 @@ from pathlib import Path
 from typing import Any, get_args
 
 from steelyard.check import Array
-from steelyard.io.description import default_gravity, load_toml, parse_gravity
+from steelyard.io.description import default_gravity, parse_gravity
+from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.stream_entries import StreamSpec, parse_stream
 from steelyard.logs.team_log import KINDS, Base, Kind

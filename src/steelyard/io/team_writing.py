@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import gzip
-import json
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -13,6 +12,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.io.example import columns_text
+from steelyard.io.toml_string import toml_string
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
@@ -77,8 +78,9 @@ def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings
     folder.mkdir(exist_ok=True)
     level = {_gravity(robot) for robot in log.robots}
     said = "".join(f"# {line}\n" for line in heading.splitlines())
-    text = [f"{said}[team]\nreference = {json.dumps(log.reference)}   # the answer is given in its grasp frame\n"]
+    text = [f"{said}[team]\nreference = {toml_string(log.reference)}   # the answer is given in its grasp frame\n"]
     text[0] += _gravity(log.robots[0]) if len(level) == 1 else ""
+    taken: set[str] = set()
     for robot in log.robots:
         by_joints = any(robot.name in each for each in joints)
         text.append(_robot(robot, by_joints) + (_gravity(robot) if len(level) > 1 else ""))
@@ -87,15 +89,23 @@ def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings
                 text.append(_recording(recording) + "  away = true   # it holds nothing then\n")
             if robot.name not in recording.tracks:
                 continue
-            name = re.sub(r"[^\w.-]+", "-", f"{robot.name}-{recording.name}") + (".csv.gz" if packed else ".csv")
+            name = _own_name(f"{robot.name}-{recording.name}", taken) + (".csv.gz" if packed else ".csv")
             columns = _columns(recording.tracks[robot.name], joints[k].get(robot.name) if by_joints else None)
             text.append(_recording(recording) + _stream(f"{folder.name}/{name}", columns))
             _write_table(folder / name, recording.tracks[robot.name].time, columns, packed)
     write_text(path, "\n".join(text))
 
 
+def _own_name(said: str, taken: set[str]) -> str:
+    """Return the name of a file for what is `said`, and add it to those taken; a number makes it another than they."""
+    plain = re.sub(r"[^\w.-]+", "-", said)
+    name = next(n for n in (plain, *(f"{plain}-{k}" for k in range(2, len(taken) + 3))) if n.casefold() not in taken)
+    taken.add(name.casefold())
+    return name
+
+
 def _robot(robot: TeamRobot, by_joints: bool) -> str:
-    lines = ["[[robot]]", f"name = {json.dumps(robot.name)}"]
+    lines = ["[[robot]]", f"name = {toml_string(robot.name)}"]
     if by_joints:
         lines.append('model = "omnid"')
     if robot.base != "still":
@@ -109,7 +119,7 @@ def _gravity(robot: TeamRobot) -> str:
 
 
 def _recording(recording: TeamRecording) -> str:
-    return f'  [[robot.recording]]\n  kind = "{recording.kind}"\n  name = {json.dumps(recording.name)}\n'
+    return f'  [[robot.recording]]\n  kind = "{recording.kind}"\n  name = {toml_string(recording.name)}\n'
 
 
 def _columns(track: Track, joints: JointReadings | None) -> dict[str, Array]:
@@ -136,12 +146,12 @@ def _with_gaps(values: Array, track: Track, channel: str) -> Array:
 def _stream(path: str, columns: Mapping[str, Array]) -> str:
     lines = [
         "    [[robot.recording.stream]]",
-        f"    path = {json.dumps(path)}",
+        f"    path = {toml_string(path)}",
         '    time = { columns = ["t"], unit = "s" }',
     ]
     for name in columns:
         names, said, _ = _COLUMNS[name]
-        lines.append(f"    {name} = {{ columns = {json.dumps(names)}, {said} }}")
+        lines.append(f"    {name} = {{ columns = {columns_text(names)}, {said} }}")
     if "force" in columns and "torque" not in columns:
         lines.append('    torque = "zero"   # a passive gimbal')
     return "\n".join(lines) + "\n"

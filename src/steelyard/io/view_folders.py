@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import math
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -12,6 +11,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
+from steelyard.io.documents import load_json
+from steelyard.io.entries import is_number
 from steelyard.io.images import read_colour, read_depth, require_images, write_image
 from steelyard.io.in_file import in_file
 from steelyard.shape.views import Intrinsics, TablePlane, Views
@@ -46,16 +47,11 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
     return in_file(folder, lambda: Views(depth, rgb, intrinsics, X_WC, float(camera["depth_unit_m"]), table))
 
 
-def _object(path: Path, keys: tuple[str, ...]) -> dict[str, Any]:
-    """Return a JSON object that has all `keys`."""
-    try:
-        values = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise BadFile(f"{path}: this file is missing. It needs {', '.join(keys)}.") from None
-    except (OSError, UnicodeDecodeError, json.JSONDecodeError) as error:
-        raise BadFile(f"{path}: expected a JSON file; {error}.") from None
-    if not isinstance(values, dict):
-        raise BadFile(f"{path}: expected one JSON object with {', '.join(keys)}.")
+def _object(path: Path, what: str, keys: tuple[str, ...]) -> dict[str, Any]:
+    """Return a JSON object, `what` of the views in words, that has all `keys`."""
+    if not path.exists():
+        raise BadFile(f"{path}: this file is missing. It needs {', '.join(keys)}.")
+    values = load_json(path, f"the {what} of views", f"It needs {', '.join(keys)}.")
     if missing := [key for key in keys if key not in values]:
         raise BadFile(f"{path}: {_named(missing)} missing. It needs {', '.join(keys)}.")
     return values
@@ -67,13 +63,13 @@ def _named(missing: list[str]) -> str:
 
 
 def _number(path: Path, key: str, value: Any) -> float:
-    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+    if not is_number(value):
         raise BadFile(f'{path}: "{key}" must be a finite number; got {value!r}.')
     return float(value)
 
 
 def _camera(path: Path) -> dict[str, float]:
-    values = _object(path, _CAMERA)
+    values = _object(path, "camera", _CAMERA)
     camera = {key: _number(path, key, values[key]) for key in _CAMERA}
     if any(camera[key] != int(camera[key]) for key in ("width", "height")):
         raise BadFile(f"{path}: width and height must be whole numbers of pixels.")
@@ -91,7 +87,7 @@ def _intrinsics(camera: dict[str, float]) -> Intrinsics:
 def _poses(path: Path) -> tuple[list[str], Pose]:
     """Return the names of the views and the poses (V,) of the camera in W."""
     try:
-        with path.open(newline="", encoding="utf-8") as lines:
+        with path.open(newline="", encoding="utf-8-sig") as lines:
             reader = csv.DictReader(lines, skipinitialspace=True)
             numbered = [(reader.line_num, row) for row in reader]  # blank lines are passed over
     except FileNotFoundError:
@@ -150,7 +146,7 @@ def _sized(path: Path, read: Callable[[Path], Any], size: tuple[int, int]) -> An
 
 
 def _table(path: Path) -> TablePlane:
-    values = _object(path, ("normal", "offset_m"))
+    values = _object(path, "table", ("normal", "offset_m"))
     normal = values["normal"]
     if not isinstance(normal, list) or len(normal) != 3:
         raise BadFile(f'{path}: "normal" must be three numbers; got {normal!r}.')

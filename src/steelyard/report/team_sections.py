@@ -7,7 +7,7 @@ import numpy as np
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import fixed, general, measured, rpy_deg
+from steelyard.report.numbers import decimals, fixed, general, measured, rpy_deg
 from steelyard.report.palette import hexadecimal
 from steelyard.report.sections import section, table
 from steelyard.spatial import Pose
@@ -83,7 +83,7 @@ def _line(report: Report, seen: TeamEstimate, name: str, true: Pose | None, comp
 
 def _angles(grasp: GraspEstimate) -> Html:
     std = float(grasp.std_deg.max())
-    places = max(0, int(1 - np.floor(np.log10(std)))) if std > 0 else 2
+    places = decimals(std) if std > 0 else 2
     shown = ", ".join(fixed(float(a), places) for a in rpy_deg(grasp.pose.rotation))
     bar = tag("span", f" ± {fixed(std, places)}", class_="pm") if std > 0 else ""
     return tag("span", tag("span", shown, class_="v"), bar, tag("span", "°", class_="u"), class_="angles")

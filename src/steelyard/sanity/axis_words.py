@@ -18,5 +18,5 @@ def direction_words(vector: Array) -> str:
 
 
 def _listed(vector: Array, places: int) -> str:
-    # Adding zero turns a minus zero into a plain one.
-    return ", ".join(f"{v:.{places}f}" for v in vector + 0.0)
+    # Adding zero turns a minus zero, which rounding leaves, into a plain one.
+    return ", ".join(f"{v:.{places}f}" for v in np.round(vector, places) + 0.0)

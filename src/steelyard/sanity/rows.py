@@ -27,6 +27,8 @@ FROZEN_ROWS, FROZEN_S = 50, 0.25
 CLIPPED_ROWS, CLIPPED_SHARE, CLIPPED_RATIO = 10, 0.003, 5
 # Measured channels carry noise of more than this share of their range; simulated ones without noise do not.
 NOISE_SHARE = 1e-5
+# What is left of a stream that loses more rows than this share is no fair sample: then none is left out.
+MOST_LEFT_OUT = 0.7
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 _NOISY = ("force", "torque", "specific_force")
 
@@ -70,16 +72,12 @@ def without_repeats(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
 
 def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     """Return the stream without stretches in which a channel stood still although nothing else says rest."""
-    found: list[Finding] = []
+    found: list[tuple[str, str]] = []
     if stream.time is None or len(stream) < 4 * FROZEN_ROWS:
         return stream, ()
     frozen = _hung_rows(stream)
     if frozen.any():
-        found.append(
-            _stuck(
-                stream, "every channel", f"stands still in {int(frozen.sum())} of {len(frozen)} rows and jumps after"
-            )
-        )
+        found.append(("every channel", f"stands still in {int(frozen.sum())} of {len(frozen)} rows and jumps after"))
     for quantity in (q for q in _NOISY if q in stream.channels):
         values = stream.channels[quantity]
         same = values[1:] == values[:-1]
@@ -89,15 +87,12 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
             others = np.delete(np.arange(3), axis)
             rows = _frozen_rows(values[:, axis], stream.time) & ~frozen & noisy[others].any()
             if dead[axis]:
-                found.append(_stuck(stream, name, "does not change at all while its neighbours do"))
+                found.append((name, "does not change at all while its neighbours do"))
             elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
-                found.append(
-                    _stuck(stream, name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else")
-                )
+                found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
                 frozen |= rows
-    if frozen.mean() > 0.7:
-        frozen[:] = False
-    return _kept(stream, ~frozen) if frozen.any() else stream, tuple(found)
+    rest, then = _left_out(stream, frozen)
+    return rest, tuple(_stuck(stream, name, what, then) for name, what in found)
 
 
 def dead_channels(recording: Recording) -> tuple[bool, ...]:
@@ -146,7 +141,8 @@ def _hung_rows(stream: Stream) -> Mask:
 
 def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     """Return the stream without rows at the end of a channel's range."""
-    found, clipped = [], np.zeros(len(stream), bool)
+    found: list[tuple[str, int, float, int]] = []
+    clipped = np.zeros(len(stream), bool)
     for quantity in (q for q in _MEASURED if q in stream.channels):
         values = stream.channels[quantity]
         noisy = _noise_shares(values) > NOISE_SHARE
@@ -154,14 +150,25 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
             for extreme in (values[:, axis].min(), values[:, axis].max()):
                 rows = _clipped_rows(values[:, axis], float(extreme))
                 if rows.any():
-                    count = int(rows.sum())
-                    found.append(_saturated(stream, quantity, axis, extreme, count, "these were left out"))
+                    found.append((quantity, axis, float(extreme), int(rows.sum())))
                     clipped |= rows
-    if clipped.mean() > 0.7:
-        clipped[:] = False
-    # The neighbours of a clipped row are filtered by the same electronics.
-    wide = clipped | np.roll(clipped, 1) | np.roll(clipped, -1)
-    return _kept(stream, ~wide) if clipped.any() else stream, tuple(found)
+    rest, then = _left_out(stream, _with_neighbours(clipped))
+    return rest, tuple(_saturated(stream, *each, then) for each in found)
+
+
+def _with_neighbours(rows: Mask) -> Mask:
+    """Return the rows (N,) and those beside them, which are filtered by the same electronics."""
+    wide = rows.copy()
+    wide[1:] |= rows[:-1]
+    wide[:-1] |= rows[1:]
+    return wide
+
+
+def _left_out(stream: Stream, rows: Mask) -> tuple[Stream, str]:
+    """Return the stream without `rows` (N,), or all of it where they are too many, and what was done in words."""
+    if rows.mean() > MOST_LEFT_OUT:
+        return stream, "so many cannot be left out, and these were used as they are"
+    return _kept(stream, ~rows) if rows.any() else stream, "these rows were left out"
 
 
 def _columns(stream: Stream) -> Array:
@@ -262,9 +269,9 @@ def _clipped_rows(column: Array, extreme: float) -> Mask:
     return at if len(entering) and float(np.median(entering)) > 3 * quantum else none
 
 
-def _stuck(stream: Stream, name: str, what: str) -> Finding:
-    left_out = "; it was not used" if "at all" in what else "; these rows were left out"
-    return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}{left_out}.")
+def _stuck(stream: Stream, name: str, what: str, then: str) -> Finding:
+    done = "it was not used" if "at all" in what else then
+    return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}; {done}.")
 
 
 def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: int, then: str) -> Finding:

@@ -41,6 +41,7 @@ class TwistTeam:
     """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s].
 
     clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
+    reference    number of the robot in whose grasp the answer is given
     """
 
     parts: tuple[TwistStretch, ...]
@@ -48,6 +49,7 @@ class TwistTeam:
     late: Mapping[str, float]
     findings: tuple[Finding, ...] = ()
     clocks_left: ClockErrors = NOTHING
+    reference: int = 0
 
     @classmethod
     def of(cls, log: TeamLog, clocks: bool) -> TwistTeam:
@@ -70,7 +72,7 @@ class TwistTeam:
             if not (clocks and left) or fit.punctual(share * PUNCTUAL, share * DOUBTED):
                 break
             late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
-        return cls(parts, fit, late)
+        return cls(parts, fit, late, reference=log.names.index(log.reference))
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
@@ -115,11 +117,11 @@ class TwistTeam:
 
     @cached_property
     def split(self) -> Split | None:
-        """How grasps fall apart where they do not move as on one rigid body."""
+        """How grasps fall apart where they do not move as on one rigid body, the reference's group first."""
         if not self.rough:
             return None
         part = max((p for p in self.parts if p.rows.kind != "still"), key=lambda p: len(p.rows), default=self.parts[0])
-        return split_of(*smoothed(part.twist, np.asarray(part.seen.all(1)), part.rows.rate))
+        return split_of(*smoothed(part.twist, np.asarray(part.seen.all(1)), part.rows.rate), self.reference)
 
     @property
     def rough(self) -> bool:
