@@ -114,6 +114,15 @@ def test_every_unit_has_a_rule() -> None:
     assert {unit(name) for name in modules()} <= set(MAY_IMPORT)
 
 
+def test_no_imports_go_round_in_a_circle() -> None:
+    """Neither at the top of modules nor within functions: what imports what could be drawn from left to right."""
+    left = {name: {target for target in own_imports(name) if target in modules()} - {name} for name in modules()}
+    left.pop("")  # the package hands names on
+    while free := {name for name, targets in left.items() if not targets & left.keys()}:
+        left = {name: targets for name, targets in left.items() if name not in free}
+    assert not left
+
+
 def test_only_permitted_imports() -> None:
     offences = [
         f"{name or '__init__'} imports {target or 'the package itself'}"

@@ -13,7 +13,6 @@ import numpy as np
 from steelyard.bench.asked import Progress, require_known, require_one
 from steelyard.bench.pool import spread
 from steelyard.bench.timing import thread_ms
-from steelyard.check import Array
 from steelyard.errors import SteelyardError
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, TeamTruth, simulate_team
@@ -155,7 +154,7 @@ def trial(job: tuple[str, int, Sequence[str]]) -> list[dict[str, Any]]:
 
 def score(made: TeamTrial, found: TeamEstimate) -> dict[str, Any]:
     """Return the errors of one answer; inertia is None where it was not identified."""
-    turned, moved, share = grasp_errors(made.truth, poses_found(made.log, found))
+    turned, moved, share = grasp_errors(made.truth, found.poses_of(made.log.names))
     body, moments = made.truth.body, found.principal_moments
     return {
         "rotation_deg": turned,
@@ -174,12 +173,6 @@ def grasp_errors(truth: TeamTruth, found: Pose) -> tuple[float, float, float]:
     angle = np.rad2deg((truth.grasps.rotation.inverse() @ found.rotation).angle())[others]
     gap = np.linalg.norm(found.position - truth.grasps.position, axis=1)[others]
     return float(angle.mean()), float(1000 * gap.mean()), float(100 * (gap / far[others]).mean())
-
-
-def poses_found(log: TeamLog, found: TeamEstimate) -> Pose:
-    """Return the grasps (N,) in R of every robot of the log."""
-    matrices: Array = np.array([found.grasps[name].pose.matrix() for name in log.names])
-    return Pose.from_matrix(matrices)
 
 
 def summary(rows: Sequence[Mapping[str, Any]], name: str, method: str) -> dict[str, Any]:

@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.pool import spread
-from steelyard.bench.team import poses_found
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
@@ -38,7 +37,7 @@ RULES = (
 
 def _position(made: TeamTrial, found: TeamEstimate) -> float:
     """Return the mean error [mm] of the grasps that are not the reference's."""
-    apart = np.linalg.norm(poses_found(made.log, found).position - made.truth.grasps.position, axis=1)
+    apart = np.linalg.norm(found.poses_of(made.log.names).position - made.truth.grasps.position, axis=1)
     return float(1000 * apart[1:].mean())
 
 

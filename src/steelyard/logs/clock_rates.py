@@ -26,8 +26,8 @@ from steelyard.logs.runs import picked
 SURE, LEFT, LEAST_S, LARGEST = 8.0, 0.95, 5e-5, 0.05
 # The first stretch is at least this long on either side of the middle [s]; each is twice as long as the one before.
 _FIRST_S, _STEPS = 4.0, 4
-# Rows that are enough, and blocks of them whose scores tell standard deviations.
-_ROWS, _BLOCKS = 3000, 20
+# Rows that are enough, and that a stretch must have, and blocks of them whose scores tell standard deviations.
+_ROWS, _FEWEST, _BLOCKS = 3000, 100, 20
 # How far [s] a delay may be from the one found, and a rate [s/s] from one, beforehand.
 _LATE, _RATE = 0.1, 0.02
 _STEP = 1e-3  # [s] for differences
@@ -73,7 +73,8 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
         half /= 2
     while half <= full:
         rows = np.flatnonzero(np.abs(time - middle) <= half * (1 + 1e-9)).astype(np.int64)
-        found = _settled(_rows(question, rows[picked(len(rows), _ROWS)]), start, found, half)
+        if len(rows) >= _FEWEST:
+            found = _settled(_rows(question, rows[picked(len(rows), _ROWS)]), start, found, half)
         half *= 2
     every = _rows(question, picked(len(time), _ROWS))
     if not _better(every, start, found):

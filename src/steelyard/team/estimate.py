@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -102,6 +102,11 @@ class TeamEstimate(Estimate):
     clock_offsets_s: Mapping[str, float] = field(default_factory=dict)
     clock_offset_std_s: Mapping[str, float] = field(default_factory=dict)
     hinge: HingeEstimate | None = None
+
+    def poses_of(self, names: Sequence[str]) -> Pose:
+        """Return the poses (N,) of these robots' grasps in R."""
+        matrices: Array = np.array([self.grasps[name].pose.matrix() for name in names])
+        return Pose.from_matrix(matrices)
 
     @cached_property
     def principal_moments(self) -> Array | None:
