@@ -116,7 +116,7 @@ def recorded(*names: str) -> Recording:
 @pytest.mark.parametrize(
     "name",
     [
-        "../../x.csv", "/tmp/x.csv", "a/../../x.csv", "..", "", ".", "..\\x.csv", "C:\\x.csv", "C:x.csv", "\\x.csv",
+        "../../x.csv", "/x.csv", "a/../../x.csv", "..", "", ".", "..\\x.csv", "C:\\x.csv", "C:x.csv", "\\x.csv",
         "a\0b.csv", "log.toml", "./log.toml",
     ],
 )  # fmt: skip
