@@ -172,3 +172,15 @@ def test_a_gain_of_the_forces_is_said_to_be_in_no_bar() -> None:
         f"error bars hold no gain of the sensor: forces 1 % too large would move the mass by {moved:.2g} kg, "
         "and no log shows it; weigh a known mass once"
     ]
+
+
+@pytest.mark.parametrize("motion", ["paper", "slow"])
+@pytest.mark.parametrize("times", [2.0, 1.0])
+def test_a_tip_at_the_end_of_a_rod_or_at_its_middle_is_no_sign_and_no_unit(times: float, motion: str) -> None:
+    """Reversed torques put the point at twice the centre of mass, too, but with an inertia below zero."""
+    tip = tuple(float(v) for v in times * BODY.com)
+    told = told_of(of_the_tip(recorded(motion, 2), tip))
+    assert "torques have the sign" not in told
+    assert "times too small beside" not in told
+    if times > 1:
+        assert "the positions were those of a point" in told

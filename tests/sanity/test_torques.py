@@ -51,7 +51,8 @@ def test_columns_in_another_order(made: Recording, matrix: list[list[int]], word
 
 
 def test_the_other_sign(made: Recording) -> None:
-    assert "sign opposite to that of the forces" in named(edited(made, torque=np.negative))
+    (unit,) = (f for f in identify(edited(made, torque=np.negative)).findings if f.code == "force-unit")
+    assert "sign opposite to that of the forces" in unit.message
 
 
 @pytest.mark.parametrize(

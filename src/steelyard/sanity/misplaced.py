@@ -29,6 +29,8 @@ APART, SURE, LEFT, FARTHEST = 0.01, 8.0, 0.95, 2.0
 NOISE, CALM = 3.0, 0.05
 # Forces k times too large look like a point at 1 - k times the centre of mass. So near, the unit is likelier.
 NEAR = 0.03
+# The unit, or sign, is told where the ratio that it puts the point at is known to this share.
+TOLD = 0.1
 # The point is sought anew with the body found until it moves by less [m].
 ROUNDS, SETTLED = 5, 1e-5
 # Along an axis of S about which alone it turns, no point is told from another: the motion shows this much less of it.
@@ -44,6 +46,7 @@ class Misplaced:
     left        squared residual beside that with the origin of S
     moved       (10,) what the parameters are less with it
     com         (3,) [m] centre of mass with it
+    trace       [kg m^2] sum of the moments of inertia about it that a free fit has
     noise       share of noise in the squared acceleration of the rows
     blind       (3,) an axis of S along which the motion does not show the point, which is then taken to lie at zero;
                 None where there is none
@@ -55,24 +58,40 @@ class Misplaced:
     left: float
     moved: Array
     com: Array
+    trace: float
     noise: float
     blind: Array | None = None
     measured: bool = False
 
     @property
     def sure(self) -> bool:
+        """Whether it is another point than the origin of S beyond doubt, and one that poses may be of."""
+        return self.seen and not self.of_a_unit
+
+    @property
+    def seen(self) -> bool:
         """Whether it is another point than the origin of S beyond doubt."""
         far = float(np.linalg.norm(self.place))
         least = APART + NOISE * self.noise * float(np.linalg.norm(self.com))
-        seen = bool((np.abs(self.place) > SURE * self.std).any()) and self.noise < CALM
-        return seen and least < far < FARTHEST and self.left < LEFT
+        shown = bool((np.abs(self.place) > SURE * self.std).any()) and self.noise < CALM
+        return shown and least < far < FARTHEST and self.left < LEFT
 
     @property
     def of_a_unit(self) -> bool:
         """Whether it lies where the wrong unit of force or torque, or the other sign of torques, puts it."""
-        ways = np.array([1 - factor for factor in (-1.0, *(factor for factor, _ in UNITS), 1e3, 1e-3)])
+        ways = np.array([1 - factor for factor in (*(factor for factor, _ in UNITS), 1e3, 1e-3)])
         gaps = np.linalg.norm(self.place - ways[:, None] * self.com, axis=1)
-        return bool((gaps < NEAR * np.linalg.norm(self.place)).any())
+        return self._of_a_sign or bool((gaps < NEAR * np.linalg.norm(self.place)).any())
+
+    @property
+    def _of_a_sign(self) -> bool:
+        """Whether it lies at twice the centre of mass, as the tip of a rod held at its end, with an inertia below zero.
+
+        The sign of torques is that of the inertia: no body has one below zero, however little is known of it.
+        """
+        gap = float(np.linalg.norm(self.place - 2 * self.com))
+        near = NEAR * float(np.linalg.norm(self.place)) + 2 * float(np.linalg.norm(self.std))
+        return self.trace < 0 and gap < near
 
     @property
     def larger(self) -> tuple[float, float]:
@@ -137,7 +156,9 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
             break
     left = fit.left / once.left if once.left else 1.0
     std, moved = np.sqrt(axes**2 @ fit.spread[at:] ** 2), once.solution[:10] - phi
-    return Misplaced(place, std, left, moved, phi[1:4] / phi[0], noise_share(log), blind)
+    com = phi[1:4] / phi[0]
+    trace = float(phi[4] + phi[7] + phi[9] - 2 * phi[0] * com @ com)
+    return Misplaced(place, std, left, moved, com, trace, noise_share(log), blind)
 
 
 def examine_place(
@@ -152,11 +173,15 @@ def examine_place(
     if {f.code for f in known} & ELSEWHERE:
         return None, ()
     found = misplaced(log, drift)
-    if found is None or not found.sure:
+    if found is None or not found.seen:
         return None, ()
     if any(r is not None and found.left >= r.left for r in (two_masses(log), sensor_matrix(log, drift))):
         return None, ()
-    return (None, compared(*found.larger)) if found.of_a_unit else (found, ())
+    if not found.of_a_unit:
+        return found, ()
+    ratio, std = found.larger
+    # A point at the centre of mass itself has no ratio that tells.
+    return None, compared(ratio, std) if std < TOLD * abs(ratio) else ()
 
 
 def _lever(log: MotionLog) -> Array:

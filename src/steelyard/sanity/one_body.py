@@ -33,9 +33,12 @@ def one_body(
 
 
 def _put_right(log: MotionLog, recording: Recording, drift: bool) -> MotionLog:
-    """Return the log without what spoils all of it beyond doubt; the same log where nothing does."""
+    """Return the log without what spoils all of it beyond doubt; the same log where nothing does.
+
+    A point where only a wrong unit or sign puts it serves as well: with it, one body explains all rows.
+    """
     sensor = None if felt_in_sensor(recording) is None else sensor_matrix(log, drift)
     if sensor is not None and (sensor.turned or sensor.unlike):
         log = sensor.put_right(log)
     place = misplaced(log, drift)
-    return place.put_right(log) if place is not None and place.sure else log
+    return place.put_right(log) if place is not None and place.seen else log

@@ -66,7 +66,8 @@ def examine_torques(
         return recording, ()
     if abs(ratio[0] / 1000 - 1) < NEAR + 3 * ratio[1] / 1000:
         return _in_newton_metres(recording, *ratio)
-    return recording, compared(*ratio)
+    # The other sign looks like positions of a tip as far behind the centre of mass: all rows tell them apart later.
+    return recording, () if ratio[0] < 0 else compared(*ratio)
 
 
 def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[Recording, tuple[Finding, ...]]:
