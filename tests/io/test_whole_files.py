@@ -130,6 +130,14 @@ def test_a_stream_whose_name_leads_elsewhere_is_refused(name: str, tmp_path: Pat
     assert names(tmp_path) == []
 
 
+@pytest.mark.parametrize("other", ["a.csv", "./a.csv"])
+def test_two_streams_of_one_name_are_refused(other: str, tmp_path: Path) -> None:
+    with pytest.raises(BadValue) as caught:
+        write_recording(recorded("a.csv", other), tmp_path / "new")
+    assert str(caught.value) == f"streams 'a.csv' and {other!r} would be one file: give every stream a name of its own."
+    assert names(tmp_path) == []
+
+
 @pytest.mark.parametrize("name", ["kuka-1/2-baseline.csv", 'the "good" one.csv', "a\nb.csv", "\x7f.csv", "🔨.csv"])
 def test_a_stream_of_any_name_inside_the_folder_is_written_as_valid_toml(name: str, tmp_path: Path) -> None:
     path = write_recording(recorded(name), tmp_path)

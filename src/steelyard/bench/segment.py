@@ -14,7 +14,7 @@ from scipy.spatial import cKDTree
 from steelyard.bench.asked import Progress
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.evaluate.segments import score_segments, surface_gap
+from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.evaluate.solids import score, true_solid, winding_of
 from steelyard.io.object_folders import object_folders, read_object
 from steelyard.parts.clustering import cluster
@@ -135,13 +135,13 @@ def _ours(known: KnownObject, cloud: Cloud, warm: bool) -> tuple[dict[str, Any],
     truth = true_solid(known)
     scores, solid = score_segments(true, found.point_part), score(found.mesh, truth)
     surface = _spread(found.mesh.vertices[found.mesh.surface], SURFACE_POINTS)[0]
-    gap = surface_gap(surface, _outside(known.mesh.corners, SURFACE_POINTS)[0])
+    gap = hausdorff_mm(surface, _outside(known.mesh.corners, SURFACE_POINTS)[0])
     row = {
         "impurity": scores.impurity,
         "gce": scores.gce,
         "ari": scores.ari,
         "undersegmentation": scores.undersegmentation,
-        "hausdorff_mm": gap.hausdorff_mm,
+        "hausdorff_mm": gap,
         "n_parts": len(found),
         "n_true": scores.n_true,
         "volume_ratio": solid.volume_ratio,

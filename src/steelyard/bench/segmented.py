@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.evaluate.segments import score_segments, surface_gap
+from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.identify.shape_error import ShapeError
 from steelyard.parts.clustering import cluster
 from steelyard.parts.known import KnownObject
@@ -75,7 +75,7 @@ def _scores(known: KnownObject, mesh: TetMesh, labels: Integers) -> dict[str, An
         "volume_ratio": mesh.volume / true,
         "impurity": scores.impurity,
         "gce": scores.gce,
-        "hausdorff_mm": surface_gap(mesh.vertices[mesh.surface].reshape(-1, 3), known.cloud.xyz).hausdorff_mm,
+        "hausdorff_mm": hausdorff_mm(mesh.vertices[mesh.surface].reshape(-1, 3), known.cloud.xyz),
         "n_parts": int(labels.max()) + 1,
         "n_true": scores.n_true,
     }

@@ -15,20 +15,18 @@ from steelyard.evaluate.bodies import (
 from steelyard.evaluate.published import published_edges, score_as_published
 from steelyard.evaluate.segments import (
     SegmentScores,
-    SurfaceGap,
     adjusted_rand,
     contingency,
     global_consistency,
+    hausdorff_mm,
     impurity,
     score_segments,
-    surface_gap,
     undersegmentation,
 )
 
 __all__ = [
     "Scores",
     "SegmentScores",
-    "SurfaceGap",
     "adjusted_rand",
     "box_edges",
     "com_mm",
@@ -36,6 +34,7 @@ __all__ = [
     "consistent",
     "contingency",
     "global_consistency",
+    "hausdorff_mm",
     "impurity",
     "inertia_pct",
     "inertia_scale",
@@ -45,6 +44,5 @@ __all__ = [
     "score",
     "score_as_published",
     "score_segments",
-    "surface_gap",
     "undersegmentation",
 ]

@@ -36,18 +36,6 @@ class SegmentScores:
     n_parts: int
 
 
-@dataclass(frozen=True)
-class SurfaceGap:
-    """Distance between two surfaces sampled by points, with the true one scaled to a diagonal of 1000 mm.
-
-    hausdorff_mm   the farthest that a point of either is from the other
-    mean_mm        the mean distance, both directions alike
-    """
-
-    hausdorff_mm: float
-    mean_mm: float
-
-
 def score_segments(true: ArrayLike, found: ArrayLike) -> SegmentScores:
     """Score the found labels (N,) of points whose true labels (N,) are known."""
     table = contingency(true, found)
@@ -116,11 +104,12 @@ def adjusted_rand(table: Array) -> float:
     return 1.0 if most == chance else float((together - chance) / (most - chance))
 
 
-def surface_gap(found: ArrayLike, true: ArrayLike) -> SurfaceGap:
-    """Return the gap between two surfaces given by points (M, 3) and (N, 3) [m] in one frame.
+def hausdorff_mm(found: ArrayLike, true: ArrayLike) -> float:
+    """Return the farthest that a point of either surface is from the other [mm], the true one's diagonal being 1000.
 
-    Both are scaled by the diagonal of the true points' box. Points stand for the surface: their spacing is the
-    smallest gap that can be seen.
+    found, true  points (M, 3) and (N, 3) [m] in one frame; both are scaled by the diagonal of the true points' box
+
+    Points stand for the surface: their spacing is the smallest gap that can be seen.
     """
     from scipy.spatial import cKDTree
 
@@ -128,7 +117,4 @@ def surface_gap(found: ArrayLike, true: ArrayLike) -> SurfaceGap:
     diagonal = float(np.linalg.norm(np.ptp(two, axis=0)))
     scale = UNIT_DIAGONAL_MM / check.positive("the diagonal of the true points' box", diagonal)
     there, back = cKDTree(two).query(one)[0], cKDTree(one).query(two)[0]
-    return SurfaceGap(
-        hausdorff_mm=float(scale * max(there.max(), back.max())),
-        mean_mm=float(scale * (there.mean() + back.mean()) / 2),
-    )
+    return float(scale * max(there.max(), back.max()))

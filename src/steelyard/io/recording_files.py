@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path, PurePosixPath, PureWindowsPath
 
 import numpy as np
@@ -28,10 +29,10 @@ def write_recording(recording: Recording, folder: Path) -> Path:
     """Write every stream as CSV and the description as log.toml into `folder`; return the description's path.
 
     All of it or nothing is written; other files in the folder stay. Raises BadFile where the folder cannot be written
-    or a stream holds a quantity that this writer does not know, BadValue where the name of a stream leads elsewhere.
+    or a stream holds a quantity that this writer does not know, BadValue where the name of a stream leads elsewhere or
+    is that of another.
     """
-    for stream in recording.streams:
-        _require_inside(stream.name)
+    _require_own_places([stream.name for stream in recording.streams])
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
     gravity = ", ".join(f"{g + 0.0:g}" for g in recording.gravity)
     text = [f'[log]\ngravity = [{gravity}]   # in the world frame W, m/s^2\nwrench  = "{sign}"\n']
@@ -45,6 +46,19 @@ def write_recording(recording: Recording, folder: Path) -> Path:
             write_text(path, _csv(stream))
         write_text(new / _DESCRIPTION, "\n".join(text))
     return folder / _DESCRIPTION
+
+
+def _require_own_places(names: Sequence[str]) -> None:
+    """Raise BadValue where a name leads out of the folder, or two streams would be one file."""
+    places: dict[PurePosixPath, str] = {}
+    for name in names:
+        _require_inside(name)
+        place = PurePosixPath(name)
+        if place in places:
+            raise BadValue(
+                f"streams {places[place]!r} and {name!r} would be one file: give every stream a name of its own."
+            )
+        places[place] = name
 
 
 def _require_inside(name: str) -> None:
