@@ -73,14 +73,11 @@ def _quantities(body: InertialParameters, covariance: Array, any_grasp: bool) ->
     if body.mass == 0:
         raise BadValue("a body of mass zero has no centre of mass; there is nothing to compare.")
     J = forms.people_jacobian(body.vector)
-    values = np.concatenate([[body.mass], body.com, forms.upper(body.inertia_com)])
     people = J @ covariance @ J.T + np.diag(np.square(EXACT * natural_sizes(body.vector.copy())))
     if not any_grasp:
-        return values, people, NAMES
+        return body.people, people, NAMES
     moments, axes = np.linalg.eigh(body.inertia_com)
     slopes = np.zeros((4, 10))
-    slopes[0, 0] = 1
-    for k, (i, j) in enumerate(forms.UPPER):
-        slopes[1:, 4 + k] = axes[i] * axes[j] * (1 if i == j else 2)
+    slopes[0, 0], slopes[1:, 4:] = 1, forms.principal_slopes(axes)
     names = ("mass", "principal moment 1", "principal moment 2", "principal moment 3")
     return np.concatenate([[body.mass], moments]), slopes @ people @ slopes.T, names

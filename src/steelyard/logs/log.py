@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.check import Integers as Integers
 from steelyard.check import Mask as Mask
 from steelyard.errors import BadValue
+from steelyard.inertia import forms
 from steelyard.spatial import Pose, cross_matrix, lever_acceleration
 
 
@@ -162,7 +163,7 @@ class MotionLog:
     def predicted(self, phi: Array) -> Array:
         """Return the wrench (N, 6) that a body phi (10,) needs for this motion, without bias."""
         m, h = phi[0], phi[1:4]
-        inertia = phi[[[4, 5, 6], [5, 7, 8], [6, 8, 9]]]
+        inertia = forms.inertia_matrix(phi)
         a = self.acceleration - self.gravity
         omega, alpha = self.angular_velocity, self.angular_acceleration
         H = cross_matrix(h)
