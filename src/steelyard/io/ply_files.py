@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile
+from steelyard.io.in_file import in_file
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
 
@@ -172,15 +173,9 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     if len(indices) and indices.shape[1] != 3:
         raise BadFile(f"{path}: faces have {indices.shape[1]} corners. Save every face as a triangle.")
     colours = [face[name] for name in ("red", "green", "blue") if name in face]
-    try:
-        return TriangleMesh(
-            np.stack([vertex[axis] for axis in "xyz"], axis=1),
-            indices,
-            face.get("part", np.zeros(len(indices))),
-            np.stack(colours, axis=1) if len(colours) == 3 else None,
-        )
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
+    xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1)
+    rgb = np.stack(colours, axis=1) if len(colours) == 3 else None
+    return in_file(path, lambda: TriangleMesh(xyz, indices, face.get("part", np.zeros(len(indices))), rgb))
 
 
 def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> None:
