@@ -8,6 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import counted
 from steelyard.identify.linear import normal_equations, solve_scaled
 from steelyard.identify.noise_cost import residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
@@ -164,7 +165,7 @@ def require_rows(rows: int) -> None:
     """Raise CannotAnswer where there are too few rows for anything."""
     if rows < FEWEST_ROWS:
         raise CannotAnswer(
-            f"The log has {rows} usable row{'s' * (rows != 1)}, which cannot tell a weight from a bias. {ADD_POSES}."
+            f"The log has {counted(rows, 'usable row')}, which cannot tell a weight from a bias. {ADD_POSES}."
         )
 
 
