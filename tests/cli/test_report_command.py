@@ -135,6 +135,14 @@ def test_a_pose_that_is_not_the_results_is_passed_over(
     assert ("put the parts up to 200 mm from where the result has them, and were passed over" in err) == said
 
 
+def test_a_truth_that_is_no_body_is_named(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
+    facts = json.loads((folder / "hammer" / "truth.json").read_text())
+    (folder / "wrong.json").write_text(json.dumps(facts | {"mass_kg": -1.0}))
+    status, _, error = run(capsys, folder, "@result.json", "--truth", "@wrong.json", "-o", "@wrong.html")
+    assert status == 2
+    assert error.startswith(f"steelyard: {folder}/wrong.json: These inertial parameters are not those of a rigid body")
+
+
 def test_truth_names_only_parts_that_are_the_same(capsys: pytest.CaptureFixture[str], folder: Path) -> None:
     changed = json.loads((folder / "result.json").read_text())
     changed["parts"][0]["volume_m3"] *= 1.5

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from bench_logs import bench_log
 
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.same import NAMES, Comparison, compare
@@ -94,6 +94,14 @@ def test_nothing_to_compare(runs: list[Estimate]) -> None:
         compare(one.parameters, one.covariance, other.parameters, other.covariance, ~ALL)
     text = "Neither mass nor inertia is identified in both results; there is nothing to compare."
     assert str(caught.value) == text
+
+
+def test_what_is_no_body_or_no_covariance_is_said(runs: list[Estimate]) -> None:
+    body, nothing = runs[0].parameters, np.zeros((10, 10))
+    with pytest.raises(BadValue, match="mass zero has no centre of mass"):
+        compare(type(body)(np.zeros(10)), nothing, body, nothing, ALL)
+    with pytest.raises(BadValue, match="must have no negative variance; these have"):
+        compare(body, -np.eye(10), body, nothing, ALL)
 
 
 def test_exact_results_are_the_same_only_if_they_are(runs: list[Estimate]) -> None:

@@ -84,6 +84,12 @@ def test_runs_that_repeat_are_undone() -> None:
         ("a.pcd", pcd("binary_compressed")[:-9], "ends before its 50 points"),
         ("a.pcd", pcd("ascii").replace(b"FIELDS x y", b"FIELDS x"), "that fit each other"),
         ("a.pcd", pcd("binary").replace(b"FIELDS x y", b"FIELDS x w"), '"y" is missing'),
+        (
+            "a.pcd",
+            b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 99999999999\nPOINTS 1\nDATA ascii\n",
+            "that fit each",
+        ),
+        ("a.pcd", b"FIELDS _ _0 x\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", '"y" is missing'),
         ("a.ply", b"x", "expected a PLY file"),
         ("a.npz", b"x", "expected an NPZ file"),
         ("a.xyz", b"1 2 3", "is no cloud"),

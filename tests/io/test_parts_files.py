@@ -92,6 +92,7 @@ def write_wrong(saved: SavedParts, path: Path, **changed: Any) -> None:
         ({"rgb": np.zeros((2, 3))}, "3 parts need one colour 0..255 each (P, 3); got shape (2, 3)."),
         ({"rgb": np.full((3, 3), 300)}, "3 parts need one colour 0..255 each (P, 3); got shape (3, 3)."),
         ({"names": np.array(["a"])}, "3 parts need one name each; got 1."),
+        ({"names": np.array("a")}, "3 parts need one name each; got 1."),
         ({"com_std_m": np.array([1e-4, 1e-4])}, 'array "com_std_m" must hold one number; it has the shape (2,).'),
         ({"stretch": np.float64(np.nan)}, "standard deviations of a shape must not be negative; got 0.0004, nan, 0.01."),
         ({"names": np.zeros(3)}, 'array "names" must hold text; it holds float64.'),
@@ -117,9 +118,10 @@ def test_labels_without_gaps(saved: SavedParts, tmp_path: Path) -> None:
         BadFile, match=r"labels must be 0, 1, 2 \.\.\. with at least one cell each; these leave numbers out"
     ):
         read_parts(tmp_path / "p.npz")
-    write_wrong(saved, tmp_path / "p.npz", labels=saved.labels - 1)
-    with pytest.raises(BadFile, match="leave numbers out"):
-        read_parts(tmp_path / "p.npz")
+    for labels in (saved.labels - 1, saved.labels * 10**12):
+        write_wrong(saved, tmp_path / "p.npz", labels=labels)
+        with pytest.raises(BadFile, match="leave numbers out"):
+            read_parts(tmp_path / "p.npz")
 
 
 def test_millimetres_are_named(saved: SavedParts, tmp_path: Path) -> None:

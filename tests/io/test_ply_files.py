@@ -83,6 +83,23 @@ BAD: dict[str, tuple[Callable[[], bytes], str]] = {
         swapped("property float z", "property flot z"),
         'F: the PLY header has a line that means nothing: "property flot z".',
     ),
+    "odd digit": (
+        lambda: ASCII.replace("vertex 3", "vertex \u00b2").encode("latin-1"),
+        'F: the PLY header has a line that means nothing: "element vertex \u00b2".',
+    ),
+    "too many": (
+        swapped("vertex 3", "vertex " + "9" * 5000),
+        f'F: the PLY header has a line that means nothing: "element vertex {"9" * 45}".',
+    ),
+    "length with a fraction": (
+        swapped("list uchar", "list float"),
+        'F: the lists "vertex_indices" count in float; lengths are whole numbers.',
+    ),
+    "twice": (swapped("property float z", "property float y"), 'F: element "vertex" has 2 properties "y".'),
+    "negative length": (
+        swapped("3 0 1 2", "-3 0 1 2"),
+        'F: the lists "vertex_indices" differ in length. Save every face as a triangle.',
+    ),
     "too short": (swapped("vertex 3", "vertex 300"), 'F: the file ends inside element "vertex" (300 announced).'),
     "a word": (swapped("1 0 0", "1 0 a"), 'F: element "vertex" holds a word that is no number.'),
     "quads": (
@@ -121,6 +138,32 @@ def test_a_truncated_binary_body_is_said(tmp_path: Path) -> None:
     (tmp_path / "m.ply").write_bytes((tmp_path / "m.ply").read_bytes()[:-5])
     with pytest.raises(BadFile, match=r'the file ends inside element "face" \(3 announced\)\.$'):
         read_mesh(tmp_path / "m.ply")
+
+
+@pytest.mark.parametrize(
+    ("kind", "first", "text"),
+    [
+        ("char", "ff", 'the lists "v" differ in length'),
+        ("uint", "ffffffff", 'the file ends inside element "face"'),
+        ("uchar", "ff", 'the file ends inside element "face"'),
+    ],
+)
+def test_a_binary_list_of_no_possible_length_is_said(tmp_path: Path, kind: str, first: str, text: str) -> None:
+    header = f"ply\nformat binary_little_endian 1.0\nelement face 1\nproperty list {kind} int v\nend_header\n"
+    (tmp_path / "m.ply").write_bytes(header.encode() + bytes.fromhex(first) + bytes(20))
+    with pytest.raises(BadFile, match=text):
+        read_ply(tmp_path / "m.ply")
+
+
+def test_elements_without_rows_or_properties_are_passed_over(tmp_path: Path) -> None:
+    header = (
+        "ply\nformat binary_little_endian 1.0\nelement camera 1\nelement face 0\nproperty list uint int v\n"
+        "element vertex 2\nproperty float x\nend_header\n"
+    )
+    (tmp_path / "m.ply").write_bytes(header.encode() + np.array([1.5, -2.0], "<f4").tobytes())
+    found = read_ply(tmp_path / "m.ply")
+    assert found["face"]["v"].shape == (0, 0)
+    assert found["vertex"]["x"].tolist() == [1.5, -2.0]
 
 
 def test_a_missing_file_is_said(tmp_path: Path) -> None:

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import json
+import struct
+import zlib
 from collections.abc import Callable
 from pathlib import Path
 
@@ -100,6 +102,16 @@ def camera(**change: object) -> Callable[[Path], None]:
     return make
 
 
+def bomb(size: int) -> bytes:
+    """Return a PNG of so many pixels across and down that holds none of them."""
+
+    def chunk(kind: bytes, body: bytes) -> bytes:
+        return struct.pack(">I", len(body)) + kind + body + struct.pack(">I", zlib.crc32(kind + body))
+
+    header = struct.pack(">IIBBBBB", size, size, 16, 0, 0, 0, 0)
+    return b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", header) + chunk(b"IDAT", zlib.compress(b"")) + chunk(b"IEND", b"")
+
+
 CAMERA = "width, height, fx, fy, cx, cy, depth_unit_m"
 COLUMNS = "name, x, y, z, qw, qx, qy, qz"
 
@@ -135,6 +147,8 @@ WRONG: list[tuple[str, Callable[[Path], object], str]] = [
     ("no picture", lambda f: (f / "depth" / "0001.png").write_bytes(b"x"), "expected a PNG image"),
     ("colour as depth", lambda f: (f / "color" / "0001.png").replace(f / "depth" / "0001.png"), "16 bits"),
     ("other size", camera(width=64, cx=30), "32 x 24 pixels; camera.json says 64 x 24"),
+    ("too many pixels", camera(width=10**9, height=10**9), "camera.json: 1000000000 x 1000000000 pixels are more than"),
+    ("a bomb", lambda f: (f / "depth" / "0001.png").write_bytes(bomb(20_000)), "0001.png: this image has more pixels"),
     ("no lens", camera(fx=0), "fx must be a focal length"),
     ("centre outside", camera(cx=99), "cx must lie inside the image"),
     ("not a number", camera(fy="wide"), '"fy" must be a finite number'),

@@ -91,6 +91,14 @@ def test_a_recording_with_a_quantity_that_cannot_be_written_leaves_nothing(tmp_p
     assert names(tmp_path) == []
 
 
+def test_stamps_of_a_recording_that_are_large_and_close_stay_apart(tmp_path: Path) -> None:
+    time = 900_000 + np.arange(50) / 4000
+    channels = {"force": np.ones((50, 3)), "torque": np.ones((50, 3))}
+    path = write_recording(Recording((Stream("a.csv", channels, time),), np.array([0, 0, -9.81])), tmp_path)
+    again = np.loadtxt(path.parent / "a.csv", delimiter=",", skiprows=1)[:, 0]
+    np.testing.assert_allclose(again, time, rtol=0, atol=1e-6)
+
+
 def test_a_team_with_a_robot_that_cannot_be_written_leaves_what_was_there(tmp_path: Path) -> None:
     made = three_omnids(0)
     path = write_team(made.log, tmp_path / "team.toml", made.joints)

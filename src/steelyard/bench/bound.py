@@ -11,8 +11,8 @@ import numpy as np
 from steelyard import evaluate
 from steelyard.check import Array
 from steelyard.identify.linear import normal_equations
-from steelyard.identify.noise_cost import weight
-from steelyard.identify.regressor import design, residual_map
+from steelyard.identify.noise_cost import residual_map_of, weight
+from steelyard.identify.regressor import design
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments
@@ -26,7 +26,7 @@ RANK_TOLERANCE = 1e-12
 def covariance(log: MotionLog, noise: Noise, body: InertialParameters, parts: Parts) -> Array:
     """Return the least covariance (10, 10) of phi with free masses of `parts`, from the exact rows of `body`."""
     T = design(with_bias=False)
-    K = residual_map(body.vector, np.zeros(6))
+    K = residual_map_of(T, body.vector.copy())
     scatter = Moments.of_log(log).sum
     information, _ = normal_equations(T, scatter[None], weight(K, noise.acceleration, noise.wrench)[None])
     B = parts.per_mass

@@ -160,7 +160,7 @@ def _page(answers: Mapping[str, Estimate], shape: Shape, recording: Recording, s
         "A hammer, scanned and weighed",
         best,
         scene_of_solid(made.mesh, made.labels, shape.solid.cloud, made.rgb, seen.X_SW),
-        None if rows.time is None else Residuals(rows.time, left[:, 3:], left[:, :3], rows.still),
+        Residuals.of(rows, left),
         dict(rivals),
         Truth(seen.truth),
         names,

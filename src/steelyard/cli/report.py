@@ -99,14 +99,11 @@ class _Facts:
     @classmethod
     def read(cls, path: Path, estimate: Estimate) -> _Facts:
         """A part of the result is one of the truth's when label and volume are the same."""
-        from steelyard.inertia import InertialParameters
-        from steelyard.io.object_folders import read_truth
+        from steelyard.io.object_folders import read_truth, truth_in_sensor
         from steelyard.report import Truth
-        from steelyard.spatial import Pose
 
         facts = read_truth(path)
-        X_SO = Pose.from_matrix(facts["T_mesh_from_grasp"]).inverse()
-        body = InertialParameters.from_com(facts["mass_kg"], facts["com_mesh_m"], facts["inertia_com_mesh_kgm2"])
+        body, X_SO = truth_in_sensor(path, facts)
         volumes = {part.label: part.volume for part in estimate.parts}
         masses, names = {}, {}
         for row in facts.get("parts", []):
@@ -117,7 +114,7 @@ class _Facts:
             mass = row.get("mass_kg", row.get("mass_fitted_kg"))
             if isinstance(mass, float | int):
                 masses[label] = float(mass)
-        return cls(Truth(body.in_frame(X_SO), masses), names, X_SO)
+        return cls(Truth(body, masses), names, X_SO)
 
 
 def _of_team(
@@ -165,8 +162,7 @@ def _from_log(
             f"{log} leaves much more than the result says: was it made of another log, or a tool taken away? "
             "Give its result with --tool."
         )
-    residuals = None if rows.time is None else Residuals(rows.time, left[:, 3:], left[:, :3], rows.still)
-    return recording.object_pose, residuals
+    return recording.object_pose, Residuals.of(rows, left)
 
 
 def _scene(

@@ -9,6 +9,7 @@ import click
 
 from steelyard.cli.console import print_json, require_output, say_if_compiling
 from steelyard.cli.options import HELP, JSON
+from steelyard.findings import counted
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
@@ -70,7 +71,7 @@ def _table(shape: Shape, scan: Path, output: Path | None) -> str:
     from steelyard.cli.table import finding_lines
 
     made, parts, volume = shape.segmentation, shape.parts, shape.solid.mesh.volume
-    count = f"{len(made)} part{'s' * (len(made) != 1)}"
+    count = counted(len(made), "part")
     lines = [
         f"{scan}: {1e6 * volume:.4g} ± {1e6 * shape.solid.volume_std * volume:.2g} cm^3 in {count}",
         "",

@@ -57,8 +57,7 @@ def estimate_table(
 
 def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, str]]:
     """Return the rows name, value ± std, and truth."""
-    body = estimate.parameters
-    values = np.concatenate([[body.mass], body.com, body.inertia_com[np.triu_indices(3)]])
+    values = estimate.parameters.people
     names = ["mass", "com x", "com y", "com z", *INERTIA]
     told = np.abs(values[4:])[np.asarray(estimate.identified[4:])]
     large = bool(told.max(initial=0.0) >= LARGE_INERTIA)

@@ -101,7 +101,7 @@ def build(
         click.echo(
             f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {counted(row['parts'], 'part'):8s}  {row['half']}"
         )
-    say(f"{len(rows)} object folder{'s' * (len(rows) != 1)} in {folder} (seed {seed}, {seconds:.1f} s).")
+    say(f"{counted(len(rows), 'object folder')} in {folder} (seed {seed}, {seconds:.1f} s).")
     if views:
         one = folder / rows[0]["name"]
         say(

@@ -6,6 +6,8 @@ is behind the decimal point, and divides by the box of its own estimated shape, 
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 from numpy.typing import ArrayLike
 
@@ -31,11 +33,4 @@ def score_as_published(found: InertialParameters, true: InertialParameters, edge
     box = check.vectors("edges", edges)
     floored = np.floor(100 * np.abs(found.com - true.com) / box)
     right = bodies.score(found, true, np.stack([np.zeros(3), box]))
-    return Scores(
-        mass_pct=right.mass_pct,
-        com_mm=right.com_mm,
-        com_pct=float(floored.mean()),
-        inertia_pct=right.inertia_pct,
-        riemannian=right.riemannian,
-        consistent=right.consistent,
-    )
+    return replace(right, com_pct=float(floored.mean()))

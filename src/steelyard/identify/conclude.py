@@ -72,7 +72,7 @@ def conclude(
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
     data, noise = problem.scatter, (problem.acceleration, problem.wrench)
-    K = noise_cost.residual_map_of(problem.T, solution.linear)
+    K = problem.residual_map(solution.linear)
     H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
     cost, square = noise_cost.value(K, data, *noise)
     H, rows = nonnegative(H, plain), problem.samples
@@ -84,7 +84,7 @@ def conclude(
     bread, meat = H, white
     if solution.weights is not None:
         bread, _ = normal_equations(problem.T, problem.scatter, solution.weights)
-        meat = max(chi2, 1.0) * problem.fixed_weight_score(K, solution.weights)
+        meat = max(chi2, 1.0) * problem.fixed_weight_score(solution.linear, solution.weights)
     meat = meat if score is None else score
     bread, meat = problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
     covariance = _sandwich(bread, meat, solution.jacobian, solution.prior)

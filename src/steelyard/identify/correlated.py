@@ -55,7 +55,7 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
         variance += squares * (extra - (plain - H))
         floor = LEAST_SHARE * nonnegative(H + extra, plain)
     else:
-        floor = LEAST_SHARE * problem.fixed_weight_score(K, solution.weights)
+        floor = LEAST_SHARE * problem.fixed_weight_score(solution.linear, solution.weights)
         plain = floor
     return np.asarray(floor + nonnegative(variance - floor, plain))
 

@@ -137,6 +137,27 @@ def solved(low: Array, g: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)
+def downhill(gradient: Array, hessian: Array, least: float) -> Array:
+    """Return the Newton step (n,), with negative curvatures turned round (saddle-free) where the Hessian has any.
+
+    Curvatures below `least` count as that.
+    """
+    n = len(gradient)
+    step = np.zeros(n)
+    low, positive = cholesky(hessian, least)
+    if positive:
+        return moved(step, solved(low, gradient), -1.0)
+    values, vectors = eigen(hessian)
+    for k in range(n):
+        along = 0.0
+        for i in range(n):
+            along += vectors[i, k] * gradient[i]
+        for i in range(n):
+            step[i] -= vectors[i, k] * along / max(abs(values[k]), least)
+    return step
+
+
+@numba.njit(cache=True, nogil=True)
 def inverse_of(low: Array) -> Array:
     """Return (L L^T)^-1."""
     n = low.shape[0]

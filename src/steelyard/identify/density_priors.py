@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.dense import cholesky, eigen, inner, moved, solved, times
+from steelyard.identify.dense import cholesky, downhill, eigen, inner, moved, times
 from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import Integers
 
@@ -50,7 +50,7 @@ def mode(
                 break
             share *= 0.5
         y, best, hessian = trial, now, h
-        step = _newton(g, h)
+        step = downhill(g, h, FLATTEST)
         if -inner(g, step) < FALL:
             break
         longest = 1.0
@@ -58,23 +58,6 @@ def mode(
             longest = max(longest, abs(step[k]))
         share = 1 / longest
     return y, best, hessian
-
-
-@numba.njit(cache=True)
-def _newton(gradient: Array, hessian: Array) -> Array:
-    """Return the Newton step, with negative curvatures turned round (saddle-free) where the Hessian has any."""
-    low, positive = cholesky(hessian, FLATTEST)
-    step = np.zeros(len(gradient))
-    if positive:
-        return moved(step, solved(low, gradient), -1.0)
-    values, vectors = eigen(hessian)
-    for k in range(len(values)):
-        along = 0.0
-        for i in range(len(values)):
-            along += vectors[i, k] * gradient[i]
-        for i in range(len(values)):
-            step[i] -= vectors[i, k] * along / max(abs(values[k]), FLATTEST)
-    return step
 
 
 @numba.njit(cache=True)

@@ -40,7 +40,7 @@ class Effective:
         """
         data, noise = (problem.T, problem.scatter), (problem.acceleration, problem.wrench)
         weights = noise_cost.weights_at(linear, problem.T, *noise)
-        H, extra, plain = noise_cost.information(noise_cost.residual_map_of(problem.T, linear), *data, *noise)
+        H, extra, plain = noise_cost.information(problem.residual_map(linear), *data, *noise)
         H = nonnegative(H, plain)
         V = problem.plus_bias_prior(H + extra if score is None else score)
         g = problem.plus_bias_pull(right_side(*data, weights))

@@ -68,10 +68,15 @@ def within_numbers() -> Iterator[None]:
         ) from None
 
 
+def problem_of(moments: Moments, bias: Bias) -> Problem:
+    """Return the problem of a statistic that carries its noise, with what is known of the bias."""
+    return replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
+
+
 @within_numbers()
 def fit_moments(moments: Moments, bias: Bias, solver: Solver, method: str) -> Estimate:
     """Return the estimate from a statistic that carries its noise."""
-    problem = replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
+    problem = problem_of(moments, bias)
     return conclude(problem, solver(problem), method)
 
 
@@ -119,5 +124,5 @@ def _drifting(steady: MotionLog, log: MotionLog, lost: Array) -> MotionLog:
 
 
 def _problem(log: MotionLog, bias: Bias, by_block: bool) -> Problem:
-    problem = replace(Problem.of(Moments.of_log(log, by_block), bias.free), bias_prior=bias.prior)
+    problem = problem_of(Moments.of_log(log, by_block), bias)
     return problem.with_drift(log) if bias.drift else problem

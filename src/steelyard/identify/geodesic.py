@@ -127,7 +127,4 @@ def _units() -> Array:
 def _neutral(linear: Array) -> Array:
     """Return the pseudo-inertia of a 5 cm ball with the mass and centre that least squares found."""
     mass = max(float(linear[0]), 1e-3)
-    centre = np.append(linear[1:4] / mass, 1.0)
-    out = np.outer(centre, centre)
-    out[:3, :3] += NEUTRAL_RADIUS**2 / 5 * np.eye(3)
-    return mass * out
+    return forms.pseudo_inertia_about(mass, linear[1:4] / mass, NEUTRAL_RADIUS**2 / 5 * np.eye(3))

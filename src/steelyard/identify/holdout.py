@@ -55,7 +55,7 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Arra
         "holdout_torque_Nm": torque,
         "blocks": len(numbers),
         "jackknife": _jackknife(phi),
-        "jackknife_people": _jackknife(_people(phi)),
+        "jackknife_people": _jackknife(forms.people(phi)),
     }
 
 
@@ -82,15 +82,6 @@ def _without(
     moved = solution.linear + left(plain) @ gradient / 2
     K = problem.residual_map(moved)
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)
-
-
-def _people(phi: Array) -> Array:
-    """Return mass, com and inertia about the CoM (B, 10) of phi (B, 10)."""
-    com = phi[:, 1:4] / phi[:, :1]
-    outer = com[:, :, None] * com[:, None, :]
-    shift = (com**2).sum(1)[:, None, None] * np.eye(3) - outer
-    central = forms.inertia_matrix(phi) - phi[:, 0, None, None] * shift
-    return np.concatenate([phi[:, :1], com, forms.upper(central)], 1)
 
 
 def _jackknife(refits: Array) -> Array:

@@ -17,6 +17,7 @@ from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.linear import reweighted, solve_scaled
+from steelyard.identify.noise_cost import weight
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog
@@ -74,7 +75,7 @@ def _total(problem: Problem) -> Array:
     T = np.concatenate([problem.T[:10], unit, problem.T[10:]])
     data, noise = np.zeros((len(T), len(T))), np.zeros((11, 11))
     for S, Sa, Sw in zip(problem.scatter, problem.acceleration, problem.wrench, strict=True):
-        W = np.linalg.inv(np.diag(Sw) + (K[:, :6] * Sa) @ K[:, :6].T)
+        W = weight(K, Sa, Sw)
         data += np.einsum("pij,qij->pq", W @ T @ S, T)
         noise[:10, :10] += S[18, 18] * np.einsum("pij,qij->pq", (W @ T[:10, :, :6]) * Sa, T[:10, :, :6])
         noise[10, 10] += S[18, 18] * float(np.diag(W) @ Sw)

@@ -90,11 +90,14 @@ def fitted(H: Array, prior: Array) -> float:
 
 
 @numba.njit(cache=True)
-def inverse_scaled(matrix: Array) -> Array:
-    """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal."""
+def inverse_scaled(matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
+    """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal.
+
+    tolerance  directions with an eigenvalue below this share of the largest are left at zero
+    """
     scaled, scale = unit_diagonal(matrix)
     size, trace = len(scale), 0.0
-    low, positive = cholesky(scaled, RANK_TOLERANCE)
+    low, positive = cholesky(scaled, tolerance)
     if positive:
         out = inverse_of(low)
         for i in range(size):
@@ -102,14 +105,14 @@ def inverse_scaled(matrix: Array) -> Array:
             for j in range(size):
                 out[i, j] *= scale[i] * scale[j]
         # No eigenvalue is below 1 / trace, none above the number of rows.
-        if trace * size * RANK_TOLERANCE < 1.0:
+        if trace * size * tolerance < 1.0:
             return out
     values, vectors = eigen(scaled)
     left, right = np.zeros((size, size)), np.empty((size, size))
     for k in range(size):
         for i in range(size):
             right[i, k] = vectors[i, k] * scale[i]
-            if values[k] > RANK_TOLERANCE * values[-1]:
+            if values[k] > tolerance * values[-1]:
                 left[i, k] = right[i, k] / values[k]
     return product_transposed(left, right)
 

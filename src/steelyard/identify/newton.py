@@ -13,7 +13,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.dense import cholesky, eigen, solved
+from steelyard.identify.dense import downhill
 from steelyard.identify.noise_cost import derivatives, residual_map_of
 
 # Newton converges quadratically: once the cost can fall by no more than this (half squared standard deviations), two
@@ -23,6 +23,8 @@ NEAR = 1e-4
 # Mass and centre of mass have no prior: where nothing shows them, this curvature (of a thirty-fold mass, of 30 m) keeps
 # rounding from driving them off. It is no part of the cost.
 DAMPING = 1e-3
+# Curvatures below this, after scaling, count as this.
+FLATTEST = 1e-9
 # A step that is halved more often moves nothing.
 HALVINGS = 30
 
@@ -192,32 +194,21 @@ def cost_derivatives(
 
 @numba.njit(cache=True)
 def _downhill(gradient: Array, hessian: Array) -> Array:
-    """Return the Newton step, with negative curvatures turned round (saddle-free) where the Hessian has any."""
+    """Return the Newton step (see `dense.downhill`) of coordinates scaled to curvatures of one."""
     size = len(gradient)
-    scale, scaled, g = np.empty(size), np.empty((size, size)), np.empty(size)
+    scale, scaled, slope = np.empty(size), np.empty((size, size)), np.empty(size)
     for i in range(size):
         own = hessian[i, i] + (DAMPING if i == 0 or 7 <= i <= 9 else 0.0)
         scale[i] = 1 / np.sqrt(max(abs(own), 1e-300))
         scaled[i, i] = own * scale[i] * scale[i]
-        g[i] = -scale[i] * gradient[i]
+        slope[i] = scale[i] * gradient[i]
     for i in range(size):
         for j in range(i):
             scaled[i, j] = scaled[j, i] = hessian[i, j] * scale[i] * scale[j]
-    low, positive = cholesky(scaled, 1e-9)
-    if positive:
-        x = solved(low, g)
-    else:
-        values, vectors = eigen(scaled)
-        x = np.zeros(size)
-        for k in range(size):
-            along = 0.0
-            for i in range(size):
-                along += vectors[i, k] * g[i]
-            for i in range(size):
-                x[i] += vectors[i, k] * along / max(abs(values[k]), 1e-9)
+    step = downhill(slope, scaled, FLATTEST)
     for i in range(size):
-        x[i] *= scale[i]
-    return x
+        step[i] *= scale[i]
+    return step
 
 
 def minimise(

@@ -90,12 +90,4 @@ class NoiseAware:
         values, axes = np.linalg.eigh(pseudo[:3, :3] / mass - np.outer(com, com))
         shape = (axes * np.clip(values, SMALLEST**2, LARGEST**2)) @ axes.T
         for s in (shape, self.size**2 * np.eye(3)):
-            yield np.concatenate([forms.log_cholesky(_pseudo(mass, com, s)), linear[10:]])
-
-
-def _pseudo(mass: float, com: Array, shape: Array) -> Array:
-    """Return P (4, 4) of a body with second moment per unit mass `shape` (3, 3) about its centre of mass."""
-    centre = np.append(com, 1.0)
-    out = np.outer(centre, centre)
-    out[:3, :3] += shape
-    return mass * out
+            yield np.concatenate([forms.log_cholesky(forms.pseudo_inertia_about(mass, com, s)), linear[10:]])

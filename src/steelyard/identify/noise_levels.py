@@ -9,8 +9,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.linear import inverse_scaled, loosest, normal_equations, reweighted
-from steelyard.identify.noise_cost import weights_at
-from steelyard.identify.regressor import design, residual_map
+from steelyard.identify.noise_cost import residual_map_of, weights_at
+from steelyard.identify.regressor import design
 from steelyard.identify.rest import RIPPLE
 from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
@@ -27,8 +27,8 @@ LEAST_SHARE = 0.02
 QUIETEST = 0.25
 # A fit takes no larger share than this of what a channel's residuals tell: three poses and a free bias take so much.
 MOST_LOST = 2 / 3
-# Start of the iteration: force in N and torque in N m of an everyday wrist sensor.
-FIRST_GUESS = np.repeat(np.square([0.02, 0.5]), 3)
+# Variances [(N m)^2, N^2] of an everyday wrist sensor with its model errors: where the iteration starts.
+EVERYDAY = np.repeat(np.square([0.02, 0.5]), 3)
 # Of a channel that does not measure.
 DEAF = np.repeat(np.square([1e2, 1e3]), 3)
 SMALLEST = np.repeat(np.square([1e-7, 1e-6]), 3)
@@ -48,7 +48,7 @@ def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
     unknown = np.stack([n.wrench for n in noise]) <= 0
     if not unknown.any():
         return log
-    levels = np.where(unknown, FIRST_GUESS, np.stack([n.wrench for n in noise]))
+    levels = np.where(unknown, EVERYDAY, np.stack([n.wrench for n in noise]))
     trial, resting = _resting(log)
     for _ in range(5):
         trial = replace(trial, noise=_with_wrench(trial.noise or (), levels))
@@ -163,7 +163,7 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
     acceleration = np.stack([noise[c].acceleration for c in moments.noise_class])
     wrench = np.stack([noise[c].wrench for c in moments.noise_class])
     linear = reweighted(T, moments.scatter, acceleration, wrench, 4)
-    K = residual_map(linear[:10], linear[10:16] if with_bias else np.zeros(6))
+    K = residual_map_of(T, linear)
     # Parameters that the data fix take their share of the residual degrees of freedom away.
     lost = _lost(T, moments.scatter, weights_at(linear, T, acceleration, wrench), linear) / (3 * moments.samples)
     lost = np.minimum(lost, MOST_LOST)

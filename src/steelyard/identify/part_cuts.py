@@ -20,8 +20,10 @@ from steelyard.findings import counted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.part_masses import PartMasses
+from steelyard.identify.part_models import mixture
 from steelyard.identify.problem import Problem
 from steelyard.identify.shape_error import MEASURED, ShapeError
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
 from steelyard.parts.material import Material
@@ -108,14 +110,11 @@ class PartCuts:
         best = estimates[int(np.argmax(chosen))]
         if len(estimates) == 1:
             return best
-        vectors = np.stack([e.parameters.vector for e in estimates])
-        mean = chosen @ vectors
-        off = vectors - mean
-        covariance = np.einsum("k,kij->ij", chosen, np.stack([e.covariance for e in estimates]))
+        mean, covariance = mixture(chosen, [e.parameters.vector for e in estimates], [e.covariance for e in estimates])
         return replace(
             best,
-            parameters=type(best.parameters)(mean),
-            covariance=covariance + np.einsum("k,ki,kj->ij", chosen, off, off),
+            parameters=InertialParameters(mean),
+            covariance=covariance,
             notes=(*best.notes, self._said(weight)),
         )
 

@@ -20,7 +20,7 @@ from steelyard.identify.conclude import conclude, widened
 from steelyard.identify.correlated import score_variance
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
-from steelyard.identify.fit import Bias, prepared
+from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.linear import reweighted
 from steelyard.identify.misdrawn import misdrawn
 from steelyard.identify.nearest_body import nearest_body
@@ -114,8 +114,7 @@ class PartMasses:
 
     def problem(self, moments: Moments) -> Problem:
         """Return the problem of a statistic that carries its noise."""
-        bias = Bias.of(self.bias)
-        return replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
+        return problem_of(moments, Bias.of(self.bias))
 
     def _start(self, problem: Problem) -> Array:
         """Return the linear parameters (p,) of ten free numbers: the first weights come from them."""

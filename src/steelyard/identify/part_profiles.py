@@ -22,7 +22,6 @@ POINTS = 150
 FEATURES = 9
 # Points this few, or this much out of shape, do not stand for a part.
 FEWEST_POINTS, OUT_OF_SHAPE = 20, 4.0
-_PAIRS = ((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +71,7 @@ class Profile:
 
 def _features(place: Array, weight: Array) -> Array:
     """Return position and its products (N, 9), of mean zero, uncorrelated with what comes before, of unit size."""
-    columns = [place[:, k] for k in range(3)] + [place[:, i] * place[:, j] for i, j in _PAIRS]
+    columns = [place[:, k] for k in range(3)] + [place[:, i] * place[:, j] for i, j in forms.UPPER]
     raw = np.stack(columns, 1)
     raw -= weight @ raw
     linear = raw[:, :3]

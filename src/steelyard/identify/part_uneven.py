@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.identify.effective import Effective
 from steelyard.identify.part_findings import misfit_limit
 from steelyard.identify.part_gradients import Freed, Search, freed, total
-from steelyard.identify.part_models import Masses
+from steelyard.identify.part_models import Masses, mixture
 from steelyard.identify.part_profiles import Profile
 from steelyard.parts.parts import Parts
 
@@ -47,18 +47,11 @@ def uneven(data: Effective, parts: Parts) -> Uneven | None:
         return None
     models = [search.answer(fit) for fit in fits]
     weight = np.exp(np.array([model.evidence for model in models]) - total(fits))
-    vector, covariance = _average(weight, [m.vector for m in models], [m.covariance for m in models])
+    vector, covariance = mixture(weight, [m.vector for m in models], [m.covariance for m in models])
     if data.misfit(vector) > misfit_limit(data, 1):
         return None
-    masses = Masses(*_average(weight, [m.masses.mean for m in models], [m.masses.covariance for m in models]))
+    masses = Masses(*mixture(weight, [m.masses.mean for m in models], [m.masses.covariance for m in models]))
     return Uneven(vector, covariance, masses, _message(parts, search, models, weight))
-
-
-def _average(weight: Array, means: list[Array], covariances: list[Array]) -> tuple[Array, Array]:
-    """Return mean (n,) and covariance (n, n) of a mixture."""
-    mean = weight @ np.stack(means)
-    off = np.stack(means) - mean
-    return mean, np.einsum("k,kij->ij", weight, np.stack(covariances)) + np.einsum("k,ki,kj->ij", weight, off, off)
 
 
 def _message(parts: Parts, search: Search, models: list[Freed], weight: Array) -> str:

@@ -18,6 +18,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.linear import unit_diagonal
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
@@ -55,8 +56,8 @@ class PointMasses:
         """Return the best masses m >= 0: |R (B m - phi)|^2 with R^T R the weighted normal matrix of phi."""
         weights = problem.wrench_weights
         H, g = problem.normal_equations(weights)
-        scale = 1 / np.sqrt(np.maximum(np.diag(H), np.finfo(float).tiny))
-        values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
+        scaled, scale = unit_diagonal(H)
+        values, vectors = np.linalg.eigh(scaled)
         kept = values > NEGLIGIBLE * values[-1]
         root = np.sqrt(values[kept])[:, None] * vectors[:, kept].T
         target = (vectors[:, kept].T @ (scale * g)) / np.sqrt(values[kept])

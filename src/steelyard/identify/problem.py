@@ -8,15 +8,14 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.findings import counted
 from steelyard.identify.linear import normal_equations, solve_scaled
-from steelyard.identify.noise_cost import weight
-from steelyard.identify.noise_levels import DEAF
+from steelyard.identify.noise_cost import residual_map_of, weights_at
+from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.identify.regressor import design
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 
-# Variances [(N m)^2, N^2] of an everyday wrist sensor with its model errors.
-EVERYDAY = np.repeat(np.square([0.02, 0.5]), 3)
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
 ADD_POSES = (
@@ -115,9 +114,7 @@ class Problem:
 
     def residual_map(self, linear: Array) -> Array:
         """Return K (6, Z), so that the wrench residual of a row is K z."""
-        K = np.tensordot(linear, self.T, axes=1)
-        K[:, 12:18] += np.eye(6)
-        return np.asarray(K)
+        return np.asarray(residual_map_of(self.T, linear))
 
     def plus_bias_prior(self, matrix: Array) -> Array:
         """Return a matrix (p, p) of information with what is known of the bias added."""
@@ -135,13 +132,12 @@ class Problem:
         out[10:16] += self.bias_prior.precision @ self.bias_prior.mean
         return out
 
-    def noise_weights(self, K: Array) -> Array:
-        """Return W (C, 6, 6), the inverse of each class's noise at the residual map K (6, Z)."""
-        return np.stack([weight(K, a, w) for a, w in zip(self.acceleration, self.wrench, strict=True)])
+    def fixed_weight_score(self, linear: Array, weights: Array) -> Array:
+        """Return the variance (p, p) of the score of rows weighted by `weights` (C, 6, 6) under white noise.
 
-    def fixed_weight_score(self, K: Array, weights: Array) -> Array:
-        """Return the variance (p, p) of the score of rows weighted by `weights` (C, 6, 6) under white noise."""
-        noise = np.linalg.inv(self.noise_weights(K))
+        linear  (p,) the parameters, which carry the noise of the acceleration into the rows
+        """
+        noise = np.linalg.inv(weights_at(linear, self.T, self.acceleration, self.wrench))
         return np.asarray(normal_equations(self.T, self.scatter, weights @ noise @ weights)[0])
 
     def normal_equations(self, weights: Array) -> tuple[Array, Array]:
@@ -169,7 +165,7 @@ def require_rows(rows: int) -> None:
     """Raise CannotAnswer where there are too few rows for anything."""
     if rows < FEWEST_ROWS:
         raise CannotAnswer(
-            f"The log has {rows} usable row{'s' * (rows != 1)}, which cannot tell a weight from a bias. {ADD_POSES}."
+            f"The log has {counted(rows, 'usable row')}, which cannot tell a weight from a bias. {ADD_POSES}."
         )
 
 

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.inertia import forms
-from steelyard.spatial import cross_matrix
+from steelyard.spatial import axial_vector, cross_matrix
 
 
 def _omega_squared(index: int) -> Array:
@@ -35,12 +35,7 @@ def _motion_map(phi: Array) -> Array:
     for k in range(6):
         outer = _omega_squared(k)
         # omega x (I omega) = the axial vector of I omega omega^T: eps_ijk (omega omega^T I)_jk.
-        product = outer @ inertia
-        out[:3, 6 + k] = [
-            product[1, 2] - product[2, 1],
-            product[2, 0] - product[0, 2],
-            product[0, 1] - product[1, 0],
-        ]
+        out[:3, 6 + k] = axial_vector(inertia @ outer)
         out[3:, 6 + k] = (outer - np.trace(outer) * np.eye(3)) @ h
     return out
 
@@ -68,8 +63,3 @@ def design(with_bias: bool) -> Array:
         out[10:, :, 18] = -np.eye(6)
     out.flags.writeable = False
     return out
-
-
-def residual_map(phi: Array, bias: Array) -> Array:
-    """Return K (6, 19), so that the wrench residual of a sample is K z."""
-    return np.concatenate([-motion_map(phi), np.eye(6), -bias[:, None]], axis=1)

@@ -8,8 +8,9 @@ import numpy as np
 from scipy.special import gammaincc
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import natural_sizes
+from steelyard.identify.linear import unit_diagonal
 from steelyard.inertia import InertialParameters, forms
 
 # A result is exact to this share of mass, radius of gyration and inertia: what is typed from a data sheet is rounded.
@@ -46,7 +47,8 @@ def compare(
 
     `known` (10,) says which of mass, com, inertia about the CoM both results identify. `any_grasp` compares only what
     does not depend on how the object is held: mass and principal moments.
-    Raises CannotAnswer where nothing is left to compare.
+    Raises CannotAnswer where nothing is left to compare, BadValue for a body of mass zero, which has no centre, and for
+    covariances with a negative variance.
     """
     first, first_cov, names = _quantities(one, one_covariance, any_grasp)
     second, second_cov, _ = _quantities(other, other_covariance, any_grasp)
@@ -57,8 +59,10 @@ def compare(
         raise CannotAnswer("Neither mass nor inertia is identified in both results; there is nothing to compare.")
     gap = (second - first)[chosen]
     covariance = (first_cov + second_cov)[np.ix_(chosen, chosen)]
-    scale = 1 / np.sqrt(np.diag(covariance))
-    values, axes = np.linalg.eigh(covariance * np.outer(scale, scale))
+    if not (np.diag(covariance) > 0).all():
+        raise BadValue("the covariances of two results must have no negative variance; these have.")
+    scaled, scale = unit_diagonal(covariance)
+    values, axes = np.linalg.eigh(scaled)
     chi2 = float(((axes.T @ (scale * gap)) ** 2 / np.maximum(values, SHARPEST)).sum())
     shown = tuple((n, float(g), float(s)) for n, g, s in zip(np.array(names)[chosen], gap, 1 / scale, strict=True))
     return Comparison(float(gammaincc(len(gap) / 2, chi2 / 2)), chi2, len(gap), shown)
@@ -66,15 +70,14 @@ def compare(
 
 def _quantities(body: InertialParameters, covariance: Array, any_grasp: bool) -> tuple[Array, Array, tuple[str, ...]]:
     """Return what is compared, its covariance and its names."""
+    if body.mass == 0:
+        raise BadValue("a body of mass zero has no centre of mass; there is nothing to compare.")
     J = forms.people_jacobian(body.vector)
-    values = np.concatenate([[body.mass], body.com, forms.upper(body.inertia_com)])
     people = J @ covariance @ J.T + np.diag(np.square(EXACT * natural_sizes(body.vector.copy())))
     if not any_grasp:
-        return values, people, NAMES
+        return body.people, people, NAMES
     moments, axes = np.linalg.eigh(body.inertia_com)
     slopes = np.zeros((4, 10))
-    slopes[0, 0] = 1
-    for k, (i, j) in enumerate(forms.UPPER):
-        slopes[1:, 4 + k] = axes[i] * axes[j] * (1 if i == j else 2)
+    slopes[0, 0], slopes[1:, 4:] = 1, forms.principal_slopes(axes)
     names = ("mass", "principal moment 1", "principal moment 2", "principal moment 3")
     return np.concatenate([[body.mass], moments]), slopes @ people @ slopes.T, names

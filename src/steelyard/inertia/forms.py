@@ -42,6 +42,11 @@ def inertia_com(phi: Array) -> Array:
     return np.asarray(inertia_matrix(phi) - phi[..., 0, None, None] * point_inertia(com(phi)))
 
 
+def people(phi: Array) -> Array:
+    """Return mass, centre of mass and inertia about it xx xy xz yy yz zz (..., 10); NaN where the mass is zero."""
+    return np.concatenate([phi[..., :1], com(phi), upper(inertia_com(phi))], axis=-1)
+
+
 def pseudo_inertia(phi: Array) -> Array:
     """Return P = [[Sigma, h], [h^T, m]] (..., 4, 4), Sigma = tr(I)/2 1 - I the second moment of mass.
 
@@ -61,6 +66,14 @@ def from_pseudo_inertia(pseudo: Array) -> Array:
     sigma = pseudo[..., :3, :3]
     inertia = np.trace(sigma, axis1=-2, axis2=-1)[..., None, None] * np.eye(3) - sigma
     return np.concatenate([pseudo[..., 3, 3, None], pseudo[..., :3, 3], upper(inertia)], axis=-1)
+
+
+def pseudo_inertia_about(mass: float, com: Array, second: Array) -> Array:
+    """Return P (4, 4) of a body with second moment per unit mass `second` (3, 3) about its centre of mass (3,)."""
+    centre = np.append(com, 1.0)
+    out = np.outer(centre, centre)
+    out[:3, :3] += second
+    return mass * out
 
 
 def log_cholesky(pseudo: Array) -> Array:
@@ -141,6 +154,11 @@ def com_jacobian(phi: Array) -> Array:
     out[..., 3:, 0] = 0.5 * np.einsum("...ka,...a->...k", slope, h) / m**2
     out[..., 3:, 1:4] = -slope / m[..., None]
     return out
+
+
+def principal_slopes(axes: Array) -> Array:
+    """Return d (principal moments) / d (inertia xx xy xz yy yz zz), (3, 6), of principal axes (3, 3) in columns."""
+    return np.asarray(upper(axes.T[:, :, None] * axes.T[:, None, :]) * [1, 2, 2, 1, 2, 1])
 
 
 def people_jacobian(phi: Array) -> Array:

@@ -98,7 +98,7 @@ class InertialParameters:
     @property
     def people(self) -> Array:
         """The numbers people read (..., 10): mass [kg], com [m], inertia about it xx xy xz yy yz zz [kg m^2]."""
-        return np.concatenate([self.mass[..., None], self.com, forms.upper(self.inertia_com)], axis=-1)
+        return forms.people(self.vector)
 
     @property
     def pseudo_inertia(self) -> Array:

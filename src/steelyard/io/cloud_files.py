@@ -8,8 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile
 from steelyard.io.array_table import ArrayTable, array_shapes, numeric_array
+from steelyard.io.in_file import in_file
 from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
 from steelyard.shape.cloud import Cloud
@@ -99,13 +100,10 @@ def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any
     if holes.all():
         what = f"all {len(xyz)} points are NaN or infinite" if len(xyz) else "the file holds no points"
         raise BadFile(f"{path}: {what}. Write the cloud again, or scan the object again.")
-    try:
-        whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
-        if holes.any():
-            xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
-        return Cloud(xyz, *whole, left_out=int(holes.sum()))
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
+    whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
+    if holes.any():
+        xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
+    return in_file(path, lambda: Cloud(xyz, *whole, left_out=int(holes.sum())))
 
 
 def write_cloud(cloud: Cloud, path: Path | str) -> None:

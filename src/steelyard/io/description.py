@@ -68,17 +68,17 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
             "[robot] is not supported yet: forward kinematics come later. "
             "Give the orientation of the sensor instead, as rotation = { columns = [..], form = .. }."
         )
-    log = _section(top, "log")
+    log = top.section("log")
     log.only("gravity", "wrench", "tool")
     gravity = parse_gravity(log) if "gravity" in log else default_gravity()
-    placed = parse_object_pose(_section(top, "object"))
+    placed = parse_object_pose(top.section("object"))
     streams = _streams(top)
     told = "gravity" in log or any(quantity.name == "gravity" for spec in streams for quantity in spec.quantities)
     return Description(
         streams=streams,
         gravity=gravity,
         wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
-        noise=_noise(_section(top, "noise")),
+        noise=_noise(top.section("noise")),
         tool=log.text("tool"),
         placed=placed,
         notes=() if told else (LEVEL_BASE,),
@@ -97,13 +97,6 @@ def parse_gravity(entry: Entry) -> Array:
 
 def _short(values: Array) -> str:
     return f"[{', '.join(f'{v:g}' for v in values)}]"
-
-
-def _section(top: Entry, key: str) -> Entry:
-    value = top.values.get(key, {})
-    if not isinstance(value, Mapping):
-        raise top.error(f'"{key}" must be a section that starts with [{key}]; got {value!r}.')
-    return Entry(value, f"{top.where}, [{key}]")
 
 
 def _noise(entry: Entry) -> dict[str, float]:

@@ -65,6 +65,13 @@ class Entry:
             raise self.error(f'"{key}" must be a table such as {key} = {{ .. }}; got {value!r}.')
         return Entry(value, f"{self.where}, {key}")
 
+    def section(self, key: str) -> Entry:
+        """Return the section that starts with [key]; an empty one where it is left out."""
+        value = self.values.get(key, {})
+        if not isinstance(value, Mapping):
+            raise self.error(f'"{key}" must be a section that starts with [{key}]; got {value!r}.')
+        return Entry(value, f"{self.where}, [{key}]")
+
     def text(self, key: str, default: str | None = None) -> str | None:
         """Return a string, or the default where it is left out."""
         value = self.values.get(key, default)

@@ -13,7 +13,7 @@ from steelyard.shape.mesh import Colours
 from steelyard.shape.views import Depths
 from steelyard.whole_files import write_bytes
 
-_MOST_PIXELS = 64_000_000
+MOST_PIXELS = 64_000_000
 
 
 def _pillow() -> Any:
@@ -51,9 +51,11 @@ def _opened(path: Path) -> Any:
         image = pillow.open(io.BytesIO(path.read_bytes()), formats=("PNG",))
     except FileNotFoundError:
         raise BadFile(f"{path}: this image is missing.") from None
+    except pillow.DecompressionBombError:
+        raise BadFile(f"{path}: this image has more pixels than any depth camera.") from None
     except (OSError, ValueError, SyntaxError):
         raise BadFile(f"{path}: expected a PNG image; found something else.") from None
-    if image.width * image.height > _MOST_PIXELS:
+    if image.width * image.height > MOST_PIXELS:
         raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than any depth camera has.")
     return image
 

@@ -50,8 +50,8 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
     wrong, a part is open, flat or inside out, or two parts share much volume.
     """
     folder = Path(folder)
-    for name in FILES[: 4 if motion else 2] + FILES[3:]:
-        if not (folder / name).is_file():
+    for name in FILES:
+        if (motion or name != "motion.npz") and not (folder / name).is_file():
             raise BadFile(f"{folder}: {name} is missing. An object folder has the files {', '.join(FILES)}.")
     mesh = read_mesh(folder / "mesh.ply")
     facts = read_truth(folder / "truth.json")
@@ -59,7 +59,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
     parts: Parts = in_file(folder / "mesh.ply", lambda: parts_of_mesh(mesh, solids))
     overlapping: Finding | None = in_file(folder / "mesh.ply", lambda: overlap_finding(mesh, solids))
     cloud = _cloud(folder / "points.npz", mesh)
-    X_OS = in_file(folder / "truth.json", lambda: Pose.from_matrix(facts["T_mesh_from_grasp"]))
+    truth, X_SO = truth_in_sensor(folder / "truth.json", facts)
     unseen = unseen_finding(parts, cloud)
     return KnownObject(
         name=str(facts.get("slug", folder.resolve().name)),
@@ -67,8 +67,8 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
         parts=parts,
         part_masses=_masses(folder / "truth.json", facts, parts),
         part_materials=tuple(str(row.get("material_fitted") or "") for row in _rows(facts, parts)),
-        truth=in_file(folder / "truth.json", lambda: _whole(facts)).in_frame(X_OS.inverse()),
-        X_SO=X_OS.inverse(),
+        truth=truth,
+        X_SO=X_SO,
         cloud=cloud,
         box=np.asarray(facts["reference_extents_sensor_m"], float),
         track=read_track(folder / "motion.npz") if motion else None,
@@ -112,10 +112,15 @@ def _require_parts(path: Path, rows: Any) -> None:
             raise BadFile(f"{path}: part {row.get('label')} has a volume of {volume:g} m^3; it must be above zero.")
 
 
-def _whole(facts: dict[str, Any]) -> InertialParameters:
-    """Return the object in its mesh frame; raises BadValue where no rigid body is like that."""
-    whole = InertialParameters.from_com(facts["mass_kg"], facts["com_mesh_m"], facts["inertia_com_mesh_kgm2"])
-    return whole.require_consistent()
+def truth_in_sensor(path: Path, facts: dict[str, Any]) -> tuple[InertialParameters, Pose]:
+    """Return the true object in S and the pose X_SO of its mesh; raises BadFile where no rigid body is like that."""
+
+    def made() -> tuple[InertialParameters, Pose]:
+        X_SO = Pose.from_matrix(facts["T_mesh_from_grasp"]).inverse()
+        whole = InertialParameters.from_com(facts["mass_kg"], facts["com_mesh_m"], facts["inertia_com_mesh_kgm2"])
+        return whole.require_consistent().in_frame(X_SO), X_SO
+
+    return in_file(path, made)
 
 
 def _rows(facts: dict[str, Any], parts: Parts) -> list[dict[str, Any]]:

@@ -60,7 +60,8 @@ class SavedParts:
         labels = np.array(self.labels, np.int64)
         if labels.shape != (len(self.solid),):
             raise BadValue(f"each of the {len(self.solid)} cells needs one label; got {labels.shape}.")
-        if not np.array_equal(np.unique(labels), np.arange(labels.max() + 1)):
+        used = np.unique(labels)
+        if not np.array_equal(used, np.arange(len(used))):
             raise BadValue("labels must be 0, 1, 2 ... with at least one cell each; these leave numbers out.")
         labels.flags.writeable = False
         object.__setattr__(self, "labels", labels)
@@ -179,7 +180,7 @@ def read_parts(path: Path | str) -> SavedParts:
         tree = None
         if all(name in arrays for name in _TREE):
             tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
-        names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"]) if "names" in arrays else ()
+        names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"].ravel()) if "names" in arrays else ()
         unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
         saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)

@@ -15,6 +15,7 @@ _TYPES = {
     ("F", "4"): "<f4", ("F", "8"): "<f8", ("U", "1"): "u1", ("U", "2"): "<u2", ("U", "4"): "<u4", ("U", "8"): "<u8",
     ("I", "1"): "i1", ("I", "2"): "<i2", ("I", "4"): "<i4", ("I", "8"): "<i8",
 }  # fmt: skip
+_WIDEST = 65_536  # numbers in one field of a point
 
 
 def read_pcd(path: Path) -> dict[str, Any]:
@@ -52,10 +53,11 @@ def _layout(path: Path, header: dict[str, list[str]]) -> tuple[np.dtype[Any], in
         types = [_TYPES[kind] for kind in kinds]
     except (KeyError, IndexError, ValueError):
         raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.") from None
-    if not names or len({len(names), len(types), len(widths)}) > 1 or points < 0 or min(widths) < 1:
+    sound = points >= 0 and all(1 <= width <= _WIDEST for width in widths)
+    if not names or len({len(names), len(types), len(widths)}) > 1 or not sound:
         raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.")
-    # padding fields are all called "_": number them
-    named = [name if name != "_" and names.count(name) == 1 else f"_{k}" for k, name in enumerate(names)]
+    # padding fields are all called "_", and are left out like all that begin so: number them
+    named = [name if name[0] != "_" and names.count(name) == 1 else f"_{k}" for k, name in enumerate(names)]
     fields: list[Any] = [
         (name, kind) if width == 1 else (name, kind, (width,))
         for name, kind, width in zip(named, types, widths, strict=True)

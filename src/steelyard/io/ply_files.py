@@ -8,7 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile, BadValue
+from steelyard.errors import BadFile
+from steelyard.io.in_file import in_file
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
 
@@ -21,6 +22,7 @@ _TYPES = {
 }  # fmt: skip
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_indices", "vertex_index")
+_MOST_DIGITS = 15  # of a number of rows
 
 
 @dataclass(frozen=True)
@@ -64,11 +66,13 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
         match line.split():
             case ["format", kind, _]:
                 order = _ORDERS.get(kind)
-            case ["element", name, count] if count.isdigit():
+            case ["element", name, count] if count.isdecimal() and len(count) <= _MOST_DIGITS:
                 elements.append(_Element(name, int(count), ()))
             case ["property", kind, name] if kind in _TYPES and elements:
                 elements[-1] = _with(elements[-1], (name, _TYPES[kind], ""))
             case ["property", "list", length, kind, name] if {length, kind} <= set(_TYPES) and elements:
+                if _TYPES[length][0] == "f":
+                    raise BadFile(f'{path}: the lists "{name}" count in {length}; lengths are whole numbers.')
                 elements[-1] = _with(elements[-1], (name, _TYPES[kind], _TYPES[length]))
             case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
                 pass
@@ -76,7 +80,16 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
                 raise BadFile(f'{path}: the PLY header has a line that means nothing: "{line.strip()[:60]}".')
     if order is None:
         raise BadFile(f"{path}: the PLY header names no format among {', '.join(_ORDERS)}.")
-    return order, elements, end + 1
+    _require_names_apart(path, elements)
+    return order, [element for element in elements if element.fields], end + 1
+
+
+def _require_names_apart(path: Path, elements: list[_Element]) -> None:
+    """Raise BadFile where two properties of an element have one name: which of them is meant?"""
+    for element in elements:
+        names = [name for name, _, _ in element.fields]
+        if twice := [name for name in names if names.count(name) > 1]:
+            raise BadFile(f'{path}: element "{element.name}" has {names.count(twice[0])} properties "{twice[0]}".')
 
 
 def _with(element: _Element, field: tuple[str, str, str]) -> _Element:
@@ -90,17 +103,21 @@ def _binary(path: Path, element: _Element, data: bytes, order: str) -> tuple[Any
     for name, kind, length in element.fields:
         if length:
             size = np.dtype(length).itemsize
-            k = int(np.frombuffer(data[place : place + size].ljust(size, b"\0"), order + length)[0])
-            fields += [(f"{name}#", order + length), (name, order + kind, (k,))]
+            first = data[place : place + size] if element.count else b""
+            k = max(int(np.frombuffer(first.ljust(size, b"\0"), order + length)[0]), 0)
+            if k * np.dtype(kind).itemsize > len(data):
+                raise _short(path, element)
+            # No name in a header has a blank.
+            fields += [(f"{name} #", order + length), (name, order + kind, (k,))]
         else:
             fields.append((name, order + kind))
         place = np.dtype(fields).itemsize
     used = np.dtype(fields).itemsize * element.count
     if used > len(data):
-        raise BadFile(f'{path}: the file ends inside element "{element.name}" ({element.count} announced).')
+        raise _short(path, element)
     table = np.frombuffer(data[:used], np.dtype(fields))
     for name, _, length in element.fields:
-        if length and element.count and (table[f"{name}#"] != table[f"{name}#"][0]).any():
+        if length and element.count and (table[f"{name} #"] != table[name].shape[1]).any():
             raise _ragged(path, name)
     return table, used
 
@@ -111,14 +128,14 @@ def _ascii(path: Path, element: _Element, words: list[bytes]) -> tuple[dict[str,
     width = 0
     for name, kind, length in element.fields:
         try:
-            k = int(words[width]) if length and element.count else 1
+            k = max(int(words[width]), 0) if length and element.count else 1
         except (IndexError, ValueError):
             k = 1
         slots.append((name, kind, width + bool(length), k if length else 0))
         width += k + bool(length)
     used = width * element.count
     if used > len(words):
-        raise BadFile(f'{path}: the file ends inside element "{element.name}" ({element.count} announced).')
+        raise _short(path, element)
     try:
         table = np.array(words[:used], dtype="S").astype(np.float64).reshape(element.count, width)
     except ValueError:
@@ -129,6 +146,10 @@ def _ascii(path: Path, element: _Element, words: list[bytes]) -> tuple[dict[str,
             raise _ragged(path, name)
         out[name] = (table[:, first : first + k] if length else table[:, first]).astype(kind)
     return out, used
+
+
+def _short(path: Path, element: _Element) -> BadFile:
+    return BadFile(f'{path}: the file ends inside element "{element.name}" ({element.count} announced).')
 
 
 def _ragged(path: Path, name: str) -> BadFile:
@@ -152,15 +173,9 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     if len(indices) and indices.shape[1] != 3:
         raise BadFile(f"{path}: faces have {indices.shape[1]} corners. Save every face as a triangle.")
     colours = [face[name] for name in ("red", "green", "blue") if name in face]
-    try:
-        return TriangleMesh(
-            np.stack([vertex[axis] for axis in "xyz"], axis=1),
-            indices,
-            face.get("part", np.zeros(len(indices))),
-            np.stack(colours, axis=1) if len(colours) == 3 else None,
-        )
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
+    xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1)
+    rgb = np.stack(colours, axis=1) if len(colours) == 3 else None
+    return in_file(path, lambda: TriangleMesh(xyz, indices, face.get("part", np.zeros(len(indices))), rgb))
 
 
 def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> None:

@@ -98,7 +98,7 @@ def _described(stream: Stream) -> str:
 
 
 def _csv(stream: Stream) -> str:
-    """Return the table with a header, nine significant figures."""
+    """Return the table with a header: nine significant figures, twelve of stamps, which may be large and close."""
     names, columns = [], []
     if stream.time is not None:
         names.append("t")
@@ -107,7 +107,8 @@ def _csv(stream: Stream) -> str:
         names += _COLUMNS[quantity][0]
         columns.append(_cells(quantity, values))
     rows = np.concatenate(columns, axis=1)
-    body = "\n".join(",".join(f"{v:.9g}" for v in row) for row in rows)
+    digits = [12 if name == "t" else 9 for name in names]
+    body = "\n".join(",".join(f"{v:.{k}g}" for v, k in zip(row, digits, strict=True)) for row in rows)
     return ",".join(names) + "\n" + body + "\n"
 
 

@@ -8,11 +8,12 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadFile, BadInput
+from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.io.documents import load_json
+from steelyard.io.in_file import in_file
 from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
 from steelyard.io.team_results import team_of
 
@@ -82,10 +83,7 @@ def _body(path: Path, values: dict[str, Any]) -> InertialParameters:
             return InertialParameters(_numbers(path, values, "parameters", (10,)))
         return InertialParameters.from_com(mass, com, np.zeros((3, 3)))
     inertia = _numbers(path, values, "inertia_com_kgm2", (3, 3))
-    try:
-        return InertialParameters.from_com(mass, com, inertia)
-    except BadInput as error:
-        raise BadFile(f"{path}: {error}") from None
+    return in_file(path, lambda: InertialParameters.from_com(mass, com, inertia))
 
 
 def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:

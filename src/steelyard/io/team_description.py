@@ -75,10 +75,7 @@ def parse_team_description(values: Mapping[str, Any], name: str) -> TeamDescript
     if "log" in top or "stream" in top:
         raise top.error("[log] and [[stream]] make this the log of one robot. Use it with: steelyard identify")
     top.only("team", "robot")
-    section = top.values.get("team", {})
-    if not isinstance(section, Mapping):
-        raise top.error(f'"team" must be a section that starts with [team]; got {section!r}.')
-    team = Entry(section, f"{name}, [team]")
+    team = top.section("team")
     team.only("gravity", "reference", "wrench")
     rows = _tables(top, "robot", "[[robot]]")
     if not rows:

@@ -13,7 +13,7 @@ import numpy as np
 from steelyard.errors import BadFile
 from steelyard.io.documents import load_json
 from steelyard.io.entries import is_number
-from steelyard.io.images import read_colour, read_depth, require_images, write_image
+from steelyard.io.images import MOST_PIXELS, read_colour, read_depth, require_images, write_image
 from steelyard.io.in_file import in_file
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
@@ -73,6 +73,10 @@ def _camera(path: Path) -> dict[str, float]:
     camera = {key: _number(path, key, values[key]) for key in _CAMERA}
     if any(camera[key] != int(camera[key]) for key in ("width", "height")):
         raise BadFile(f"{path}: width and height must be whole numbers of pixels.")
+    if camera["width"] * camera["height"] > MOST_PIXELS:
+        raise BadFile(
+            f"{path}: {camera['width']:.0f} x {camera['height']:.0f} pixels are more than any depth camera has."
+        )
     if not 0 < camera["depth_unit_m"] < 1:
         raise BadFile(
             f'{path}: "depth_unit_m" must be metres per step, 0.001 for millimetres; got {camera["depth_unit_m"]:g}.'

@@ -263,7 +263,7 @@ def _first_scales(question: Question, layout: _Layout) -> Array:
     scales = robust_std(residual)
     if force is not None and motion.gravity is not None:
         steady = [np.ones((len(force), 1)), motion.gravity, *turning(motion)]
-        scales = np.append(scales, 1.4826 * np.median(np.abs(free_residual(force, steady)), axis=0).mean() * np.ones(3))
+        scales = np.append(scales, np.full(3, robust_std(free_residual(force, steady)).mean()))
     sizes = wrench.std(0)
     if len(scales) > 6 and force is not None:
         sizes = np.append(sizes, np.full(3, force.std()))

@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.check import Integers as Integers
 from steelyard.check import Mask as Mask
 from steelyard.errors import BadValue
+from steelyard.inertia import forms
 from steelyard.spatial import Pose, cross_matrix, lever_acceleration
 
 
@@ -55,6 +56,9 @@ class MotionLog:
                           -1 = none, the default
     noise_class           (N,) index into `noise`; 0 by default
     noise                 one Noise per class; None = not known yet
+    dead                  (6,) channels [tau, f] that do not measure; none by default
+
+    Raises BadValue for numbers that are not finite, shapes or lengths that do not agree, and classes without a Noise.
     """
 
     wrench: Array
@@ -71,28 +75,42 @@ class MotionLog:
     dead: Mask = None  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
-        rows = len(self.wrench)
         object.__setattr__(self, "wrench", check.vectors("wrench", self.wrench, 6))
+        rows = len(self.wrench)
         for name in ("gravity", "acceleration", "angular_velocity", "angular_acceleration"):
             object.__setattr__(self, name, check.vectors(name, getattr(self, name), 3))
         if self.time is not None:
             object.__setattr__(self, "time", check.vectors("time", self.time, rows))
-        defaults = {"still": (np.bool_, False), "pose": (np.int64, -1), "noise_class": (np.int64, 0)}
-        for name, (kind, default) in defaults.items():
+        defaults: dict[str, np.ndarray[Any, Any]] = {
+            "still": np.zeros(rows, np.bool_), "pose": np.full(rows, -1, np.int64),
+            "noise_class": np.zeros(rows, np.int64), "dead": np.zeros(6, np.bool_),
+        }  # fmt: skip
+        for name, default in defaults.items():
             given = getattr(self, name)
-            value: np.ndarray[Any, Any] = np.full(rows, default, kind) if given is None else np.asarray(given, kind)
+            value = default if given is None else np.array(given, default.dtype)
             value.flags.writeable = False
             object.__setattr__(self, name, value)
-        dead: Mask = np.zeros(6, np.bool_) if self.dead is None else np.array(self.dead, np.bool_)
-        dead.flags.writeable = False
-        object.__setattr__(self, "dead", dead)
         self._check_lengths(rows)
+        self._check_numbers()
 
     def _check_lengths(self, rows: int) -> None:
         for name in self._row_fields():
             value = getattr(self, name)
             if value is not None and len(value) != rows:
                 raise BadValue(f"{name} has {len(value)} rows, wrench has {rows}; they must agree.")
+
+    def _check_numbers(self) -> None:
+        """Raise BadValue where channels are not six, or a row belongs to no class of noise or no pose."""
+        if self.dead.shape != (6,):
+            raise BadValue(f"dead must have shape (6,), one for each channel; got {self.dead.shape}.")
+        if not len(self):
+            return
+        least, most = int(self.noise_class.min()), int(self.noise_class.max())
+        if least < 0 or (self.noise is not None and most >= len(self.noise)):
+            classes = "" if self.noise is None else f" below {len(self.noise)}, one Noise each"
+            raise BadValue(f"noise_class must be numbers from 0 on{classes}; got {least} to {most}.")
+        if (self.pose < -1).any():
+            raise BadValue(f"pose must be -1 or a number from 0 on; got {int(self.pose.min())}.")
 
     @staticmethod
     def _row_fields() -> tuple[str, ...]:
@@ -145,7 +163,7 @@ class MotionLog:
     def predicted(self, phi: Array) -> Array:
         """Return the wrench (N, 6) that a body phi (10,) needs for this motion, without bias."""
         m, h = phi[0], phi[1:4]
-        inertia = phi[[[4, 5, 6], [5, 7, 8], [6, 8, 9]]]
+        inertia = forms.inertia_matrix(phi)
         a = self.acceleration - self.gravity
         omega, alpha = self.angular_velocity, self.angular_acceleration
         H = cross_matrix(h)

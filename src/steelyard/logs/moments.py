@@ -20,15 +20,7 @@ from steelyard.errors import BadValue
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 
 SIZE = 19
-ALPHA, ACCEL, OMEGA2, TORQUE, FORCE, ONE = (
-    slice(0, 3),
-    slice(3, 6),
-    slice(6, 12),
-    slice(12, 15),
-    slice(15, 18),
-    18,
-)
-MOTION, WRENCH = slice(0, 12), slice(12, 18)
+MOTION, ONE = slice(0, 12), 18
 
 _CHUNK = 128
 # Runs of rows of one group shorter than this, on average, are sorted before the pass.
@@ -119,12 +111,25 @@ class Moments:
         return cls(out, groups[:, 0], groups[:, 1], groups[:, 2].astype(np.bool_), log.noise)
 
     @classmethod
-    def total(cls, parts: Iterable[Moments]) -> Moments:
-        """Return the statistic of several logs of one body taken together."""
-        return sum_of(list(parts))
+    def total(cls, logs: Iterable[Moments]) -> Moments:
+        """Return the statistic of several logs of one body: groups of one class, stillness and block are added.
+
+        Raises BadValue for none, and where the noise of the classes differs.
+        """
+        parts = list(logs)
+        if not parts:
+            raise BadValue("There must be at least one statistic to add; got none.")
+        noise = parts[0].noise
+        if any(_differ(noise, p.noise) for p in parts[1:]):
+            raise BadValue("Statistics can be added only where their noise classes are the same; these differ.")
+        keys = np.concatenate([np.stack([p.noise_class, p.still, p.block], 1).astype(np.int64) for p in parts])
+        groups, label = np.unique(keys, axis=0, return_inverse=True)
+        out = np.zeros((len(groups), SIZE, SIZE))
+        np.add.at(out, label, np.concatenate([p.scatter for p in parts]))
+        return cls(out, groups[:, 0], groups[:, 2], groups[:, 1].astype(np.bool_), noise)
 
     def __add__(self, other: Moments) -> Moments:
-        return sum_of([self, other])
+        return Moments.total([self, other])
 
     def scaled(self, factor: float) -> Moments:
         """Return the statistic with every row weighted by `factor` (forgetting)."""
@@ -191,20 +196,6 @@ def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:
     rank[present] = np.arange(len(present))
     kind, position = np.divmod(present, blocks)
     return np.stack([kind // 2, position - 1, kind % 2], 1), rank[key]
-
-
-def sum_of(parts: list[Moments]) -> Moments:
-    """Return the statistic of several logs; groups with the same class, stillness and block are added."""
-    if not parts:
-        raise BadValue("There must be at least one statistic to add; got none.")
-    noise = parts[0].noise
-    if any(_differ(noise, p.noise) for p in parts[1:]):
-        raise BadValue("Statistics can be added only where their noise classes are the same; these differ.")
-    keys = np.concatenate([np.stack([p.noise_class, p.still, p.block], 1).astype(np.int64) for p in parts])
-    groups, label = np.unique(keys, axis=0, return_inverse=True)
-    out = np.zeros((len(groups), SIZE, SIZE))
-    np.add.at(out, label, np.concatenate([p.scatter for p in parts]))
-    return Moments(out, groups[:, 0], groups[:, 2], groups[:, 1].astype(np.bool_), noise)
 
 
 def _differ(one: tuple[Noise, ...] | None, other: tuple[Noise, ...] | None) -> bool:

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
+from steelyard.inertia import forms
 from steelyard.logs.log import Noise
 from steelyard.spatial import cross_matrix
 
@@ -60,5 +61,5 @@ def levels(
 
 def _mass_matrix(body: Array) -> Array:
     """Return M = [[I, [h]x], [-[h]x, m 1]] that acts on [alpha; a - g]."""
-    h, inertia = cross_matrix(body[1:4]), body[[[4, 5, 6], [5, 7, 8], [6, 8, 9]]]
-    return np.block([[inertia, h], [-h, body[0] * np.eye(3)]])
+    h = cross_matrix(body[1:4])
+    return np.block([[forms.inertia_matrix(body), h], [-h, body[0] * np.eye(3)]])

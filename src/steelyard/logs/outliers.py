@@ -12,6 +12,7 @@ _PEAK, _EDGE = 8.0, 4.0  # sigmas to call a tap, and to end it
 _SURROUNDINGS_S = 0.6
 _SHARE_OF_RANGE = 0.05
 _GAP_ROWS, _GAP_S = 5, 0.05  # a step of the clock longer than both is a gap
+_PAUSE_S = 0.05  # a tap that rings on is loud again within this
 
 
 def bursts(time: Array, values: Array, margin_s: float = 0.03) -> Array:
@@ -97,11 +98,11 @@ def _nan_median(windows: Array) -> Array:
 
 
 def _intervals(time: Array, peak: Mask, edge: Mask, margin_s: float) -> Array:
-    """Return the stretches around peaks in which the signal comes above the edge at least every 0.1 s."""
+    """Return the stretches around peaks in which the signal comes above the edge at least every 0.05 s."""
     rows = np.flatnonzero(edge | peak)
     if not peak.any():
         return np.zeros((0, 2))
-    cuts = np.flatnonzero(np.diff(time[rows]) > 0.05)
+    cuts = np.flatnonzero(np.diff(time[rows]) > _PAUSE_S)
     starts, ends = rows[np.concatenate([[0], cuts + 1])], rows[np.concatenate([cuts, [len(rows) - 1]])]
     hits = np.concatenate([[0], np.cumsum(peak)])
     kept = hits[ends + 1] > hits[starts]

@@ -85,16 +85,6 @@ class SmoothRotation:
 
     quaternion: Smooth
 
-    @property
-    def time(self) -> Array:
-        """Sample times (N,) [s]."""
-        return self.quaternion.time
-
-    @property
-    def noise_std(self) -> float:
-        """Noise of one measured rotation, per axis [rad]."""
-        return 2 * self.quaternion.noise_std
-
     def at(self, time: Array) -> tuple[Rotation, Array, Array, Array]:
         """Return rotation, angular velocity, angular acceleration (M, 3) in S, and variances (M, 3).
 

@@ -13,6 +13,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
+from steelyard.logs.log import MotionLog
 from steelyard.report.scene import Scene
 from steelyard.spatial import Pose
 
@@ -31,6 +32,11 @@ class Residuals:
     force: Array
     torque: Array
     still: np.ndarray[Any, np.dtype[np.bool_]]
+
+    @classmethod
+    def of(cls, log: MotionLog, left: Array) -> Residuals | None:
+        """Return what is left (N, 6) [N m, N] of the rows of a log; None where they have no time."""
+        return None if log.time is None else cls(log.time, left[:, 3:], left[:, :3], log.still)
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "time", check.finite("time", self.time))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from steelyard.findings import counted
 from steelyard.identify.estimate import PartMass
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
@@ -103,7 +104,7 @@ def _legend(report: Report) -> Html:
     rows += [_bare(report, label, colours[label]) for label in drawn if label not in weighed][:MOST_PARTS]
     more = len(parts) - MOST_PARTS
     rest = tag("p", f"and {more} lighter parts", class_="aside") if more > 0 else ""
-    count = f"{len(rows)} part{'s' if len(rows) > 1 else ''}"
+    count = counted(len(rows), "part")
     if isinstance(report.estimate, TeamEstimate):
         count = f"One payload, {len(report.estimate.grasps)} robots"
     heading = tag("h2", count) if report.scene is not None else ""

@@ -87,6 +87,6 @@ def principal(estimate: Estimate) -> tuple[Array, Array, Array]:
     """Return principal moments (3,) rising [kg m^2], their standard deviations (3,), and the axes (3, 3) as columns."""
     moments, pose = estimate.parameters.principal()
     axes = pose.rotation.matrix
-    slope = np.stack([forms.upper(np.outer(v, v)) for v in axes.T]) * np.array([1, 2, 2, 1, 2, 1])
+    slope = forms.principal_slopes(axes)
     variance = np.einsum("ai,ij,aj->a", slope, estimate.people_covariance[4:, 4:], slope)
     return moments, np.sqrt(np.maximum(variance, 0)), axes

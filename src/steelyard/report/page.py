@@ -11,6 +11,7 @@ from pathlib import Path
 from string import Template
 
 from steelyard import check
+from steelyard.findings import counted
 from steelyard.report import sections, team_sections
 from steelyard.report.contents import Report
 from steelyard.report.drawing import drawing
@@ -63,9 +64,9 @@ def _subtitle(report: Report) -> str:
     if seen.evidence.samples:
         said.append(f"{seen.evidence.samples} samples, {seen.evidence.still_samples} at rest")
     if seen.parts:
-        said.append(f"{len(seen.parts)} part{'s' if len(seen.parts) > 1 else ''}")
+        said.append(counted(len(seen.parts), "part"))
     count = len(seen.findings)
-    said.append("no findings" if not count else f"{count} finding{'s' if count > 1 else ''}")
+    said.append("no findings" if not count else counted(count, "finding"))
     return " · ".join(said)
 
 

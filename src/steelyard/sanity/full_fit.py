@@ -10,6 +10,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
@@ -20,6 +21,7 @@ from steelyard.spatial import cross_matrix
 _MOST_ROWS = 3000
 _BLOCKS = 12
 _SMALLEST = 1e-9
+RANK = 1e-9  # of the largest eigenvalue: what is below is not told
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,11 +102,7 @@ def _gram(rows: Array) -> Array:
 
 
 def _solution(scatter: Array, size: int) -> Array:
-    H, g = scatter[:size, :size], scatter[:size, size]
-    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    values, axes = np.linalg.eigh(H * np.outer(scale, scale))
-    inverse = np.where(values > 1e-9 * values[-1], 1 / np.maximum(values, 1e-300), 0.0)
-    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * g)))))
+    return np.asarray(inverse_scaled(scatter[:size, :size].copy(), RANK) @ scatter[:size, size])
 
 
 def _first_weights(log: MotionLog) -> Array:

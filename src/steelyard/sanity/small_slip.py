@@ -13,8 +13,9 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.full_fit import Rows
+from steelyard.sanity.full_fit import RANK, Rows
 from steelyard.sanity.load_change import SHORTEST, longer_side, slip_words
 
 # Times tried on a first grid; either side must hold this many rows.
@@ -27,7 +28,6 @@ LEFT, BESIDE_JUMP, BESIDE_TILT = 0.9, 1.5, 2.0
 JUMP_TOO = 0.1
 # It must be this sure by leaving out stretches, no less, and no more: who loses an object has not slipped [m].
 SURE, SMALLEST, LARGEST = 12.0, 1e-3, 0.1
-RANK = 1e-9  # of the largest eigenvalue: what is below is not told
 _FIRST = slice(1, 4)  # where phi and the rows have the first moment
 
 
@@ -102,7 +102,4 @@ def _left(whole: Array, late: Array) -> float:
     p = len(whole) - 1
     H = np.block([[whole[:p, :p], late[:p, _FIRST]], [late[_FIRST, :p], late[_FIRST, _FIRST]]])
     g = np.append(whole[:p, p], late[_FIRST, p])
-    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    values, axes = np.linalg.eigh(H * np.outer(scale, scale))
-    told = values > RANK * values[-1]
-    return float(whole[p, p] - (((scale * g) @ axes[:, told]) ** 2 / values[told]).sum())
+    return float(whole[p, p] - g @ inverse_scaled(H, RANK) @ g)
