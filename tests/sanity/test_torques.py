@@ -1,4 +1,4 @@
-"""Torques that do not belong to the forces: another order or sign of columns, the other sign, another unit."""
+"""Torques that do not belong to the forces: other axes, another point, order or sign of columns, another unit."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity import examine
+from steelyard.spatial import Rotation
 
 KINDS = {"hammer": Kind(noise=0.5), "box": Kind("box_tool", 0.2, 2), "drill": Kind("drill", 1.0, 5)}
 LBF, KGF = 4.44822, 9.80665
@@ -84,6 +85,45 @@ def still(order: list[int]) -> Recording:
 def test_a_table_of_still_poses_tells_the_order() -> None:
     assert examine(still([0, 1, 2]))[1] == ()
     assert "read as Tx = Ty, Ty = Tx, Tz = Tz" in named(still([1, 0, 2]))
+
+
+def turned(in_world: str = "", declared: str = "", about_world: bool = False) -> Recording:
+    """Return sixteen still poses with rotation and position, torque or force in W, or said to be."""
+    rng = np.random.default_rng(5)
+    rotation = Rotation.exp(rng.normal(0, 1.2, (16, 3)))
+    pull, place = rotation.inverse().apply(np.array([0, 0, -9.81])), rng.normal(0, 0.4, (16, 3))
+    torque, force = np.cross([0.01, -0.02, 0.09], -pull), -1.3 * pull
+    if about_world:
+        torque = torque + np.cross(rotation.inverse().apply(place), force)
+    felt = {"torque": torque + 1e-3 * rng.normal(size=(16, 3)), "force": force + 1e-2 * rng.normal(size=(16, 3))}
+    felt = {part: rotation.apply(v) if part == in_world else v for part, v in felt.items()}
+    channels = {**felt, "rotation": rotation.matrix, "position": place}
+    frames = {declared: "W"} if declared else {}
+    return Recording((Stream("poses", channels, frames=frames, poses=True),), np.array([0, 0, -9.81]), 1)
+
+
+@pytest.mark.parametrize("part", ["", "torque", "force"])
+def test_parts_of_the_wrench_in_axes_of_their_own_are_silent(part: str) -> None:
+    assert examine(turned(part, part))[1] == ()
+
+
+@pytest.mark.parametrize(
+    ("in_world", "declared", "named", "frame"),
+    [("torque", "", "W (the base)", "W"), ("", "torque", "S", "S")],
+)
+def test_torques_in_other_axes_than_forces_are_put_right(in_world: str, declared: str, named: str, frame: str) -> None:
+    read, (found,) = examine(turned(in_world, declared))
+    assert found.code == "gravity-frame"
+    assert f"torques are in the axes of {named}: so read" in found.message
+    assert found.remedy == f'Set frame = "{frame}" in the torque of this stream.'
+    assert read.streams[0].frames["torque"] == frame
+
+
+def test_torques_about_the_origin_of_the_world_are_named() -> None:
+    _, (found,) = examine(turned(about_world=True))
+    assert found.code == "wrench-unexplained"
+    assert "about the origin of W, not of S: so read" in found.message
+    assert "position x force" in found.remedy
 
 
 def test_an_order_that_leaves_little_unexplained_is_told_too() -> None:

@@ -184,5 +184,11 @@ def test_residuals_that_nothing_explains_are_said(made: Recording) -> None:
     assert said.code == "wrench-unexplained"
     assert said.message.startswith("The residuals are 2.5 times what the channels scatter from row to row")
     assert not examine_body(sound, ())
+    torques = replace(sound, evidence=replace(sound.evidence, residual_torque_Nm=0.3 * sound.mass))
+    (missed,) = examine_body(torques, ())
+    assert missed.code == "wrench-unexplained"
+    assert missed.message.startswith("The torque misses by")
+    assert not examine_body(torques, (), noise=0.1 * sound.mass)
     for code in ("motion-mismatch", "gains-differ", "noise-level-off"):
+        assert not examine_body(torques, (Finding.of(code, ""),))
         assert not examine_body(bad, (Finding.of(code, ""),))

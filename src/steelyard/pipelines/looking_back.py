@@ -21,6 +21,7 @@ from steelyard.sanity import (
     examine_masses,
     examine_sensor,
     examine_wrench_unit,
+    row_noise,
 )
 
 # Where an acceleration comes from that does not see the arm's structure bend.
@@ -60,7 +61,8 @@ def of_sensor_and_body(
     """
     estimate, found = examine_sensor(load.log, recording, estimate, known, load.bias.drift)
     if load.shape is None:
-        found = (*found, *examine_body(estimate, (*known, *found)))
+        size, noise = float(np.linalg.norm(recording.gravity)), row_noise(load.log, recording, "torque")
+        found = (*found, *examine_body(estimate, (*known, *found), size, noise))
         if rows.aligned.acceleration_from in ENCODERS:
             estimate = allow_softness(load.log, estimate)
     return _with_gain(estimate, rows.aligned), found

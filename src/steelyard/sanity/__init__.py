@@ -1,6 +1,6 @@
 """Sanity: is the log what its description says, and does the answer look like one?"""
 
-from steelyard.sanity.after import after, drift_of
+from steelyard.sanity.after import after, drift_of, row_noise
 from steelyard.sanity.before import examine
 from steelyard.sanity.density import impossible_density, maybe_hollow
 from steelyard.sanity.gravity import fitted_gravity, levelled
@@ -28,4 +28,5 @@ __all__ = [
     "levelled",
     "maybe_hollow",
     "one_body",
+    "row_noise",
 ]

@@ -48,8 +48,7 @@ def after(
     rotation = rotation_of(log, aligned)
     tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
     drifts = () if tilted else _drifts(drift)
-    noise = max((_passed(log, s.time, v) for s, _, v in channel(recording, "force")), default=0.0)
-    size = implausible(estimate, float(np.linalg.norm(recording.gravity)), noise)
+    size = implausible(estimate, float(np.linalg.norm(recording.gravity)), row_noise(log, recording, "force"))
     return (*seen, *tilted, *drifts, *_noise_level(estimate, recording), *_prior(estimate), *size)
 
 
@@ -176,6 +175,11 @@ def _noise_level(estimate: Estimate, recording: Recording) -> tuple[Finding, ...
     message = "; ".join(out)
     known = "" if chi2 is None else f" (chi^2 per degree of freedom {chi2:.2g})"
     return (Finding.of("noise-level-off", f"{message[0].upper()}{message[1:]}{known}."),)
+
+
+def row_noise(log: MotionLog, recording: Recording, part: str) -> float:
+    """Return the white noise of "force" [N] or "torque" [N m] per axis in the rows of the log; zero for tables."""
+    return max((_passed(log, s.time, v) for s, _, v in channel(recording, part)), default=0.0)
 
 
 def _passed(log: MotionLog, time: Array | None, values: Array) -> float:

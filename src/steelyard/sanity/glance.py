@@ -23,22 +23,24 @@ _RATE_HZ = 60.0
 _MOST_ROWS = 20_000
 _FEWEST_ROWS = 60
 _BLOCKS = 12
+_PARTS = ("torque", "force")
 
 
 @dataclass(frozen=True, eq=False)
 class Glance:
     """Rows of a recording on one even clock, or the rows of a table.
 
-    wrench        (N, 6) [tau (N m), f (N)] on-object, about the S origin, in S or (where `world`) in W axes
+    wrench        (N, 6) [tau (N m), f (N)] on-object, about the S origin, in S or (what `world` names) in W axes
     rotation      (N, 3, 3) S to W, averaged over a row; None without
     pull          (N, 3) [m/s^2] gravity in S from a channel, where there is no rotation
     acceleration  (N, 3) [m/s^2] of the S origin in W, without gravity; None where no channel tells it
     block         (N,) number of the stretch (or the pose) a row belongs to, for the jackknife
     rate          [Hz] of the rows; None for a table
-    world         the wrench is in W axes
+    world         which of "torque" and "force" are in W axes
     accelerometer (N, 3) [m/s^2] what an accelerometer shows in its own axes, where there are rotations, too
     sign_free     `pull` comes from an accelerometer whose mount the force itself decided, so that a mass has no sign
     dead          channels [tau, f] of S that do not measure; their wrench is zero
+    position      (N, 3) [m] of the S origin in W; None where no channel tells it
     """
 
     wrench: Array
@@ -47,13 +49,19 @@ class Glance:
     acceleration: Array | None
     block: Integers
     rate: float | None
-    world: bool = False
+    world: frozenset[str] = frozenset()
     sign_free: bool = False
     accelerometer: Array | None = None
     dead: tuple[bool, ...] = (False,) * 6
+    position: Array | None = None
 
     def __len__(self) -> int:
         return len(self.wrench)
+
+    @property
+    def halves(self) -> tuple[Array, Array]:
+        """Torque and force (N, 3), each in its own axes."""
+        return self.wrench[:, :3], self.wrench[:, 3:]
 
     def smooth(self, values: Array) -> Array:
         """Return values (N, k) through the common low-pass; the rows of a table as they are."""
@@ -66,9 +74,13 @@ class Glance:
             return Seen(self.smooth(self.wrench), self.smooth(pull), dead=self.dead)
         own = gravity if self.acceleration is None else gravity - self.acceleration
         pull = _into_sensor(rotation, np.broadcast_to(own, (len(self), 3)))
-        wrench = self.wrench
-        if self.world:
-            wrench = np.concatenate([_into_sensor(rotation, wrench[:, :3]), _into_sensor(rotation, wrench[:, 3:])], 1)
+        wrench = np.concatenate(
+            [
+                _into_sensor(rotation, v) if part in self.world else v
+                for part, v in zip(_PARTS, self.halves, strict=True)
+            ],
+            1,
+        )
         if self.rate is None:
             return Seen(wrench, pull, dead=self.dead)
         lever, spin = _turning(rotation, self.rate)
@@ -125,12 +137,12 @@ def glance(recording: Recording) -> Glance | None:
     return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
 
 
-def in_other_axes(recording: Recording) -> Recording:
-    """Return the recording with its wrench said to be in W where it was in S, and in S where it was in W."""
+def in_other_axes(recording: Recording, parts: tuple[str, ...] = _PARTS) -> Recording:
+    """Return the recording with parts of its wrench said to be in W where the last was in S, and in S where in W."""
 
     def turned(stream: Stream) -> Stream:
-        felt = {"force", "torque"} & set(stream.channels)
-        other = "S" if stream.frames.get("force", "S") == "W" else "W"
+        felt = set(parts) & set(stream.channels)
+        other = "S" if stream.frames.get(parts[-1], "S") == "W" else "W"
         return replace(stream, frames={**stream.frames, **dict.fromkeys(felt, other)}) if felt else stream
 
     return replace(recording, streams=tuple(map(turned, recording.streams)))
@@ -165,12 +177,13 @@ def _area_at(time: Array, values: Array, area: Array, at: Array) -> Array:
     return np.asarray(area[left] + h * values[left] + 0.5 * h**2 * slope)
 
 
-def _wrench(recording: Recording, stream: Stream) -> tuple[Array, bool]:
-    """Return [tau, f] (N, 6) on-object in the stream's axes turned into S, and whether they are W axes."""
-    torque, force = stream.channels["torque"], stream.channels["force"]
-    world = stream.frames.get("force", "S") == "W"
-    if stream.turn is not None and not world:
-        torque, force = stream.turn.apply(torque), stream.turn.apply(force)
+def _wrench(recording: Recording, stream: Stream) -> tuple[Array, frozenset[str]]:
+    """Return [tau, f] (N, 6) on-object in the stream's axes turned into S, and which of them are in W axes."""
+    world = frozenset(part for part in _PARTS if stream.frames.get(part, "S") == "W")
+    torque, force = (
+        v if part in world or stream.turn is None else stream.turn.apply(v)
+        for part, v in ((part, stream.channels[part]) for part in _PARTS)
+    )
     if stream.arm is not None and not world:
         torque = torque + np.cross(stream.arm, force)
     return recording.wrench_sign * np.concatenate([torque, force], 1), world
@@ -187,7 +200,8 @@ def _of_table(recording: Recording, stream: Stream) -> Glance | None:
         pull = _pull_channel(recording, [v for _, _, v in channel(recording, "gravity", "specific_force")], wrench)
         if pull is None:
             return None
-    return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, rotation is None and _loose(recording))
+    loose, place = rotation is None and _loose(recording), next((v for _, _, v in channel(recording, "position")), None)
+    return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, loose, position=place)
 
 
 def _pull_channel(recording: Recording, values: list[Array], wrench: Array) -> Array | None:
@@ -241,7 +255,8 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     if rotation is not None:
         felt = next((on_grid(s, v) for s, _, v in channel(recording, "specific_force") if s in used), None)
     loose = rotation is None and _loose(recording)
-    return Glance(wrench, rotation, pull, acceleration, block, rate, world, loose, felt, recording.dead)
+    place = next((on_grid(s, v) for s, _, v in channel(recording, "position") if s in used), None)
+    return Glance(wrench, rotation, pull, acceleration, block, rate, world, loose, felt, recording.dead, place)
 
 
 def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, rate: float) -> Array | None:

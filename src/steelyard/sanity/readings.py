@@ -101,7 +101,8 @@ def _in_other_axes(recording: Recording, given: Reading) -> Iterator[Reading]:
     """Yield the reading of the wrench in W where it was said to be in S, and in S where it was said to be in W."""
     view = None if any(recording.dead) else glance(in_other_axes(recording))
     if view is not None and given.rotation is not None:
-        words = f"the wrench is in the axes of {'W (the base), not of S' if view.world else 'S, not of W (the base)'}"
+        axes = "W (the base), not of S" if "force" in view.world else "S, not of W (the base)"
+        words = f"the wrench is in the axes of {axes}"
         yield replace(reading_of(view, words, given.gravity, given.rotation), view=view)
 
 
@@ -143,7 +144,8 @@ def rival_finding(best: Reading, given: Reading) -> Finding:
         f"left unexplained instead of {percent(given.fit.force_share)}. The answer assumes this."
     )
     if best.view is not None:
-        remedy = f'Set frame = "{"W" if best.view.world else "S"}" in force and torque of this stream.'
+        axes = "W" if "force" in best.view.world else "S"
+        remedy = f'Set frame = "{axes}" in force and torque of this stream.'
         return Finding("gravity-frame", message, remedy)
     return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
 

@@ -1,7 +1,8 @@
-"""Torques that do not belong to the forces: columns of another order or sign, the other sign, another unit.
+"""Torques that do not belong to the forces: other axes, another point, columns of another order or sign, another unit.
 
-At rest a torque is h x g for some first moment h of mass, so that most orders of its columns show. In motion the force
-shows h, too: how it follows the turning, beside the h of the torque, tells sign and unit.
+At rest a torque is h x g for some first moment h of mass, so that axes, the point that torques are about, and most
+orders of columns show. In motion the force shows h, too: how it follows the turning, beside the h of the torque, tells
+sign and unit.
 """
 
 from __future__ import annotations
@@ -13,7 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
-from steelyard.sanity.glance import Glance, Seen
+from steelyard.sanity.glance import Glance, Seen, in_other_axes
 from steelyard.sanity.mirrored import REFLECTIONS, in_words
 from steelyard.sanity.static_fit import columns, solve
 from steelyard.sanity.units import scaled
@@ -40,14 +41,16 @@ UNITS = (
     (0.01, "torques in N*cm are read as N*m"),
 )
 REMEDY = "Check order and signs of the torque columns in the description."
+ABOUT_S = "Take position x force away from the torques, all in the axes of W, or log the wrench at the sensor."
 
 
 def examine_torques(
     recording: Recording, view: Glance, gravity: Array, rotation: Array | None
 ) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return `force-unit` where torques, read otherwise, belong to the forces, and as given do not.
+    """Return a finding where torques, read otherwise, belong to the forces, and as given do not.
 
-    Torques a thousand times too small are no other unit's: the recording is returned with them put right.
+    Torques in other axes than they are said to be in, or a thousand times too small, leave no doubt: the recording is
+    returned with them put right.
     """
     if any(view.dead) or len(view) < _FEWEST_ROWS:
         return recording, ()
@@ -58,9 +61,13 @@ def examine_torques(
     if force_share > FORCE:
         return recording, ()
     felt = force[1:4] if seen.lever is not None else np.zeros(3)
-    ordered = _ordered(view, seen, turned, share, felt) if share > BAD else ()
-    if ordered or share >= WELL or seen.lever is None:
-        return recording, ordered
+    if share > BAD:
+        otherwise, findings = _elsewhere(recording, view, seen, turned, share, rotation)
+        findings = findings or _ordered(view, seen, turned, share, felt)
+        if findings:
+            return otherwise, findings
+    if share >= WELL or seen.lever is None:
+        return recording, ()
     ratio = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
     if ratio is None:
         return recording, ()
@@ -78,6 +85,35 @@ def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[R
         "in N m, not in N mm, and were multiplied by 1000."
     )
     return scaled(recording, stream, ("torque",), 1e3), (Finding.of("length-in-mm", text),)
+
+
+def _elsewhere(
+    recording: Recording, view: Glance, seen: Seen, turned: Array, share: float, rotation: Array | None
+) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return what is said of torques in other axes, or about the origin of W, with the axes put right."""
+    if rotation is None:
+        return recording, ()
+    other = replace(view, world=view.world ^ {"torque"})
+    left = solve(turned, other.seen(np.zeros(3), rotation).wrench[:, :3], view.block)[2]
+    if left <= MUCH_BETTER * share:
+        named = "W (the base)" if "torque" in other.world else "S"
+        text = (
+            f"The torques are in the axes of {named}: so read, {_percent(left)} of their variance is left unexplained "
+            f"instead of {_percent(share)}. The answer assumes this."
+        )
+        remedy = f'Set frame = "{named[0]}" in the torque of this stream.'
+        return in_other_axes(recording, ("torque",)), (Finding("gravity-frame", text, remedy),)
+    if view.position is None:
+        return recording, ()
+    arm = view.smooth(np.einsum("nji,nj->ni", rotation, view.position))
+    left = solve(turned, seen.wrench[:, :3] - np.cross(arm, seen.wrench[:, 3:]), view.block)[2]
+    if left > MUCH_BETTER * share:
+        return recording, ()
+    text = (
+        f"The torques are about the origin of W, not of S: so read, {_percent(left)} of their variance is left "
+        f"unexplained instead of {_percent(share)}; the answer does not assume this."
+    )
+    return recording, (Finding("wrench-unexplained", text, ABOUT_S, left_in=True),)
 
 
 def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array) -> tuple[Finding, ...]:
