@@ -8,10 +8,11 @@ import numpy as np
 import pytest
 from held_poses import BODY, recorded
 
-from steelyard.logs.recording import Recording
+from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
 from steelyard.sanity.memory import examine_memory
 from steelyard.simulate.noise import Spectrum
+from steelyard.spatial import Rotation
 
 
 def table(seed: int, spectrum: Spectrum) -> Recording:
@@ -50,3 +51,26 @@ def test_a_motion_without_a_clock_is_no_pose() -> None:
     log = recorded("slow", 0, "2hz")
     moving = replace(log, streams=tuple(replace(s, time=None, poses=True) for s in log.streams))
     assert examine_memory(moving) is moving
+
+
+def with_offsets(seed: int, poses: int) -> Recording:
+    """Return poses of a hundred rows, each with an offset of its own, as stiction in an arm makes."""
+    rng = np.random.default_rng(seed)
+    rotation = Rotation.exp(rng.normal(0, 1.2, (poses, 3)))
+    pull = np.repeat(rotation.inverse().apply(np.array([0, 0, -9.81])), 100, axis=0)
+    offset = np.repeat(rng.normal(size=(poses, 6)), 100, axis=0) + 0.3 * rng.normal(size=(100 * poses, 6))
+    body = np.concatenate([np.cross(BODY.com, -BODY.mass * pull), -BODY.mass * pull], 1)
+    felt = body + np.repeat([0.01, 0.2], 3) * offset
+    channels = {"force": felt[:, 3:], "torque": felt[:, :3], "rotation": np.repeat(rotation.matrix, 100, axis=0)}
+    return Recording((Stream("poses", channels, poses=True),), np.array([0, 0, -9.81]))
+
+
+@pytest.mark.parametrize("poses", [8, 24])
+def test_rows_that_share_an_offset_count_as_one(poses: int) -> None:
+    off = []
+    for seed in range(20):
+        found = held_object.identify(with_offsets(seed, poses))
+        assert found.codes() == {"inertia-not-identified"}
+        off.append(np.append(found.mass - float(BODY.mass), found.com - BODY.com) / found.std[:4])
+    assert 0.6 < float(np.sqrt(np.mean(np.square(off)))) < 1.4
+    assert f"one mean for each pose was read, {poses} in all" in " ".join(found.notes)
