@@ -206,9 +206,8 @@ def _own_lines(table: Table, names: _Names) -> dict[str, str]:
         units = '["s", "ns"]' if len(stamps) > 1 else f'"{_said_unit(names, stamps[0]) or "s"}"'
         lines["time"] = f"{{ columns = {_columns(table, stamps)}, unit = {units} }}"
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
-        if found := _vector(names, quantity):
-            said = spelled(quantity, names.units.get(found[0], ""))
-            unit = said if said in UNITS[quantity] else next(iter(UNITS[quantity]))
+        if (found := _vector(names, quantity)) and len(said := _said_units(names, quantity, found)) < 2:
+            unit = said[0] if said and said[0] in UNITS[quantity] else next(iter(UNITS[quantity]))
             mark = "   # of S in W; check the unit" if quantity == "position" else ""
             lines[quantity] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}{mark}'
     if turn := _rotation(names):
@@ -230,14 +229,22 @@ def _vector_spec(
     table: Table, names: _Names, quantity: str, numbers: tuple[int, ...], cells: Cells
 ) -> QuantitySpec | None:
     """Return the vector with its unit, None where its size does not tell what it is."""
-    said = names.units.get(numbers[0])
-    unit = None if said is None else spelled(quantity, said)
+    said = _said_units(names, quantity, numbers)
+    if len(said) > 1:
+        reason = f"the columns of {quantity} have different units, {' and '.join(said)}; write them in one"
+        raise _cannot_tell(table, reason, _own_lines(table, names))
+    unit = said[0] if said else None
     if unit is not None and unit not in UNITS[quantity]:
         reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
         raise _cannot_tell(table, reason, _own_lines(table, names))
     if unit is None:
         unit = _unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
     return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)
+
+
+def _said_units(names: _Names, quantity: str, numbers: Sequence[int]) -> list[str]:
+    """Return the units that stand over the columns of a vector, each once: a column without one has the others'."""
+    return list(dict.fromkeys(spelled(quantity, names.units[n]) for n in numbers if n in names.units))
 
 
 def _unit_by_size(quantity: str, values: Array) -> str | None:
