@@ -58,6 +58,16 @@ def pcd(kind: str) -> bytes:
     return head + struct.pack("<II", len(packed_bytes), len(columns)) + packed_bytes
 
 
+def labelled(label: str, name: str = "label") -> bytes:
+    head = f"FIELDS x y z {name}\nSIZE 4 4 4 1\nTYPE F F F U\nPOINTS 2\nDATA ascii\n"
+    return f"{head}1 2 3 0\n4 5 6 {label}\n".encode()
+
+
+def test_padding_may_hold_anything(tmp_path: Path) -> None:
+    (tmp_path / "a.pcd").write_bytes(labelled("nan", "_"))
+    assert read_cloud(tmp_path / "a.pcd").xyz.tolist() == [[1, 2, 3], [4, 5, 6]]
+
+
 @pytest.mark.parametrize("kind", ["ascii", "binary", "binary_compressed"])
 def test_pcd(tmp_path: Path, kind: str) -> None:
     path = tmp_path / "cloud.pcd"
@@ -89,6 +99,9 @@ def test_runs_that_repeat_are_undone() -> None:
             b"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nCOUNT 1 1 99999999999\nPOINTS 1\nDATA ascii\n",
             "that fit each",
         ),
+        ("a.pcd", labelled("nan"), 'field "label" holds nan; expected integers from 0 to 255'),
+        ("a.pcd", labelled("256"), 'field "label" holds 256; expected integers from 0 to 255'),
+        ("a.pcd", labelled("-1"), 'field "label" holds -1; expected integers from 0 to 255'),
         ("a.pcd", b"FIELDS _ _0 x\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", '"y" is missing'),
         ("a.ply", b"x", "expected a PLY file"),
         ("a.npz", b"x", "expected an NPZ file"),

@@ -58,6 +58,13 @@ def test_units_in_names(tmp_path: Path) -> None:
     assert stream.time.tolist() == [0, 0.004]
 
 
+@pytest.mark.parametrize("force", ["fx [kN],fy,fz", "fx,fy [kN],fz", "fx [kN],fy [kN],fz [kN]"])
+def test_a_unit_over_one_column_is_that_of_the_vector(tmp_path: Path, force: str) -> None:
+    names = ["t", *force.split(","), "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
+    stream = bare(tmp_path, names, [0, *W, *Q], [0.01, *W, *Q])
+    assert stream.channels["force"][0].tolist() == [1000, 2000, 3000]
+
+
 @pytest.mark.parametrize(
     ("unit", "size"), [("Nm", 1.0), ("N m", 1.0), ("N.m", 1.0), ("N·m", 1.0), ("Nmm", 1e-3), ("N.mm", 1e-3)]
 )
@@ -157,6 +164,8 @@ def test_npz_with_usual_arrays(tmp_path: Path) -> None:
         ("fx FX", 'two columns are called "fx". Columns here: fx, FX.'),
         ("1 2", "the file has no header. It has 2 columns."),
         ("fx[lb] fy fz tx ty tz qw qx qy qz", 'unknown unit "lb" of force; possible are N, kN, kgf, lbf. Columns here: fx[lb], fy, fz, tx, ty, tz, qw, qx, qy, qz.'),
+        ("fx[N] fy[kN] fz tx ty tz qw qx qy qz", "the columns of force have different units, N and kN; write them in one. Columns here: fx[N], fy[kN], fz, tx, ty, tz, qw, qx, qy, qz."),
+        ("fx fy fz tx[Nm] ty[N*m] tz[N*mm] qw qx qy qz", "the columns of torque have different units, N*m and N*mm; write them in one. Columns here: fx, fy, fz, tx[Nm], ty[N*m], tz[N*mm], qw, qx, qy, qz."),
         ("fx fy fz tx ty tz gx gy gz", "nothing says where gravity points in the sensor frame. Columns here: fx, fy, fz, tx, ty, tz, gx, gy, gz."),
         ("t fx fy fz tx ty tz qw qx qy qz", "time rises by 2000 per row, which can hardly be seconds. Columns here: t, fx, fy, fz, tx, ty, tz, qw, qx, qy, qz."),
     ],

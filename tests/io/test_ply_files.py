@@ -102,6 +102,16 @@ BAD: dict[str, tuple[Callable[[], bytes], str]] = {
     ),
     "too short": (swapped("vertex 3", "vertex 300"), 'F: the file ends inside element "vertex" (300 announced).'),
     "a word": (swapped("1 0 0", "1 0 a"), 'F: element "vertex" holds a word that is no number.'),
+    "nan in integers": (
+        swapped("3 0 1 2", "3 0 nan 2"),
+        'F: property "vertex_indices" of element "face" holds nan; expected integers from -2147483648 to 2147483647. '
+        "Save the file again.",
+    ),
+    "too large an integer": (
+        swapped("3 0 1 2", "3 0 1 4294967297"),
+        'F: property "vertex_indices" of element "face" holds 4.29497e+09; expected integers from -2147483648 to '
+        "2147483647. Save the file again.",
+    ),
     "quads": (
         swapped("3 0 1 2", "4 0 1 2 0"),
         "F: faces have 4 corners. Save every face as a triangle.",

@@ -403,8 +403,12 @@ def test_results_come_back(tmp_path: Path) -> None:
     [
         ({"grasps": {}}, '"grasps" must be one object with a grasp of every robot.'),
         ({"reference": "top"}, 'the reference must be one of the grasps; found "top".'),
-        ({"grasps": {"left": {"rotation": [1], "position_m": [0, 0, 0]}}}, '"rotation" of the grasp of "left" has the wrong shape'),
-        ({"clock_offsets_s": {"left": "x"}}, '"left" of clock_offsets_s has the wrong shape'),
+        ({"grasps": {"left": {"rotation": [1], "position_m": [0, 0, 0]}}}, '"rotation" of the grasp of "left" must be 3 x 3 finite numbers; found something else.'),
+        ({"grasps": {"left": {"rotation": [[2, 0, 0], [0, 1, 0], [0, 0, 1]], "position_m": [0, 0, 0]}}}, '"rotation" of the grasp of "left": '),
+        ({"grasps": {"left": {"rotation": np.eye(3).tolist(), "position_m": [0, 0, True]}}}, '"position_m" of the grasp of "left" must be 3 finite numbers; found something else.'),
+        ({"grasps": {"left": {"rotation": np.eye(3).tolist(), "position_m": [0, 0, 0], "lost": [[1, 2]]}}}, '"lost" of the grasp of "left" must be n x 6 finite numbers; found something else.'),
+        ({"clock_offsets_s": {"left": "x"}}, '"left" of clock_offsets_s must be one finite number; found something else.'),
+        ({"clock_offsets_s": {"left": "0.7"}}, '"left" of clock_offsets_s must be one finite number; found something else.'),
     ],
 )  # fmt: skip
 def test_wrong_results(tmp_path: Path, change: dict[str, object], said: str) -> None:

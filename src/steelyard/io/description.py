@@ -20,7 +20,7 @@ from steelyard.logs.recording import STANDARD_GRAVITY
 # [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
 _WEAKEST, _STRONGEST = 0.1, 100.0
 _LOUDEST = 1e6
-_NOISE = ("force", "torque", "acceleration", "angular_acceleration")
+NOISE = ("force", "torque", "acceleration", "angular_acceleration")  # whose standard deviation can be told
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
 
 LEVEL_BASE = f"[log] gives no gravity: {STANDARD_GRAVITY} m/s² along -z of W, a level base, was assumed"
@@ -100,8 +100,8 @@ def _short(values: Array) -> str:
 
 
 def _noise(entry: Entry) -> dict[str, float]:
-    entry.only(*_NOISE)
-    return {key: entry.positive(key, _LOUDEST) for key in _NOISE if key in entry}
+    entry.only(*NOISE)
+    return {key: entry.positive(key, _LOUDEST) for key in NOISE if key in entry}
 
 
 def _streams(top: Entry) -> tuple[StreamSpec, ...]:

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -42,7 +42,9 @@ _QUATERNION = ("q", "quat", "quaternion", "orientation", "rotation")
 # Angles leave open in which order they turn and whether they are degrees. Names -> the form and unit that are usual.
 _ANGLES = {("roll", "pitch", "yaw"): ("rpy", "deg"), ("rx", "ry", "rz"): ("rotation-vector", "rad")}
 _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
-_TIMES = ("t", "time", "timestamp", "stamp", "secs", "seconds")
+_TIMES = ("t", "time", "timestamp", "stamp")
+_SECONDS = ("secs", "seconds")  # the whole stamp, unless its nanoseconds stand beside it
+_SPLIT = (("sec", "nanosec"), ("secs", "nsecs"))  # ROS; "header.stamp." may stand in front
 _UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
 _SEPARATOR = re.compile(r"[^a-z0-9]+")
 
@@ -79,20 +81,19 @@ def describe(table: Table) -> tuple[Description, Cells]:
     names = _simplified(table)
     vectors = {quantity: found for quantity in _STEMS if (found := _vector(names, quantity))}
     rotation = _rotation(names)
-    stamps = next(_time_columns(names), None)
+    stamps = next(_time_columns(names), ())
     _require(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
-    exact = [] if stamps is None else [stamps]
-    cells = table.read(sorted({*map(int, wanted), *exact}), exact)
+    cells = table.read(sorted({*map(int, wanted), *stamps}), stamps)
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
     _require(table, names, [spec.name for spec in specs])
-    time = None if stamps is None else TimeSpec(stamps, _time_unit(table, names, stamps, cells), 0.0, "time")
+    time = TimeSpec(stamps, _time_units(table, names, stamps, cells), 0.0, "time") if stamps else None
     gravity, notes = _gravity(specs, cells)
     poses = time is None and _turns_each_row(specs, cells, gravity)
     where = table.path.name
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
-    time = time and TimeSpec(time.column, time.unit, time.rate, f"{where}, time")
+    time = time and replace(time, where=f"{where}, time")
     return Description((StreamSpec(where, tuple(located), where, time, poses),), gravity, notes=notes), cells
 
 
@@ -149,11 +150,18 @@ def _rotation(names: _Names) -> QuantitySpec | None:
     return QuantitySpec("rotation", found, "rad", "rotation", form="matrix") if found else None
 
 
-def _time_columns(names: _Names) -> Iterator[int]:
-    for name in _TIMES:
+def _time_columns(names: _Names) -> Iterator[tuple[int, ...]]:
+    """Yield the columns that may be the clock, the likeliest first: one, or seconds and nanoseconds."""
+    yield from _whole_stamps(names, _TIMES)
+    yield from (found for pair in _SPLIT if (found := names.all_of(pair, False)))
+    yield from _whole_stamps(names, _SECONDS)
+
+
+def _whole_stamps(names: _Names, stems: Sequence[str]) -> Iterator[tuple[int, ...]]:
+    for name in stems:
         for suffix in ("", *(f"_{unit}" for unit in TIME)):
             if name + suffix in names.plain:
-                yield names.plain[name + suffix]
+                yield (names.plain[name + suffix],)
 
 
 def _require(table: Table, names: _Names, found: Sequence[str]) -> None:
@@ -193,13 +201,13 @@ def _cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> BadDesc
 def _own_lines(table: Table, names: _Names) -> dict[str, str]:
     """Return quantity -> its line of a description, for those whose columns were recognised."""
     lines = {}
-    stamps = next(_time_columns(names), None)
-    if stamps is not None:
-        lines["time"] = f'{{ columns = {_columns(table, (stamps,))}, unit = "{_said_unit(names, stamps) or "s"}" }}'
+    stamps = next(_time_columns(names), ())
+    if stamps:
+        units = '["s", "ns"]' if len(stamps) > 1 else f'"{_said_unit(names, stamps[0]) or "s"}"'
+        lines["time"] = f"{{ columns = {_columns(table, stamps)}, unit = {units} }}"
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
-        if found := _vector(names, quantity):
-            said = spelled(quantity, names.units.get(found[0], ""))
-            unit = said if said in UNITS[quantity] else next(iter(UNITS[quantity]))
+        if (found := _vector(names, quantity)) and len(said := _said_units(names, quantity, found)) < 2:
+            unit = said[0] if said and said[0] in UNITS[quantity] else next(iter(UNITS[quantity]))
             mark = "   # of S in W; check the unit" if quantity == "position" else ""
             lines[quantity] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}{mark}'
     if turn := _rotation(names):
@@ -221,14 +229,22 @@ def _vector_spec(
     table: Table, names: _Names, quantity: str, numbers: tuple[int, ...], cells: Cells
 ) -> QuantitySpec | None:
     """Return the vector with its unit, None where its size does not tell what it is."""
-    said = names.units.get(numbers[0])
-    unit = None if said is None else spelled(quantity, said)
+    said = _said_units(names, quantity, numbers)
+    if len(said) > 1:
+        reason = f"the columns of {quantity} have different units, {' and '.join(said)}; write them in one"
+        raise _cannot_tell(table, reason, _own_lines(table, names))
+    unit = said[0] if said else None
     if unit is not None and unit not in UNITS[quantity]:
         reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
         raise _cannot_tell(table, reason, _own_lines(table, names))
     if unit is None:
         unit = _unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
     return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)
+
+
+def _said_units(names: _Names, quantity: str, numbers: Sequence[int]) -> list[str]:
+    """Return the units that stand over the columns of a vector, each once: a column without one has the others'."""
+    return list(dict.fromkeys(spelled(quantity, names.units[n]) for n in numbers if n in names.units))
 
 
 def _unit_by_size(quantity: str, values: Array) -> str | None:
@@ -238,6 +254,10 @@ def _unit_by_size(quantity: str, values: Array) -> str | None:
         return "g"
     low, high = {"specific_force": _SPECIFIC_FORCE, "gravity": _GRAVITY}.get(quantity, (-1.0, np.inf))
     return next(iter(UNITS[quantity])) if low < size < high or not np.isfinite(size) else None
+
+
+def _time_units(table: Table, names: _Names, stamps: Sequence[int], cells: Cells) -> tuple[str, ...]:
+    return ("s", "ns") if len(stamps) > 1 else (_time_unit(table, names, stamps[0], cells),)
 
 
 def _time_unit(table: Table, names: _Names, number: int, cells: Cells) -> str:

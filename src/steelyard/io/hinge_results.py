@@ -10,6 +10,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
+from steelyard.io.json_arrays import array_or_none
 from steelyard.team.estimate import BodyEstimate, HingeEstimate
 
 
@@ -52,8 +53,8 @@ def hinge_of(path: Path, values: Mapping[str, Any]) -> HingeEstimate | None:
     made = [_body(path, body) for body in bodies]
     std = _inner(hinge)
     axis, point = _numbers(path, hinge, "axis", 3), _numbers(path, hinge, "point_m", 3)
-    spread = [float(_numbers(path, std, key, 1)[0]) for key in ("axis_deg", "point_m")]
-    swing = float(np.deg2rad(_numbers(path, hinge, "swing_deg", 1)[0]))
+    spread = [float(_numbers(path, std, key)) for key in ("axis_deg", "point_m")]
+    swing = float(np.deg2rad(_numbers(path, hinge, "swing_deg")))
     if not (np.isfinite(axis).all() and np.isfinite(point).all()):
         raise BadFile(f'{path}: "axis" and "point_m" of the hinge must be three finite numbers each.')
     return HingeEstimate(axis, point, spread[0], spread[1], swing, (made[0], made[1]))
@@ -65,9 +66,9 @@ def _body(path: Path, body: Any) -> BodyEstimate:
     std = _inner(body)
     return BodyEstimate(
         tuple(str(name) for name in body["robots"]),
-        float(_numbers(path, body, "hinge_moment_kgm2", 1)[0]), float(_numbers(path, std, "hinge_moment_kgm2", 1)[0]),
+        float(_numbers(path, body, "hinge_moment_kgm2")), float(_numbers(path, std, "hinge_moment_kgm2")),
         _numbers(path, body, "first_moment_kgm", 3), _numbers(path, std, "first_moment_kgm", 3),
-        float(_numbers(path, std, "lever_kgm", 1)[0]), _numbers(path, body, "mass_range_kg", 2),
+        float(_numbers(path, std, "lever_kgm")), _numbers(path, body, "mass_range_kg", 2),
     )  # fmt: skip
 
 
@@ -77,14 +78,7 @@ def _inner(entry: Mapping[str, Any]) -> Mapping[str, Any]:
     return std if isinstance(std, dict) else {}
 
 
-def _numbers(path: Path, entry: Mapping[str, Any], key: str, count: int) -> Array:
-    """Return numbers (count,), NaN where there are none."""
-    if entry.get(key) is None:
-        return np.full(count, np.nan)
-    try:
-        out = np.array(entry[key], dtype=np.float64).reshape(-1)
-    except (TypeError, ValueError, OverflowError):
-        out = np.empty(0)
-    if len(out) != count or not np.isfinite(out).all():
-        raise BadFile(f'{path}: "{key}" must be {count} finite number{"s" if count > 1 else ""}, or null.')
-    return out
+def _numbers(path: Path, entry: Mapping[str, Any], key: str, *shape: int) -> Array:
+    """Return numbers of a shape, NaN where there are none."""
+    found = array_or_none(path, entry, key, shape)
+    return np.full(shape, np.nan) if found is None else found

@@ -10,6 +10,7 @@ from steelyard import check
 from steelyard.errors import BadFile
 from steelyard.io import guess
 from steelyard.io.description import Description, read_description
+from steelyard.io.joined_tables import own_rows
 from steelyard.io.missing_rows import without_missing
 from steelyard.io.requirements import require_answerable, require_matched_rows
 from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
@@ -41,7 +42,8 @@ def _read(path: Path, data: Path | None) -> Recording:
         return replace(_recording(description, [table], [cells], path), described=False)
     description = read_description(path)
     tables = open_tables(description.streams, path.parent, data)
-    return _recording(description, tables, read_cells(description.streams, tables), path, data)
+    rows = own_rows(description.streams, tables, read_cells(description.streams, tables))
+    return _recording(description, tables, rows, path, data)
 
 
 def _recording(

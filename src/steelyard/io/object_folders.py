@@ -15,6 +15,7 @@ from steelyard.io.array_table import ArrayTable, read_arrays, require_numbers
 from steelyard.io.documents import load_json
 from steelyard.io.entries import is_number
 from steelyard.io.in_file import in_file
+from steelyard.io.json_arrays import Shape, array_of
 from steelyard.io.ply_files import read_mesh
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.known import MOTION, KnownObject, Track, unseen_finding
@@ -81,7 +82,7 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
 
 def read_truth(path: Path) -> dict[str, Any]:
     """Return truth.json with the entries every object needs; raises BadFile."""
-    needed = {
+    needed: dict[str, Shape] = {
         "mass_kg": (), "com_mesh_m": (3,), "inertia_com_mesh_kgm2": (3, 3), "T_mesh_from_grasp": (4, 4),
         "reference_extents_sensor_m": (3,),
     }  # fmt: skip
@@ -89,12 +90,7 @@ def read_truth(path: Path) -> dict[str, Any]:
     for key, shape in needed.items():
         if key not in facts:
             raise BadFile(f'{path}: "{key}" is missing. It needs {", ".join(needed)}.')
-        try:
-            found = np.asarray(facts[key], float)
-        except (TypeError, ValueError, OverflowError):
-            raise BadFile(f'{path}: "{key}" must be numbers.') from None
-        if found.shape != shape or not np.isfinite(found).all():
-            raise BadFile(f'{path}: "{key}" must be finite numbers of shape {shape}; got {found.shape}.')
+        array_of(path, facts, key, shape)
     _require_parts(path, facts.get("parts", []))
     return facts
 

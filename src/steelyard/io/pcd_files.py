@@ -10,6 +10,7 @@ import numba
 import numpy as np
 
 from steelyard.errors import BadFile
+from steelyard.io.ascii_columns import typed
 
 _TYPES = {
     ("F", "4"): "<f4", ("F", "8"): "<f8", ("U", "1"): "u1", ("U", "2"): "<u2", ("U", "4"): "<u4", ("U", "8"): "<u8",
@@ -88,8 +89,9 @@ def _ascii(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> Any:
     for name in dtype.names or ():
         size = int(np.prod(dtype[name].shape))
         found = values[:, column : column + size]
-        table[name] = found.reshape(table[name].shape)
         column += size
+        if name[0] != "_":  # padding may hold anything
+            table[name] = typed(path, f'field "{name}"', found, dtype[name].base).reshape(table[name].shape)
     return table
 
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
+from steelyard.io.ascii_columns import typed
 from steelyard.io.in_file import in_file
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
@@ -144,7 +145,8 @@ def _ascii(path: Path, element: _Element, words: list[bytes]) -> tuple[dict[str,
     for (name, kind, first, k), (_, _, length) in zip(slots, element.fields, strict=True):
         if length and (table[:, first - 1] != k).any():
             raise _ragged(path, name)
-        out[name] = (table[:, first : first + k] if length else table[:, first]).astype(kind)
+        values = table[:, first : first + k] if length else table[:, first]
+        out[name] = typed(path, f'property "{name}" of element "{element.name}"', values, kind)
     return out, used
 
 

@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.identify.estimate import Evidence, PartMass
 from steelyard.inertia import forms
+from steelyard.io.json_arrays import array_or_none
 
 MOST_PARTS = 100_000
 
@@ -32,7 +33,7 @@ def _part(path: Path, row: Mapping[str, Any]) -> PartMass:
     volume = _required(path, row, "volume_m3", where)
     if volume <= 0:
         raise BadFile(f'{path}: "volume_m3" of {where} must be above zero; found {volume:g}.')
-    centroid = _array(path, row, "centroid_m", (3,))
+    centroid = array_or_none(path, row, "centroid_m", (3,))
     if centroid is None:
         raise BadFile(f'{path}: "centroid_m" of {where} must be 3 finite numbers.')
     std = max(_required(path, row, "std_kg", where), 0.0)
@@ -62,7 +63,7 @@ def evidence_of(path: Path, values: Mapping[str, Any]) -> Evidence:
         chi2_per_dof=_number(path, seen, "chi2_per_dof"),
         holdout_force_N=_number(path, seen, "holdout_force_N"),
         holdout_torque_Nm=_number(path, seen, "holdout_torque_Nm"),
-        spread=_array(path, seen, "spread", (10,)),
+        spread=array_or_none(path, seen, "spread", (10,)),
         jackknife_people=_people(path, seen.get("jackknife_std")),
     )
 
@@ -85,8 +86,8 @@ def _people(path: Path, entry: Any) -> Array | None:
     if not isinstance(entry, dict):
         raise BadFile(f'{path}: "jackknife_std" must be one object.')
     mass = _number(path, entry, "mass_kg")
-    com = _array(path, entry, "com_m", (3,))
-    inertia = _array(path, entry, "inertia_com_kgm2", (3, 3))
+    com = array_or_none(path, entry, "com_m", (3,))
+    inertia = array_or_none(path, entry, "inertia_com_kgm2", (3, 3))
     if mass is None or com is None or inertia is None:
         return None
     return np.concatenate([[mass], com, forms.upper(inertia)])
@@ -110,23 +111,5 @@ def notes_of(path: Path, values: Mapping[str, Any]) -> tuple[str, ...]:
 
 def _number(path: Path, entry: Mapping[str, Any], key: str) -> float | None:
     """Return one finite number, None where there is none."""
-    value = entry.get(key)
-    if value is None:
-        return None
-    found = _array(path, entry, key, ())
+    found = array_or_none(path, entry, key, ())
     return None if found is None else float(found)
-
-
-def _array(path: Path, entry: Mapping[str, Any], key: str, shape: tuple[int, ...]) -> Array | None:
-    """Return finite numbers of a shape, None where the entry is missing or null, whole or in part."""
-    value = entry.get(key)
-    try:
-        array = np.array(value, dtype=np.float64) if value is not None else None
-    except (TypeError, ValueError, OverflowError):
-        array = np.empty(0)
-    if array is None or (array.shape == shape and np.isnan(array).any()):
-        return None
-    if array.shape != shape or not np.isfinite(array).all():
-        wanted = " x ".join(map(str, shape)) + " numbers" if shape else "one number"
-        raise BadFile(f'{path}: "{key}" must be {wanted} or null; found something else.')
-    return array

@@ -14,6 +14,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.io.documents import load_json
 from steelyard.io.in_file import in_file
+from steelyard.io.json_arrays import array_of
 from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
 from steelyard.io.team_results import team_of
 
@@ -89,11 +90,4 @@ def _body(path: Path, values: dict[str, Any]) -> InertialParameters:
 def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:
     if key not in values:
         raise BadFile(f'{path}: not a Steelyard result: "{key}" is missing. {_WRITE_ONE}')
-    try:
-        array = np.array(values[key], dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        array = np.empty(0)
-    if array.shape != shape or not np.isfinite(array).all():
-        wanted = " x ".join(map(str, shape)) + " finite numbers" if shape else "one finite number"
-        raise BadFile(f'{path}: "{key}" must be {wanted}; found something else.')
-    return array
+    return array_of(path, values, key, shape)

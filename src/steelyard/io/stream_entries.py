@@ -8,7 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.io.entries import Entry
+from steelyard.io.entries import Entry, listed
 from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
 from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, spelled
 from steelyard.logs.recording import QUANTITIES, Mount
@@ -52,12 +52,17 @@ class QuantitySpec:
 
 @dataclass(frozen=True)
 class TimeSpec:
-    """A time column with its unit, or (column None) a steady `rate` [Hz]."""
+    """One column of stamps with its unit, two with the larger unit first, or (none) a steady `rate` [Hz]."""
 
-    column: Column | None
-    unit: str
+    columns: tuple[Column, ...]
+    units: tuple[str, ...]
     rate: float
     where: str
+
+    @property
+    def unit(self) -> str:
+        """The unit that the stamps count in: of two, the smaller."""
+        return self.units[-1]
 
 
 @dataclass(frozen=True)
@@ -167,11 +172,31 @@ def _time(stream: Entry) -> TimeSpec | None:
     if "rate" in entry:
         entry.only("rate", "unit")
         scale = {"Hz": 1.0, "kHz": 1e3}[entry.choice("unit", ("Hz", "kHz"), "Hz")]
-        return TimeSpec(None, "s", entry.positive("rate") * scale, entry.where)
+        return TimeSpec((), ("s",), entry.positive("rate") * scale, entry.where)
     entry.only("columns", "unit", "rate")
-    entry.require("columns", 'time = { columns = ["t"], unit = "s" }, or time = { rate = 1000, unit = "Hz" }')
-    column = _columns(entry, 1)[0]
-    return TimeSpec(column, entry.choice("unit", list(TIME), "s"), 0.0, entry.where)
+    value = entry.require("columns", 'time = { columns = ["t"], unit = "s" }, or time = { rate = 1000, unit = "Hz" }')
+    units = _time_units(entry)
+    if isinstance(value, list) and len(value) not in (1, len(units)):
+        raise entry.error(
+            '"columns" must be one with one unit, or two with two units, such as unit = ["s", "ns"]; '
+            f"got {len(value)} with {len(units)}: {value!r}."
+        )
+    return TimeSpec(_columns(entry, len(units)), units, 0.0, entry.where)
+
+
+def _time_units(entry: Entry) -> tuple[str, ...]:
+    """Return the unit of time, or two of them, the larger first."""
+    value = entry.values.get("unit")
+    if not isinstance(value, list):
+        return (entry.choice("unit", list(TIME), "s"),)
+    known = list(TIME)  # from the largest
+    places = [known.index(unit) for unit in value if unit in known]
+    if len(value) != 2 or len(places) != 2 or places[0] >= places[1]:
+        raise entry.error(
+            f'two columns of time take two units, the larger first, such as unit = ["s", "ns"]; got {value!r}. '
+            f"Possible here: {listed(known)}."
+        )
+    return tuple(value)
 
 
 def _delay(stream: Entry) -> float | None:

@@ -14,6 +14,7 @@ from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.channels import channel, channel_with_gaps, require_one_length
 from steelyard.io.clocks import Clock, common_origin, require_likely_step, steady
 from steelyard.io.entries import listed
+from steelyard.io.split_stamps import one_column
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
 from steelyard.io.tables import Table, choose_columns, find_file, open_table
 
@@ -34,19 +35,20 @@ def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) ->
 
 
 def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cells]:
-    """Return the cells of every stream; each file is read once, whatever number of streams share it."""
+    """Return the cells of every stream's own columns; each file is read once, whatever number of streams share it."""
+    own: list[set[int]] = []
     wanted: dict[Path, set[int]] = {}
     exact: dict[Path, set[int]] = {}
     for spec, table in zip(specs, tables, strict=True):
-        stamps = _time_column(spec, table)
-        chosen = _chosen(spec, table, stamps)
-        wanted.setdefault(table.path, set()).update(chosen, stamps)
+        stamps = time_columns(spec, table)
+        own.append({*_chosen(spec, table, stamps), *stamps})
+        wanted.setdefault(table.path, set()).update(own[-1])
         exact.setdefault(table.path, set()).update(stamps)
     cells: dict[Path, Cells] = {}
     for table in tables:
         if table.path not in cells:
             cells[table.path] = table.read(sorted(wanted[table.path]), sorted(exact[table.path]))
-    return [cells[table.path] for table in tables]
+    return [{n: cells[table.path][n] for n in mine} for table, mine in zip(tables, own, strict=True)]
 
 
 def _chosen(spec: StreamSpec, table: Table, stamps: Sequence[int]) -> list[int]:
@@ -71,10 +73,11 @@ def _numbers(spec: QuantitySpec, table: Table) -> tuple[int, ...]:
     return choose_columns(table.header, spec.columns, spec.count, spec.where)
 
 
-def _time_column(spec: StreamSpec, table: Table) -> tuple[int, ...]:
-    if spec.time is None or spec.time.column is None:
+def time_columns(spec: StreamSpec, table: Table) -> tuple[int, ...]:
+    """Return the columns of the clock, none where the stream has no stamps."""
+    if spec.time is None or not spec.time.columns:
         return ()
-    return choose_columns(table.header, (spec.time.column,), 1, spec.time.where)
+    return choose_columns(table.header, spec.time.columns, len(spec.time.units), spec.time.where)
 
 
 def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, gaps: bool = False) -> dict[str, Array]:
@@ -94,8 +97,8 @@ def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, ga
             raise BadDescription(f'{spec.where}: torque = "zero" belongs in the stream that holds "force".')
         out["torque"] = check.frozen(np.zeros_like(out["force"]))
     lengths = {name: len(values) for name, values in out.items()}
-    stamps = [len(cells[n]) for n in _time_column(spec, table)]
-    require_one_length(lengths | ({"time": stamps[0]} if stamps else {}), spec.where)
+    stamps = [len(cells[n]) for n in time_columns(spec, table)]
+    require_one_length(lengths | dict(zip(("time", "its second column"), stamps, strict=False)), spec.where)
     if not next(iter(lengths.values())):
         raise BadValue(f"{spec.where}: the log is empty: it has no rows. Record again, or correct the path.")
     return out
@@ -114,14 +117,15 @@ def seconds_of(
     """
     clocks: dict[int, Clock] = {}
     for i, (spec, table, mine) in enumerate(zip(specs, tables, cells, strict=True)):
-        for number in _time_column(spec, table):
-            if spec.time is not None:
-                clocks[i] = Clock.of(mine[number], spec.time.unit, spec.time.where, gaps)
+        columns = [mine[number] for number in time_columns(spec, table)]
+        if spec.time is not None and columns:
+            stamps = one_column(columns, spec.time.units, spec.time.where)
+            clocks[i] = Clock.of(stamps, spec.time.unit, spec.time.where, gaps)
     origin = common_origin(list(clocks.values()))
     seconds: list[Array | None] = [clocks[i].seconds_after(origin) if i in clocks else None for i in range(len(specs))]
     start = min((float(np.nanmin(s)) for s in seconds if s is not None), default=0.0)
     for i, spec in enumerate(specs):
-        if spec.time is not None and spec.time.column is None:
+        if spec.time is not None and not spec.time.columns:
             require_likely_step(1 / spec.time.rate, spec.time.where)
             seconds[i] = steady(spec.time.rate, rows[i], start)
     return seconds

@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
 from steelyard.errors import BadFile, BadInput
 from steelyard.identify.estimate import Estimate
 from steelyard.io.hinge_results import hinge_entries, hinge_of
+from steelyard.io.json_arrays import array_of
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
@@ -68,39 +68,27 @@ def team_of(path: Path, values: Mapping[str, Any], plain: Estimate) -> TeamEstim
 def _grasp(path: Path, name: str, entry: Any) -> GraspEstimate:
     if not isinstance(entry, dict):
         raise BadFile(f'{path}: the grasp of "{name}" must be one object with rotation and position_m.')
-    where = f'the grasp of "{name}"'
-    matrix = _array(path, entry, "rotation", where, lambda s: s == (3, 3))
+    of = f' of the grasp of "{name}"'
+    matrix = array_of(path, entry, "rotation", (3, 3), of)
     try:
         turn = Rotation(matrix)
     except BadInput as error:
-        raise BadFile(f"{path}: {where}: {error}") from None
-    place = _array(path, entry, "position_m", where, lambda s: s == (3,))
+        raise BadFile(f'{path}: "rotation"{of}: {error}') from None
+    place = array_of(path, entry, "position_m", (3,), of)
     covariance = np.zeros((6, 6))
     if "covariance" in entry:
-        covariance = _array(path, entry, "covariance", where, lambda s: s == (6, 6))
+        covariance = array_of(path, entry, "covariance", (6, 6), of)
     elif "std_deg" in entry and "std_m" in entry:
-        said = [_array(path, entry, key, where, lambda s: s == (3,)) for key in ("std_deg", "std_m")]
+        said = [array_of(path, entry, key, (3,), of) for key in ("std_deg", "std_m")]
         covariance = np.diag(np.concatenate([np.deg2rad(said[0]), said[1]]) ** 2)
     lost = np.zeros((0, 6))
     if entry.get("lost"):
-        lost = _array(path, entry, "lost", where, lambda s: len(s) == 2 and s[1] == 6)
+        lost = array_of(path, entry, "lost", (None, 6), of)
     return GraspEstimate(Pose(turn, place), covariance, lost)
-
-
-def _array(
-    path: Path, entry: Mapping[str, Any], key: str, where: str, fits: Callable[[tuple[int, ...]], bool]
-) -> Array:
-    try:
-        array = np.array(entry.get(key), dtype=np.float64)
-    except (TypeError, ValueError, OverflowError):
-        array = np.empty(0)
-    if not fits(array.shape) or not np.isfinite(array).all():
-        raise BadFile(f'{path}: "{key}" of {where} has the wrong shape, or numbers that are not finite.')
-    return array
 
 
 def _seconds(path: Path, values: Mapping[str, Any], key: str) -> dict[str, float]:
     entry = values.get(key) or {}
     if not isinstance(entry, dict):
         raise BadFile(f'{path}: "{key}" must be one object of numbers.')
-    return {str(name): float(_array(path, entry, name, key, lambda s: s == ())) for name in entry}
+    return {str(name): float(array_of(path, entry, name, (), f" of {key}")) for name in entry}
