@@ -10,7 +10,7 @@ import numpy as np
 
 from steelyard import evaluate
 from steelyard.check import Array
-from steelyard.identify.linear import normal_equations
+from steelyard.identify.linear import inverse_scaled, normal_equations
 from steelyard.identify.noise_cost import residual_map_of, weight
 from steelyard.identify.regressor import design
 from steelyard.inertia import InertialParameters, forms
@@ -20,7 +20,6 @@ from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import noise_std
 
 DRAWS = 4000
-RANK_TOLERANCE = 1e-12
 
 
 def covariance(log: MotionLog, noise: Noise, body: InertialParameters, parts: Parts) -> Array:
@@ -30,10 +29,7 @@ def covariance(log: MotionLog, noise: Noise, body: InertialParameters, parts: Pa
     scatter = Moments.of_log(log).sum
     information, _ = normal_equations(T, scatter[None], weight(K, noise.acceleration, noise.wrench)[None])
     B = parts.per_mass
-    A = B.T @ information @ B
-    scale = 1 / np.sqrt(np.diag(A))
-    inverse = np.linalg.pinv(A * np.outer(scale, scale), rcond=RANK_TOLERANCE, hermitian=True) * np.outer(scale, scale)
-    return np.asarray(B @ inverse @ B.T)
+    return np.asarray(B @ inverse_scaled(B.T @ information @ B) @ B.T)
 
 
 def expected_scores(spread: Array, body: InertialParameters, edges: Array) -> dict[str, float]:
