@@ -69,7 +69,11 @@ def _tilted_finding(tilt: GlanceTilt) -> Finding:
         f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
         f"given, along ({direction_words(tilt.gravity)}) of W; the answer uses the direction found{tilt.blind_words}."
     )
-    return Finding.of("base-tilted" if tilt.angle < STEEP else "gravity-frame", message)
+    if tilt.angle >= STEEP:
+        return Finding.of("gravity-frame", message)
+    share = percent(float(np.sin(tilt.angle)))
+    pull = f"On a level base a pull of {share} of the weight looks the same, and the mass is then off by about as much."
+    return Finding.of("base-tilted", f"{message} {pull}")
 
 
 def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> bool:
