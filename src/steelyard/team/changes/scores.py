@@ -13,7 +13,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.linear import inverse_scaled
 from steelyard.logs.log import Integers
 
 # Directions of scaled parameters with less than this share of the information are open: they stay at zero.
@@ -53,7 +52,8 @@ class Scores:
         held  (C, C) information from elsewhere
         """
         H = self.information.sum(0) + (0.0 if held is None else held)
-        inverse = inverse_scaled(H, OPEN)
+        scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+        inverse = np.linalg.pinv(H * np.outer(scale, scale), rcond=OPEN, hermitian=True) * np.outer(scale, scale)
         size = inverse @ self.pull.sum(0)
         # With the parameters taken out: what is explained is no noise.
         left = self.pull - self.information @ size
