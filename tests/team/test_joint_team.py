@@ -334,7 +334,8 @@ def test_a_fit_that_ends_too_early_is_told(sensing: str, fit: str, monkeypatch: 
     early = "The fit of the grasps ended before it settled"
     notes = JointTeam().identify(made.log).notes
     assert not any(early in note for note in notes)
-    assert any("not the calibration of the arms" in note for note in notes) == (sensing == "poses")
+    assert any("constant error of a robot's tool frame" in note for note in notes) == (sensing == "poses")
+    assert not any("come back with the pose" in note for note in notes)
     monkeypatch.setattr(f"steelyard.team.{fit}.STEPS", 1)
     assert any(early in note for note in JointTeam().identify(made.log).notes)
 

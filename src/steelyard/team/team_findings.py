@@ -187,10 +187,19 @@ def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:
     )
 
 
-FROM_POSES = (
-    "Error bars of the grasps hold noise, not the calibration of the arms: errors that come back with the pose move a "
-    "grasp by about as much."
-)
+def uncalibrated(recurring: Array | None) -> tuple[str, ...]:
+    """Return notes on what bars of grasps hold of the arms' calibration, by how much errors come back with the pose.
+
+    recurring  (2,) rms [rad, m]; None where none show
+    """
+    constant = "No error bar holds a constant error of a robot's tool frame: its grasp is off by as much."
+    if recurring is None:
+        return (constant,)
+    turn, place = np.degrees(recurring[0]), 1e3 * recurring[1]
+    text = (
+        f"Poses err by {turn:.2g} degrees and {place:.2g} mm in ways that come back with the pose: bars allow for it."
+    )
+    return text, constant
 
 
 def unsettled(left: float) -> tuple[str, ...]:

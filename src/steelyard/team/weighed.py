@@ -32,12 +32,12 @@ from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.team_findings import (
-    FROM_POSES,
     bad_robots,
     gains,
     late_clocks,
     lost_directions,
     open_parameters,
+    uncalibrated,
     unseen_gains,
     unsettled,
 )
@@ -117,7 +117,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *open_parameters(team.identified, team.evidence.rank),
     )
     said = (*unsettled(seen.left), *unseen_gains(team, weight_by_gains(groups, D)))
-    said = (*said, *(FROM_POSES,) * (seen.order == 2))
+    said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
     return replace(team, findings=found, notes=(*team.notes, *said))
 
 

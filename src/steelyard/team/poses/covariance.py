@@ -16,6 +16,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.spatial import cross, cross_matrix
 from steelyard.team.adjoint import adjoint
+from steelyard.team.poses.calibration import recurring
 from steelyard.team.poses.fit import PoseFit
 from steelyard.team.poses.statistic import OWN
 
@@ -35,6 +36,7 @@ class Spread:
     turns     (N, 6, 6) from a grasp's own axes to those of R
     level     (N, 3) direction of gravity in each grasp's own axes over how well [rad] its base and the reference's
               agree on it, zero where they do not tell: it holds turns that the motion does not show
+    recurring (2,) [rad, m] rms errors of poses that come back with the pose, None where none show
     """
 
     full: Array
@@ -42,6 +44,7 @@ class Spread:
     late: Array | None
     turns: Array
     level: Array | None = None
+    recurring: Array | None = None
 
     def with_lost(self, size: float) -> Spread:
         """Return the spread with directions that are not shown as unsure as a team of this size [m] can be."""
@@ -92,6 +95,10 @@ def grasp_covariance(fit: PoseFit) -> Spread:
     H = _turned(_turned(fit.known.information, central).T, central)
     factor = np.sqrt(_inflation(fit, np.diag(H), central))[KIND[unknown % OWN]]
     V = H[np.ix_(unknown, unknown)] * np.outer(factor, factor)
+    again = recurring(fit)
+    if again is not None:
+        pulls = _turned(again.scores, central)[:, unknown]
+        V = V + pulls.T @ pulls
     # Grasps and delays are the same whatever homes turn about.
     asked = np.flatnonzero((unknown % OWN < 6) | (unknown % OWN == OWN - 1))
     inverse = np.zeros((len(asked), OWN * count))
@@ -109,7 +116,7 @@ def grasp_covariance(fit: PoseFit) -> Spread:
         late = np.sqrt(np.maximum(_against(covariance[np.ix_(delay, delay)], fit.reference), 0))
     turn = adjoint(fit.team.grasps)
     turn[:, 3:, :3] = 0.0
-    return Spread(full, blind, late, turn)
+    return Spread(full, blind, late, turn, recurring=None if again is None else again.size)
 
 
 def _against(covariance: Array, reference: int) -> Array:
