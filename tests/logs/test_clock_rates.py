@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 from made_recordings import BODY, Swing, recording
 
+from steelyard.logs import clock_rates
 from steelyard.logs.alignment import align
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.pipelines.held_object import identify
@@ -87,3 +88,28 @@ def test_a_hand_on_the_object_is_no_clock(seed: int) -> None:
     force = wrench.channels["force"] + pushed[:, None] * np.array([3.0, -5.0, 4.0])
     hand = replace(wrench, channels={**wrench.channels, "force": force})
     assert not unsteady(align(replace(sound, streams=(hand, *sound.streams[1:]))))
+
+
+class Slow(Swing):
+    """A swing at a fifth of its speed."""
+
+    def at(self, t):
+        R, omega, alpha, position, velocity, acceleration = super().at(t / 5)
+        return R, omega / 5, alpha / 25, position, velocity / 5, acceleration / 25
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_errors_that_vary_with_the_pose_are_no_clock(seed: int, monkeypatch: pytest.MonkeyPatch) -> None:
+    # Some pass all other bounds; here all do.
+    monkeypatch.setattr(clock_rates, "SURE", 0.0)
+    monkeypatch.setattr(clock_rates, "LEFT", np.inf)
+    monkeypatch.setattr(clock_rates, "LEAST_S", 0.0)
+    sound = recording(Slow(seed, 60.0), position=True, imu=False)
+    wrench, poses = sound.streams
+    rng = np.random.default_rng(seed)
+    turns = poses.channels["rotation"].reshape(-1, 9)
+    smooth = np.concatenate([turns**2, np.sin(3 * turns)], 1) @ rng.normal(size=(18, 6)) * ([0.4] * 3 + [0.04] * 3)
+    off = np.stack([np.interp(wrench.time, poses.time, column) for column in smooth.T], 1)
+    channels = {"force": wrench.channels["force"] + off[:, :3], "torque": wrench.channels["torque"] + off[:, 3:]}
+    aligned = align(replace(sound, streams=(replace(wrench, channels=channels), poses)))
+    assert not unsteady(aligned)

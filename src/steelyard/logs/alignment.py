@@ -164,11 +164,7 @@ def _rows(given: Prepared) -> tuple[Array, Felt]:
 def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
     reach = min(_LONGEST_DELAY_S, 0.1 * float(time[-1] - time[0]))
-    ok = given.covered(time, given.known)
-    if given.unknown:
-        everyone = {**given.known, **dict.fromkeys(given.unknown, 0.0)}
-        inner = [given.covered(time, {n: d + s for n, d in everyone.items()}) for s in (-reach, reach)]
-        ok = inner[0] & inner[1]
+    ok = given.covered(time, given.known, reach if given.unknown else 0.0)
     pick = np.flatnonzero(ok)
     if len(pick) < _FEWEST_ROWS:
         raise CannotAnswer(

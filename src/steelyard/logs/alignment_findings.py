@@ -10,13 +10,13 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
+from steelyard.logs.holes import holes
 from steelyard.logs.imu import Imu, Mounting
 from steelyard.logs.recording import Stream
 from steelyard.spatial import Rotation
 
 _TURNED = np.radians(5)
 _LOOSE_M, _LOOSE_RAD = 0.1, 0.1
-_GAP_S, _GAP_STEPS = 0.25, 10  # a step of a clock that is longer than both is a gap worth a note
 _THIRD = 0.1  # of its size: below this, gravity hardly sweeps a third direction
 
 
@@ -60,14 +60,11 @@ def gaps(streams: Sequence[Stream]) -> tuple[str, ...]:
     """Return a note on each timed stream that has no rows for a while."""
     out = []
     for stream in streams:
-        if stream.time is None or len(stream.time) < 2:
-            continue
-        steps = np.diff(stream.time)
-        long = np.flatnonzero(steps > max(_GAP_S, _GAP_STEPS * float(np.median(steps))))
-        if len(long):
+        long = holes(stream)
+        if stream.time is not None and len(long):
             many = f" in {len(long)} gaps, the first" if len(long) > 1 else ""
-            first = float(stream.time[long[0]] - stream.time[0])
-            out.append(f"'{stream.name}' has no rows for {steps[long].sum():.2g} s{many} at {first:.4g} s")
+            first = float(long[0, 0] - stream.time[0])
+            out.append(f"'{stream.name}' has no rows for {np.ptp(long, axis=1).sum():.2g} s{many} at {first:.4g} s")
     return tuple(out)
 
 

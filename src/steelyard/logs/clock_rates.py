@@ -24,6 +24,9 @@ from steelyard.logs.runs import picked
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
 # one delay leaves, is off at the ends by so much [s], and by no more than a clock or a noted rate may be [s/s].
 SURE, LEFT, LEAST_S, LARGEST = 8.0, 0.95, 5e-5, 0.05
+# A clock shows everywhere; errors that vary with the pose feign another one in each stretch. So the rate must stand out
+# by so many standard deviations of what leaving out each of some stretches does to it.
+HOLDS, _STRETCHES = 2.0, 8
 # The first stretch is at least this long on either side of the middle [s]; each is twice as long as the one before.
 _FIRST_S, _STEPS = 4.0, 4
 # Rows that are enough, and that a stretch must have, and blocks of them whose scores tell standard deviations.
@@ -80,7 +83,11 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
     if not _better(every, start, found):
         return {}
     least = LEAST_S / full
-    return {n: f for n, f in found.items() if max(SURE * f.rate_std, least) < abs(f.rate) < LARGEST}
+    sure = {n: f for n, f in found.items() if max(SURE * f.rate_std, least) < abs(f.rate) < LARGEST}
+    if not sure:
+        return {}
+    loose = _by_leaving_out(every, start, found, full)
+    return {n: f for n, f in sure.items() if abs(f.rate) > HOLDS * loose[n]}
 
 
 def put_right(recording: Recording, rates: Mapping[str, ClockRate]) -> Recording:
@@ -147,6 +154,17 @@ def _settled(
         if (np.abs(step) < _SETTLED * std).all():
             break
     return clocks
+
+
+def _by_leaving_out(
+    question: Question, start: Mapping[str, ClockRate], found: Mapping[str, ClockRate], half: float
+) -> dict[str, float]:
+    """Return the standard deviation [s/s] of each rate by leaving out each of some stretches (jackknife)."""
+    stretch = np.arange(len(question.time)) * _STRETCHES // len(question.time)
+    without = [np.flatnonzero(stretch != k).astype(np.int64) for k in range(_STRETCHES)]
+    told = [_settled(_rows(question, rows), start, found, half) for rows in without]
+    spread = np.sqrt(_STRETCHES - 1)
+    return {n: float(spread * np.std([clocks[n].rate for clocks in told])) for n in found}
 
 
 def _step(

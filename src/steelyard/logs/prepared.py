@@ -11,8 +11,10 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
 from steelyard.logs.conditioning import sampling_rate
 from steelyard.logs.felt import Felt
+from steelyard.logs.holes import unknown_motion
 from steelyard.logs.imu import Imu, imu
 from steelyard.logs.kinematics import Kinematics, kinematics
+from steelyard.logs.outliers import inside, merged
 from steelyard.logs.recording import Recording, Stream
 
 
@@ -39,6 +41,7 @@ class Prepared:
     clock, felt     (N,) raw samples of the wrench on the object
     known, unknown  delays that were given, and the streams whose delay is sought
     cutoff          [Hz] common low-pass, None where one stream tells everything on one clock
+    holes           stream -> stamps (K, 2) [s] between which its motion is not known
     """
 
     recording: Recording
@@ -50,6 +53,7 @@ class Prepared:
     imu: Imu | None
     known: Mapping[str, float]
     unknown: tuple[str, ...]
+    holes: Mapping[str, Array]
 
     @property
     def source(self) -> str:
@@ -68,12 +72,13 @@ class Prepared:
             spans[self.imu.name] = (self.imu.signal.start, self.imu.signal.end)
         return spans
 
-    def covered(self, time: Array, delays: Mapping[str, float]) -> Mask:
-        """Return which times (N,) all streams cover."""
+    def covered(self, time: Array, delays: Mapping[str, float], reach: float = 0.0) -> Mask:
+        """Return which times (N,) all streams cover, be they late by up to `reach` [s] more or less."""
         ok = np.ones(len(time), bool)
         for name, (start, end) in self.spans().items():
             stamp = time + delays.get(name, 0.0)
-            ok &= (stamp >= start - 1e-9) & (stamp <= end + 1e-9)
+            ok &= (stamp >= start + reach - 1e-9) & (stamp <= end - reach + 1e-9)
+            ok &= ~inside(stamp, merged(self.holes[name] + [-reach, reach]))
         return ok
 
 
@@ -97,8 +102,9 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     sought = late if options.estimate_delays else []
     felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
     known = {n: d for n, d in known.items() if n not in sought}
+    unseen = {s.name: unknown_motion(s) for s in streams if s.name in (*moving.streams, *used)}
     return Prepared(
-        recording, options, stamps_of(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought)
+        recording, options, stamps_of(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought), unseen
     )  # fmt: skip
 
 
