@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import contextlib
 from dataclasses import replace
 
 import numpy as np
@@ -66,6 +67,46 @@ def test_a_sign_of_forces_or_torques_alone_is_put_right(robots: int, wrong: str)
         assert f"the {wrong} columns of '{name}'" in said.remedy
         np.testing.assert_allclose(found.parameters.vector, right.parameters.vector, rtol=1e-6, atol=1e-9)
     assert "wrench-sign-flipped" not in right.codes()
+
+
+def tared(log: TeamLog) -> TeamLog:
+    """Return the log with every sensor set to zero under the load of the first row."""
+    made, first = [], log.recordings[0].tracks
+    for recording in log.recordings:
+        tracks = dict(recording.tracks)
+        for name, track in tracks.items():
+            read = {k: v - first[name].channels[k][0] for k, v in track.channels.items() if k in ("force", "torque")}
+            tracks[name] = replace(track, channels={**track.channels, **read})
+        made.append(replace(recording, tracks=tracks))
+    return log.with_recordings(*made)
+
+
+@pytest.mark.parametrize("robots", [2, 3])
+@pytest.mark.parametrize("seed", [100, 102, 104])
+def test_sensors_tared_under_load_still_weigh(robots: int, seed: int) -> None:
+    """Their raw sums say a mass of about zero, of either sign; what varies with tilt says 12 kg."""
+    found = JointTeam().identify(tared(trial(robots, seed=seed).log))
+    assert abs(found.mass - 12) < 4 * found.std[0] < 2
+    assert "wrench-sign-flipped" not in found.codes()
+
+
+def test_all_signs_wrong_are_refused_after_taring_under_load() -> None:
+    with pytest.raises(CannotAnswer, match="the forces must hold the payload up; they add up to a mass of -1"):
+        JointTeam().identify(turned(tared(trial(3).log), "robot0", "robot1", "robot2"))
+
+
+def test_a_level_payload_that_was_tared_under_load_has_no_wrong_sign() -> None:
+    """Whatever sign the mass then has by chance, it is open, and no sign is to be blamed."""
+    level = replace(NOISY, force_bias_N=0.0)
+    for seed in range(100, 104):
+        scene = TeamScene(level, 3, sensing="poses", kinds=("still", "grasp"), still_turns=((0.0, 0.0, 0.0),) * 3)
+        log = tared(simulate_team(scene, seed).log)
+        with contextlib.suppress(CannotAnswer):
+            found = JointTeam().identify(log)
+            assert abs(found.mass - 12) < 4 * found.std[0]
+            continue
+        with pytest.raises(CannotAnswer, match="do not show the mass"):
+            JointTeam().identify(log)
 
 
 def test_all_signs_wrong_are_refused() -> None:

@@ -26,7 +26,7 @@ from steelyard.team.misread.torques import with_torque_sign
 from steelyard.team.payload.balance import require_balance
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
-from steelyard.team.payload.fit import fit_payload
+from steelyard.team.payload.fit import PayloadFit, fit_payload
 from steelyard.team.payload.model import Group, unit_bias
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
@@ -50,6 +50,8 @@ LEAST_CHI2 = -0.1
 COMPARABLE = 0.1
 # The mass is open where so much of it lies along what is not shown: mostly it is all of it or next to nothing.
 UNWEIGHED = 0.5
+# A mass below zero by fewer standard deviations is open; by more, a sign is wrong.
+OPEN_SIGN = 3.0
 # Findings that say already why forces do not fit.
 TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
 
@@ -100,7 +102,8 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
-        _require_mass(payload.lost)
+        _require_mass(payload)
+        require_lift(float(payload.parameters[0]), "the forces")
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))
     told = any(one.code in TOLD for one in (*seen.findings, *read))
@@ -166,12 +169,16 @@ def _require_one_clock(chi2: float) -> None:
         )
 
 
-def _require_mass(lost: Array) -> None:
-    """Raise CannotAnswer where the mass lies along directions (10, L) that the rows do not show: it would be zero."""
-    if np.linalg.norm(lost[0]) > UNWEIGHED:
+def _require_mass(payload: PayloadFit) -> None:
+    """Raise CannotAnswer where the mass lies along directions that the rows do not show, where it would be zero, and
+    where biases leave even its sign open.
+    """
+    mass, std = float(payload.parameters[0]), float(np.sqrt(payload.covariance[0, 0]))
+    if np.linalg.norm(payload.lost[0]) > UNWEIGHED or -OPEN_SIGN * std < mass <= 0:
         raise CannotAnswer(
-            "motion and forces do not show the mass: noise of the motion is as large as what it tells beside a bias of "
-            "the forces. Turn the payload about two axes, farther or faster, or measure the motion better."
+            "motion and forces do not show the mass: beside a bias of the forces, what they tell of it is no more than "
+            "noise. Turn the payload about two axes, farther or faster, or measure the motion better; check the sign "
+            "of each robot's forces."
         )
 
 

@@ -101,7 +101,11 @@ def _without_slips(log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit]
         # Recordings that differ for another reason than a slip still do.
         if before.rough and found.between and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER):
             break
-        slips.append(team.measured(log, found))
+        measured = team.measured(log, found)
+        # What bends the first fit looks larger in it.
+        if not measured.slip.large:
+            break
+        slips.append(measured)
     if not slips:
         return replace(given, clocks_left=left)
     team = fitted(edited(edit, slips))

@@ -41,6 +41,11 @@ class Slip:
     angle: float
     score: float
 
+    @property
+    def large(self) -> bool:
+        """Whether the step is one that counts."""
+        return self.distance > LEAST_M or self.angle > LEAST_RAD
+
     @classmethod
     def of(cls, robot: int, row: int, step: Array, score: float) -> Slip:
         """Return the slip by a step (6,), rotation vector and position."""
@@ -170,8 +175,7 @@ def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool 
         score, step = _steps(apart[:, i], seen[:, i], width, gap, noise[i])
         row = int(np.argmax(score))
         slip = Slip.of(i, row, step[row], float(score[row]))
-        large = slip.distance > LEAST_M or slip.angle > LEAST_RAD
-        if slip.score > threshold and large and (best is None or slip.score > best.score):
+        if slip.score > threshold and slip.large and (best is None or slip.score > best.score):
             best = slip
     return best
 

@@ -1,7 +1,7 @@
-"""Whether forces have the sign that they should: each robot's beside the others', and all of them under the weight.
+"""Whether each robot's forces have the sign that they should beside the others'.
 
 What robots push against one another cancels in the sum over the team. Where one of them says what it feels instead of
-what it applies, it adds up.
+what it applies, it adds up. Whether all together hold the payload up is for the fit to say, which leaves biases out.
 """
 
 from __future__ import annotations
@@ -13,7 +13,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
-from steelyard.team.mass_and_com import require_lift
 from steelyard.team.payload.model import Group
 
 # What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
@@ -26,8 +25,6 @@ def with_one_sign(
     """Return D (6, 6 N), the sum of pushes at B, with a robot's sign turned where its forces ask for it, and why.
 
     doubtful  (N,) whose signs may be wrong: those of others are left as they are
-
-    Raises CannotAnswer where the forces of all then pull the payload down.
     """
     total = [part.scatter.sum(0) for group in groups for part in group.parts]
     forces = D[3:].reshape(3, -1, 6)
@@ -35,10 +32,8 @@ def with_one_sign(
     each = np.sum([_beside_one_another(S, forces) for S in total], axis=0)
     wrong, found = odd_one_out(each, lifted, names, doubtful)
     if wrong is not None:
-        D, lifted = D.copy(), lifted.copy()
+        D = D.copy()
         D[:, 6 * wrong : 6 * wrong + 6] *= -1
-        lifted[wrong] *= -1
-    require_lift(float(lifted.sum() / sum(np.trace(S[3:6, 3:6]) for S in total)), "the forces")
     return D, found
 
 

@@ -54,7 +54,9 @@ def ladder_shares(evidence: Array, ladder: Array) -> Array:
     """
     chance = evidence + np.where(ladder[:, 2:].any(1), 0.0, np.log(NO_GAIN_ERROR))
     chance -= np.where(ladder[:, 0] > COMMON[0], np.log(NO_COMMON), 0.0)
-    chance -= np.where(ladder[:, 3] > 0, np.log(NO_LASTING), 0.0)
+    # In one recording a gain that is drawn anew is one that lasts.
+    lasting = ladder[:, 3] if ladder[:, 0].any() else ladder[:, 2]
+    chance -= np.where(lasting > 0, np.log(NO_LASTING), 0.0)
     weight = np.exp(chance - chance.max())
     weight[weight < NOTHING] = 0.0
     return np.asarray(weight / weight.sum())
