@@ -174,7 +174,9 @@ class PoseTeam:
 
     def off(self, log: TeamLog) -> list[Array]:
         """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
-        left = self._off(stretches(log, self.late)) / np.repeat(self.fit.noise, 3, axis=1)
+        # How two robots share their noise is open: one alone may seem to have next to none.
+        noise = noise_alone(self.fit.J, self.fit.W)
+        left = self._off(stretches(log, self.late)) / np.sqrt(np.einsum("nii->ni", noise))
         each = np.sqrt((left**2).mean(-1))
         return np.split(each, np.cumsum([len(part) for part in self.parts])[:-1])
 

@@ -85,8 +85,8 @@ class TwistTeam:
 
     def off(self, log: TeamLog) -> list[Array]:
         """Return by how many times its noise each twist is off (T, N) what the others say, for every recording."""
-        noise = np.repeat(self.fit.noise, 3, axis=1)
-        raw = twist_stretches(log, self.late)
+        alone = noise_alone(adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1))
+        noise, raw = np.sqrt(np.einsum("nii->ni", alone)), twist_stretches(log, self.late)
         return [
             np.sqrt(((self._against(was, now) / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
         ]
