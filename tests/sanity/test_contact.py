@@ -137,6 +137,20 @@ def test_what_misses_one_body_in_most_of_a_log_is_not_called_a_hand() -> None:
     assert log.still[mask].mean() > log.still.mean()
 
 
+@pytest.mark.parametrize("motion", ["stop_go", "dyn_slow"])
+def test_errors_everywhere_are_named_and_nothing_is_left_out(motion: str) -> None:
+    """Errors of the wrench that vary smoothly with where gravity points return with the pose; a hand does not."""
+    log = made("drill", motion, "low", 0)
+    down = log.gravity / 9.81
+    smooth = np.concatenate([np.sin(2 * down), down**2, np.sin(3 * down)], 1)
+    off = (smooth - smooth.mean(0)) @ np.random.default_rng(0).normal(size=(9, 6)) * ([0.1] * 3 + [1.0] * 3)
+    mask, (finding,) = untouched(replace(log, wrench=log.wrench + off), True)
+    assert mask.all()
+    assert finding.message.startswith("The wrench does not fit one body in")
+    assert finding.message.endswith("the rest fits hardly better, so nothing was left out.")
+    assert "left out" not in finding.remedy
+
+
 @pytest.mark.parametrize(("slip", "noise"), [(0.05, "low"), (0.05, "high"), (0.08, "low")])
 @pytest.mark.parametrize("seed", [0, 1, 2])
 def test_a_slip_is_named_with_its_time(slip: float, noise: str, seed: int) -> None:

@@ -42,6 +42,9 @@ ALIKE, LOOSER = 0.9, 0.3
 SAME = 2.0
 # More of the log than this, or more of the motion than that, is more likely misread than touched.
 MUCH, MOVING = 0.4, 0.8
+# Where it is more than that, it is left out only if the extra force or torque is so many times what the rest leaves:
+# errors that vary with the pose are everywhere, and the times that happen to agree give a worse answer than all.
+STANDS_OUT = 15.0
 ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
     "a payload that the controller compensates. If all are right, keep hands and fixtures off the object."
@@ -99,7 +102,8 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
     if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
         return everything, ()
     moving = np.bincount(row, ~log.still) > 0.5 * np.bincount(row)
-    return guarded[row], (_contact(slices, found, touches, guarded, _unlike_hands(guarded, moving)),)
+    finding = _contact(slices, found, touches, guarded, _unlike_hands(guarded, moving))
+    return (guarded[row] if _left_out(found, touches, guarded) else everything), (finding,)
 
 
 def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[Mask, tuple[Finding, ...]]:
@@ -179,6 +183,14 @@ def _possible(x: Array, touches: Sequence[Touch]) -> bool:
     return bool(body and all(t.torque < LONGEST_PUSH * t.force + LARGEST_TWIST for t in touches))
 
 
+def _left_out(found: Consensus, touches: Sequence[Touch], kept: Mask) -> bool:
+    """Whether the touches are to be left out: not much of the log, or far beyond what the rest leaves of the wrench."""
+    if kept.mean() >= 1 - MUCH:
+        return True
+    torque, force = np.sqrt((found.residual[found.kept].reshape(-1, 2, 3) ** 2).sum(2).mean(0))
+    return any(t.force > STANDS_OUT * force or t.torque > STANDS_OUT * torque for t in touches)
+
+
 def _with_drift(slices: Slices, late: Array) -> Slices:
     """Return the slices less the late wrench; a bias, where there is none, and its drift are more parameters."""
     count, _, size = slices.A.shape
@@ -248,9 +260,12 @@ def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: M
     what, left_out = "Something else than the robot touched the object", share
     if unlike_hands:
         what, left_out = f"The wrench does not fit one body in {share},", "that time"
+    end = f"{left_out} was left out"
+    if not _left_out(found, touches, kept):
+        end = "the rest fits hardly better, so nothing was left out"
     text = (
         f"{what} at {named} s, with up to {max(t.force for t in touches):.2g} N and "
-        f"{max(t.torque for t in touches):.2g} N m; {left_out} was left out."
+        f"{max(t.torque for t in touches):.2g} N m; {end}."
     )
     if _swappable(slices, found, touches):
         text += (

@@ -29,7 +29,7 @@ def one_body(
     if right is log:
         return kept, touched
     more, still_touched = untouched(right, with_bias)
-    return (more, still_touched) if more.sum() > kept.sum() else (kept, touched)
+    return (more, still_touched) if more.sum() >= kept.sum() else (kept, touched)
 
 
 def _put_right(log: MotionLog, recording: Recording, drift: bool) -> MotionLog:
