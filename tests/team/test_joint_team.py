@@ -21,6 +21,7 @@ from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge.axis import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
+from steelyard.team.poses.team import PoseTeam
 from steelyard.team.stacked import stretches
 from steelyard.team.twists.fit import fit_twists
 from steelyard.team.twists.rows import twist_stretches
@@ -453,3 +454,24 @@ def test_half_a_robots_rows_missing_in_motion_alone_cost_no_more_than_those_rows
     missing = replace(last, tracks={**last.tracks, "robot2": replace(track, valid=valid)})
     found = JointTeam().identify(made.log.with_recordings(missing))
     assert (error(made, found) < [2e-3, 2e-3, 0.05, 0.01, 0.3]).all()
+
+
+def test_one_recording_weighs_as_well_as_its_halves() -> None:
+    """A gain that is drawn anew for the only recording is one that lasts: it has the same odds beforehand."""
+    made = trial(kinds=("motion",), motion_samples=3000)
+    (whole,) = made.log.recordings
+    halves = [
+        replace(whole, name=name, tracks={n: track.rows(rows) for n, track in whole.tracks.items()})
+        for name, rows in (("first", slice(0, 1500)), ("second", slice(1500, 3000)))
+    ]
+    one, two = (JointTeam().identify(made.log.with_recordings(*cut)) for cut in ([whole], halves))
+    assert 0.5 < one.std[0] / two.std[0] < 2
+    assert abs(one.mass - 12) < 4 * one.std[0]
+
+
+def test_an_idle_robot_is_judged_by_the_noise_of_both() -> None:
+    """How two robots share their noise is open: by its own alone, next to nothing, one that holds seemed to be off."""
+    made = trial(robots=2, six_axis=frozenset({0, 1}))
+    team = PoseTeam.of(made.log, clocks=True)
+    shared = replace(team, fit=replace(team.fit, noise=team.fit.noise * np.array([[1.4], [0.01]])))
+    assert max(float(np.median(off)) for off in shared.off(made.log)) < 2
