@@ -1,4 +1,4 @@
-"""Error bars that survive noise correlated in time: the variance of the score from lagged residuals.
+"""Error bars that survive noise correlated in time, or with the pose: the variance of the score from residuals.
 
 With whitened rows e_t = L^T r_t and G_t = L^T T z_t (W = L L^T) the score is sum_t G_t^T e_t, and its variance
 sum_k sum_t G_t^T diag(rho_k) G_{t+k} needs only the autocorrelation rho_k of the six whitened residual channels, which
@@ -9,17 +9,20 @@ Source: Newey and West 1987 for the form; lag choice and flat-top taper Politis 
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify import noise_cost
 from steelyard.identify.linear import nonnegative
+from steelyard.identify.pose_errors import directions, pose_errors
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.logs.log import Integers, MotionLog
 
-# Longer logs are judged by the scatter of scores summed over blocks of time; shorter ones have too few.
-FEWEST, LONGEST, BLOCKS = 50, 20_000, 200
+# Shorter logs tell nothing; of longer ones so many rows in turn are joined that no more than these are left.
+FEWEST, LONGEST = 50, 20_000
 # A clock with more gaps than rows times this is not even.
 MOST_GAPS = 4
 # A lag is insignificant below this many standard errors; this many in a row end the search.
@@ -28,28 +31,38 @@ SIGNIFICANT, QUIET_LAGS = 2.0, 5
 LEAST_SHARE = 0.25
 
 
-def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Array | None:
-    """Return the variance (p, p) of the score, or None where the rows have no order in time."""
+@dataclass(frozen=True, eq=False)
+class Score:
+    """What the order of the rows tells of the score: its variance (p, p), None where there is none, and notes."""
+
+    variance: Array | None
+    notes: tuple[str, ...] = ()
+
+
+def score_in_time(log: MotionLog, problem: Problem, solution: Solution) -> Score:
+    """Return the variance of the score under noise that rows remember, and errors that come back with the pose."""
     if log.time is None or len(log) < FEWEST:
-        return None
-    K = problem.residual_map(solution.linear)
-    log = log.rows(np.argsort(log.time, kind="stable"))
-    if len(log) > LONGEST:
-        return _by_blocks(log, K, problem, solution.weights)
+        return Score(None)
+    K, D = problem.residual_map(solution.linear), directions(problem)
+    rows = _read(log.rows(np.argsort(log.time, kind="stable")), K, D, problem, solution.weights)
+    variance = _by_noise(rows, K, problem, solution)
+    recurring = pose_errors(problem, solution, D, _along(rows))
+    return Score(variance) if recurring is None else Score(variance + recurring.variance, (recurring.note,))
+
+
+def _by_noise(rows: _Rows, K: Array, problem: Problem, solution: Solution) -> Array:
+    """Return the variance (p, p) of the score under noise that rows remember."""
     H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
-    residual, slope = _whitened(log, K, problem, solution.weights)
-    slot = _slots(np.asarray(log.time))
     variance, squares, memory = np.zeros_like(H), 0.0, 0.0
     for channel in range(6):
-        kernel = _autocovariance(_placed(residual[:, channel], slot), len(log))
+        kernel = rows.kernel(rows.white[:, channel])
         if not kernel[0] > 0:  # a channel without any residual has none to be correlated
             continue
-        placed = _placed(slope[:, channel], slot)
-        variance += placed.T @ _convolved(placed, kernel)
-        squares += (2 * float((kernel[1:] ** 2).sum()) / kernel[0] ** 2 + 1) / 6
+        variance += _summed(_placed(rows.slope[:, channel], rows.slot), kernel)
+        squares += (2 * rows.joined * float((kernel[1:] ** 2).sum()) / kernel[0] ** 2 + 1) / 6
         memory += (2 * float(kernel[1:].sum()) / kernel[0] + 1) / 6
     # The fit has taken its share of the slow part of the noise out of the residual.
-    lost = len(H) * max(memory, 1.0) / (6 * len(log))
+    lost = len(H) * max(memory, 1.0) / (6 * len(rows.slot))
     variance = variance / (1 - min(lost, 0.5))
     if solution.weights is None:
         variance += squares * (extra - (plain - H))
@@ -60,28 +73,68 @@ def score_variance(log: MotionLog, problem: Problem, solution: Solution) -> Arra
     return np.asarray(floor + nonnegative(variance - floor, plain))
 
 
-def _by_blocks(log: MotionLog, K: Array, problem: Problem, weights: Array | None) -> Array:
-    """Return the score variance from the scatter of scores summed over equal stretches of time."""
-    total = np.zeros((BLOCKS, len(problem.T)))
-    for block, rows in enumerate(np.array_split(np.arange(len(log)), BLOCKS)):
-        residual, slope = _whitened(log.rows(slice(int(rows[0]), int(rows[-1]) + 1)), K, problem, weights)
-        total[block] = np.einsum("nip,ni->p", slope, residual)
-    total -= total.mean(0)
-    return np.asarray(total.T @ total * (BLOCKS / (BLOCKS - 1)))
+def _along(rows: _Rows) -> Array:
+    """Return the variance (6, K, K) by noise of the mean of every channel's residual times a - g along an axis."""
+    placed = _placed(rows.along, rows.slot)
+    return np.stack([_summed(placed, rows.kernel(r)) for r in rows.residual.T]) / len(rows.slot) ** 2
 
 
-def _whitened(log: MotionLog, K: Array, problem: Problem, weights: Array | None) -> tuple[Array, Array]:
-    """Return whitened residuals (N, 6) and what each adds to the score (N, 6, p): L^-1 W_0 T z for fixed weights."""
+@dataclass(frozen=True, eq=False)
+class _Rows:
+    """Rows in order of time, `joined` in turn made one: means of residuals, sums of what they pull.
+
+    slot      (M,) place of each on an even clock
+    residual  (M, 6) of the wrench
+    white     (M, 6) the same, whitened
+    along     (M, K) a - g along the directions of `pose_errors`
+    slope     (M, 6, p) what each whitened residual adds to the score: L^-1 W_0 T z for fixed weights W_0
+    """
+
+    joined: int
+    slot: Integers
+    residual: Array
+    white: Array
+    along: Array
+    slope: Array
+
+    def kernel(self, series: Array) -> Array:
+        """Return the autocovariance of one number for each row (M,) at lags 0, 1, ..., as far as it is known."""
+        return _autocovariance(_placed(series, self.slot), len(self.slot))
+
+
+def _read(log: MotionLog, K: Array, D: Array, problem: Problem, weights: Array | None) -> _Rows:
+    """Return the rows of a log, joined where they are many, at the residual map K (6, Z)."""
     z = problem.features(log)
-    residual = z @ K.T
-    slope = np.tensordot(z, problem.T, axes=(1, 2)).swapaxes(1, 2)
+    joined = -(-len(log) // LONGEST)
+    starts = np.arange(0, len(log), joined)
+    counts = np.diff(np.append(starts, len(log)))[:, None]
+    residual, along, time = (_joined(v, starts) / counts for v in (z @ K.T, z @ D.T, np.c_[log.time]))
+    white, slope = np.empty((len(starts), 6)), np.empty((len(starts), 6, len(problem.T)))
+    # Slopes are many times as large as the rows: not all of them at once.
+    for some in np.array_split(np.arange(len(starts)), joined):
+        rows = slice(int(starts[some[0]]), int(starts[some[-1]] + counts[some[-1], 0]))
+        parts = _whitened(z[rows], log.noise_class[rows], K, problem, weights)
+        white[some], slope[some] = (_joined(v, starts[some] - rows.start) for v in parts)
+    return _Rows(joined, _slots(time[:, 0]), residual, white / counts, along, slope)
+
+
+def _joined(values: Array, starts: Integers) -> Array:
+    """Return the sums of values (N, ...) over the rows from each of `starts` to the next."""
+    return values if len(values) == len(starts) else np.asarray(np.add.reduceat(values, starts))
+
+
+def _whitened(
+    z: Array, noise_class: Integers, K: Array, problem: Problem, weights: Array | None
+) -> tuple[Array, Array]:
+    """Return whitened residuals (N, 6) of rows z (N, Z), and what each adds to the score (N, 6, p)."""
+    white, slope = np.zeros((len(z), 6)), np.zeros((len(z), 6, len(problem.T)))
     for index, number in enumerate(problem.classes):
-        rows = log.noise_class == number
-        if rows.any():
-            L = np.linalg.cholesky(noise_cost.weight(K, problem.acceleration[index], problem.wrench[index]))
-            residual[rows] = residual[rows] @ L
-            slope[rows] = (L.T if weights is None else np.linalg.solve(L, weights[index])) @ slope[rows]
-    return residual, slope
+        rows = noise_class == number
+        L = np.linalg.cholesky(noise_cost.weight(K, problem.acceleration[index], problem.wrench[index]))
+        pull = (L.T if weights is None else np.linalg.solve(L, weights[index])) @ problem.T
+        white[rows] = z[rows] @ (K.T @ L)
+        slope[rows] = np.tensordot(z[rows], pull, axes=(1, 2)).swapaxes(1, 2)
+    return white, slope
 
 
 def _slots(time: Array) -> Integers:
@@ -117,13 +170,16 @@ def _autocovariance(series: Array, rows: int) -> Array:
     return np.asarray(raw[: len(lags)] * taper)
 
 
-def _convolved(values: Array, kernel: Array) -> Array:
-    """Return sum_k kernel_|k| values_{t+k} along time."""
+def _summed(values: Array, kernel: Array) -> Array:
+    """Return the sum (p, p) of values_t kernel_|k| values_{t+k}^T over rows t of values (N, p) and lags k."""
     if len(kernel) == 1:
-        return np.asarray(kernel[0] * values)
+        return np.asarray(kernel[0] * values.T @ values)
     size = 2 ** int(np.ceil(np.log2(len(values) + 2 * len(kernel))))
     both = np.zeros(size)
     both[: len(kernel)] = kernel
     both[-len(kernel) + 1 :] = kernel[:0:-1]
-    spectrum = np.fft.rfft(both).real[:, None] * np.fft.rfft(values, size, axis=0)
-    return np.asarray(np.fft.irfft(spectrum, size, axis=0)[: len(values)])
+    # Parseval: every frequency but the first and the last stands for two.
+    power = np.fft.rfft(both).real / size
+    power[1:-1] *= 2
+    waves = np.fft.rfft(values, size, axis=0)
+    return np.asarray(((waves.conj() * power[:, None]).T @ waves).real)

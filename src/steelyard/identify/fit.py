@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import conclude
-from steelyard.identify.correlated import score_variance
+from steelyard.identify.correlated import score_in_time
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift
@@ -94,7 +94,8 @@ def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest
 
     log, problem = prepared(log, bias, rested if verify_rest and log.still.any() else None)
     solution = solver(problem)
-    return conclude(problem, solution, method, score_variance(log, problem, solution))
+    score = score_in_time(log, problem, solution)
+    return conclude(problem, solution, method, score.variance).noted(*score.notes)
 
 
 def prepared(

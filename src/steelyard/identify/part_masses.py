@@ -17,7 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.conclude import conclude, widened
-from steelyard.identify.correlated import score_variance
+from steelyard.identify.correlated import score_in_time
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias, prepared, problem_of
@@ -93,8 +93,8 @@ class PartMasses:
         linear = np.concatenate([first.parameters.vector, first.wrench_bias[:bias]])
         if bias > 6:  # an Estimate has no place for the drift
             linear = self._data(problem, start, None).linear_at(first.parameters.vector)
-        score = score_variance(log, problem, Solution.unconstrained(self._loaded(linear)))
-        return self._conclude(problem, linear, score)
+        score = score_in_time(log, problem, Solution.unconstrained(self._loaded(linear)))
+        return self._conclude(problem, linear, score.variance).noted(*score.notes)
 
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
