@@ -3,7 +3,8 @@
 In slow motion all that such an error does to mass and centre of mass goes through its part that is linear in gravity as
 S sees it (in a - g where S accelerates): 18 numbers, six channels by three axes. A body takes up four of them and
 leaves the others as residual. All of one kind, of forces or of torques, are taken to be drawn alike, so that those that
-show tell how large those are that do not. Unlike noise, they are no smaller in a longer log.
+show tell how large those are that do not; gains of the six channels, which look
+like mass in the mean, may be larger. Unlike noise, all this is no smaller in a longer log.
 Source: own; a random-effects model whose variances are found by moments.
 """
 
@@ -13,16 +14,19 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.identify.linear import inverse_scaled, normal_equations
 from steelyard.identify.noise_cost import weights_at
 from steelyard.identify.problem import Problem
+from steelyard.identify.regressor import motion_map
 from steelyard.identify.solution import Solution
 
 # Gravity must spread by this along an axis of S [m/s^2], some three degrees.
 SPREAD = 0.5
 # What shows must be so many times as large, in squares, as noise makes it: by chance in one log of fifty.
 SEEN = 2.0
+# Gains of which less than this shows look like mass or a first moment.
+PLAIN, ROUNDS = 0.1, 20
 
 
 def directions(problem: Problem) -> Array:
@@ -77,19 +81,58 @@ def pose_errors(problem: Problem, solution: Solution, D: Array, noise: Array) ->
     alike = (problem.T @ along.sum(0)).reshape(size, shown) / problem.samples
     left = np.eye(shown) - alike.T @ _response(problem, solution, weights) @ pull
     found = left @ (problem.residual_map(solution.linear) @ along.sum(0)).ravel() / problem.samples
-    spread = np.zeros((6, len(D), 6, len(D)))
-    spread[np.arange(6), :, np.arange(6)] = noise
-    by_noise = ((left @ spread.reshape(shown, shown)) * left).sum(1)
+    by_noise = np.zeros((6, len(D), 6, len(D)))
+    by_noise[np.arange(6), :, np.arange(6)] = noise
+    seen = _Seen(found, left, left @ by_noise.reshape(shown, shown) @ left.T)
     # Six channels, torques and then forces.
     kinds = np.repeat(np.eye(2), 3 * len(D), axis=0) * np.repeat(problem.heard, len(D))[:, None]
-    square, quiet, count = found**2 @ kinds, by_noise @ kinds, (left**2).sum(1) @ kinds
+    square, quiet, count = seen.of(kinds)
     if not square @ (count / np.maximum(quiet, 1e-300)) > SEEN * count.sum() > 0:
         return None
-    # Few numbers told the variance, which is uncertain itself: that of Student's t.
+    gains = _gains(motion_map(solution.linear[:10]) @ along.sum(0)[:12] / problem.samples, problem.heard)
+    axes, plain = _axes(left, gains, kinds)
+    square, quiet, count = seen.without(axes).of(kinds)
     beyond = np.maximum(square - quiet, 0.0)
-    variance = kinds @ (beyond / np.maximum(count - 2, 1.0))
-    rms = np.sqrt(len(D) * beyond / np.maximum(count, 1.0))
-    return PoseErrors(rms, (pull * variance) @ pull.T)
+    variance = kinds @ (beyond / np.maximum(count, 1.0) * _student(count))
+    # Gains of the channels may differ by more than the rest says.
+    of_gains = seen.along(axes / plain, variance)
+    score = (pull * variance) @ pull.T + of_gains * (pull @ gains) @ (pull @ gains).T
+    each = of_gains * (gains.reshape(2, 3, -1) ** 2).sum((1, 2)) / 3
+    return PoseErrors(np.sqrt(len(D) * beyond / np.maximum(count, 1.0) + each), score)
+
+
+def _student(count: Array) -> Array:
+    """Return by how much a variance that `count` numbers told is larger for those who do not know it (Student's t)."""
+    return count / np.maximum(count - 2, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Seen:
+    """What residuals show of errors (n,): found = left errors + noise, whose covariance is `noise` (n, n)."""
+
+    found: Array
+    left: Array
+    noise: Array
+
+    def of(self, kinds: Array) -> tuple[Array, Array, Array]:
+        """Return for each kind (n, 2) the sum of squares, what noise makes of it, and how many errors it shows."""
+        return self.found**2 @ kinds, np.diag(self.noise) @ kinds, (self.left**2).sum(1) @ kinds
+
+    def without(self, axes: Array) -> _Seen:
+        """Return what is seen across some orthonormal axes (n, r)."""
+        rest = np.eye(len(self.found)) - axes @ axes.T
+        return _Seen(rest @ self.found, rest @ self.left, rest @ self.noise @ rest)
+
+    def along(self, axes: Array, variance: Array) -> float:
+        """Return the variance along axes (n, r), one for all, beyond noise and errors of `variance` (n,)."""
+        square = (axes.T @ self.found) ** 2
+        quiet = np.diag(axes.T @ (self.noise + (self.left * variance) @ self.left.T) @ axes)
+        found = float(np.maximum(square - quiet, 0.0).max(initial=0.0))
+        # Most likely where each is weighted by how well it tells.
+        for _ in range(ROUNDS):
+            told = (found + quiet) ** -2.0
+            found = max(float(told @ (square - quiet) / told.sum()), 0.0)
+        return found * float(_student(((found / (found + quiet)) ** 2).sum()))
 
 
 def _response(problem: Problem, solution: Solution, weights: Array) -> Array:
@@ -100,3 +143,20 @@ def _response(problem: Problem, solution: Solution, weights: Array) -> Array:
     A = J.T @ H @ J
     A[:10, :10] += solution.prior
     return np.asarray(J @ inverse_scaled(A) @ J.T)
+
+
+def _gains(felt: Array, heard: Mask) -> Array:
+    """Return the errors (6 K, 6) that a gain of each channel makes, of a wrench that is `felt` (6, K) along D."""
+    out = np.zeros((6, felt.shape[1], 6))
+    out[np.arange(6), :, np.arange(6)] = felt * heard[:, None]
+    return out.reshape(-1, 6)
+
+
+def _axes(left: Array, gains: Array, kinds: Array) -> tuple[Array, Array]:
+    """Return orthonormal axes (n, r) along which gains (n, 6) show, and how plainly (r,)."""
+    size = np.sqrt((kinds.T @ gains**2).sum(1))
+    scale = kinds @ (1 / np.maximum(size, 1e-300))
+    shape = left @ gains
+    _, plain, mixed = np.linalg.svd(scale[:, None] * shape, full_matrices=False)
+    U, seen, _ = np.linalg.svd(shape @ mixed[plain > PLAIN * plain.max(initial=0.0)].T, full_matrices=False)
+    return np.asarray(U), np.asarray(seen)
