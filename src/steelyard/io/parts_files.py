@@ -7,7 +7,6 @@ twice (volumes, centroids) must agree.
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -180,7 +179,7 @@ def read_parts(path: Path | str) -> SavedParts:
         tree = None
         if all(name in arrays for name in _TREE):
             tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
-        names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"].ravel()) if "names" in arrays else ()
+        names = tuple(str(name)[:_LONGEST_NAME] for name in _texts(path, arrays, len(solid)))
         unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
         saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)
@@ -191,23 +190,20 @@ def read_parts(path: Path | str) -> SavedParts:
 
 def _arrays(path: Path) -> dict[str, Array]:
     """Return the arrays of numbers in the file, sizes bounded first."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
-    except (zipfile.BadZipFile, RuntimeError):
-        size = 0  # the next line says what the file should be
-    if size > MOST_BYTES:
-        raise BadFile(
-            f"{path}: holds {size / 1024**2:.0f} MiB, more than the {MOST_BYTES // 1024**2} MiB that are read."
-        )
-    found = read_arrays(path)
+    found = read_arrays(path, most=MOST_BYTES)
     for name, array in found.items():
         kinds, wanted = ("U", "text") if name == "names" else ("fiub", "real numbers")
         if array.dtype.kind not in kinds:
             raise BadFile(f'{path}: array "{name}" must hold {wanted}; it holds {array.dtype}.')
     return found
+
+
+def _texts(path: Path, arrays: dict[str, Array], cells: int) -> Array:
+    """Return the names (P,), none where they are missing; each becomes a value, so they are counted first."""
+    names = arrays.get("names", np.array([], "U1"))
+    if names.size > cells:
+        raise BadFile(f'{path}: array "names" holds {names.size} names for {cells} cells.')
+    return names.ravel()
 
 
 def _number(path: Path, arrays: dict[str, Array], name: str) -> float:

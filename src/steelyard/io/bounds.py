@@ -1,0 +1,22 @@
+"""How much of a file is read: a few kB from a stranger may claim, or unpack to, many GB."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+from steelyard.errors import BadFile
+
+MOST_BYTES = 2 * 1024**3  # six hours of a log at 1 kHz, 80 million points
+
+
+def require_bounded(path: Path, size: int, most: int | None = None) -> None:
+    """Raise BadFile where reading would take more memory than `most`, MOST_BYTES if left out.
+
+    size  [bytes] what would be unpacked, known before it is
+    """
+    most = MOST_BYTES if most is None else most
+    if size > most:
+        raise BadFile(
+            f"{path}: holds {size / 1024**2:.0f} MiB, more than the {most // 1024**2} MiB that are read. "
+            "Give fewer rows or points at once."
+        )
