@@ -17,6 +17,8 @@ from steelyard.io.cloud_files import read_cloud
 from steelyard.io.moment_files import read_moments
 from steelyard.io.object_folders import read_track
 from steelyard.io.parts_files import read_parts
+from steelyard.io.pcd_files import read_pcd
+from steelyard.io.ply_files import read_mesh
 from steelyard.io.tables import open_table
 from steelyard.parts.known import MOTION
 
@@ -103,3 +105,11 @@ def test_packings_that_numpy_does_not_write_are_refused(packing: int, tmp_path: 
 def test_columns_are_counted_before_they_are_named(tmp_path: Path) -> None:
     path = write_npz(tmp_path / "a.npz", {f"{k}.npy": npy_header("(0, 4096)") for k in range(17)})
     assert said(open_table, path) == "F: holds more than 65536 columns. Save the quantities of the log alone."
+
+
+@pytest.mark.skipif(not Path("/dev/zero").is_char_device(), reason="there are no devices here")
+@pytest.mark.parametrize("read", [read_mesh, read_pcd])
+def test_a_link_to_a_device_is_refused(read: Callable[[Path], Any], tmp_path: Path) -> None:
+    path = tmp_path / "a.ply"
+    path.symlink_to("/dev/zero")
+    assert said(read, path) == "F: this is a device, which has no end. Give a file."

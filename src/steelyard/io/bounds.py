@@ -20,3 +20,14 @@ def require_bounded(path: Path, size: int, most: int | None = None) -> None:
             f"{path}: holds {size / 1024**2:.0f} MiB, more than the {most // 1024**2} MiB that are read. "
             "Give fewer rows or points at once."
         )
+
+
+def read_whole(path: Path) -> bytes:
+    """Return the content of a file; raises BadFile where it cannot be read, is too large or a device."""
+    try:
+        if path.is_char_device():
+            raise BadFile(f"{path}: this is a device, which has no end. Give a file.")
+        require_bounded(path, path.stat().st_size)
+        return path.read_bytes()
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
