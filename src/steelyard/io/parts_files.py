@@ -56,13 +56,12 @@ class SavedParts:
     turn_std: float = 0.0
 
     def __post_init__(self) -> None:
-        labels = np.array(self.labels, np.int64)
+        labels = check.whole("labels", self.labels)
         if labels.shape != (len(self.solid),):
             raise BadValue(f"each of the {len(self.solid)} cells needs one label; got {labels.shape}.")
         used = np.unique(labels)
         if not np.array_equal(used, np.arange(len(used))):
             raise BadValue("labels must be 0, 1, 2 ... with at least one cell each; these leave numbers out.")
-        labels.flags.writeable = False
         object.__setattr__(self, "labels", labels)
         if self.rgb is not None:
             rgb = check.vectors("part colours", self.rgb)
@@ -173,22 +172,22 @@ def read_parts(path: Path | str) -> SavedParts:
     if len(arrays["tets"]) > MOST_CELLS:
         raise BadFile(f"{path}: {len(arrays['tets'])} cells are more than the {MOST_CELLS} that can be handled.")
     try:
-        solid = TetMesh(arrays["vertices"], _whole(path, arrays, "tets"))
+        solid = TetMesh(arrays["vertices"], arrays["tets"])
         if float(np.ptp(solid.vertices, axis=0).max()) > _LONGEST_M:
             raise BadValue(f"the solid is over {_LONGEST_M:g} m long. Vertices are in metres; are these millimetres?")
         tree = None
         if all(name in arrays for name in _TREE):
-            tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
+            tree = Hierarchy(arrays["piece"], arrays["merges"], arrays["cost"])
         names = tuple(str(name)[:_LONGEST_NAME] for name in _texts(path, arrays, len(solid)))
         unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
-        saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
+        saved = SavedParts(solid, arrays["labels"], arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
     return saved
 
 
-def _arrays(path: Path) -> dict[str, Array]:
+def _arrays(path: Path) -> dict[str, Any]:
     """Return the arrays of numbers in the file, sizes bounded first."""
     found = read_arrays(path, most=MOST_BYTES)
     for name, array in found.items():
@@ -212,14 +211,6 @@ def _number(path: Path, arrays: dict[str, Array], name: str) -> float:
     if array.size != 1:
         raise BadFile(f'{path}: array "{name}" must hold one number; it has the shape {array.shape}.')
     return float(array.ravel()[0])
-
-
-def _whole(path: Path, arrays: dict[str, Array], name: str) -> Integers:
-    """Return an array of whole numbers."""
-    array = arrays[name]
-    if array.dtype.kind == "f" and not (np.isfinite(array).all() and (array == np.rint(array)).all()):
-        raise BadFile(f'{path}: array "{name}" must hold whole numbers.')
-    return np.asarray(array, np.int64)
 
 
 def _agree(saved: SavedParts, arrays: dict[str, Array]) -> None:
