@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import gzip
 import struct
 import zipfile
 from collections.abc import Callable
@@ -11,9 +12,10 @@ from typing import Any
 import numpy as np
 import pytest
 
-from steelyard.errors import BadFile
+from steelyard.errors import BadDescription, BadFile
 from steelyard.io import bounds
 from steelyard.io.cloud_files import read_cloud
+from steelyard.io.documents import load_json, parse_toml
 from steelyard.io.moment_files import read_moments
 from steelyard.io.object_folders import read_track
 from steelyard.io.parts_files import read_parts
@@ -22,7 +24,7 @@ from steelyard.io.ply_files import read_mesh
 from steelyard.io.tables import open_table
 from steelyard.parts.known import MOTION
 
-TOO_MUCH = "F: holds 3 MiB, more than the 1 MiB that are read. Give fewer rows or points at once."
+TOO_MUCH = "F: holds 3 MiB, more than the 1 MiB that are read. Give fewer rows, points or views at once."
 
 
 def said(read: Callable[[Path], Any], path: Path) -> str:
@@ -113,3 +115,55 @@ def test_a_link_to_a_device_is_refused(read: Callable[[Path], Any], tmp_path: Pa
     path = tmp_path / "a.ply"
     path.symlink_to("/dev/zero")
     assert said(read, path) == "F: this is a device, which has no end. Give a file."
+
+
+@pytest.mark.usefixtures("one_mib")
+def test_a_table_of_text_is_bounded_by_its_numbers(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,a\n" + "1,2\n" * 200_000)
+    assert said(read_all, path) == TOO_MUCH
+
+
+def test_a_packed_text_that_becomes_very_long_is_not_read_to_its_end(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv.gz"
+    path.write_bytes(gzip.compress(b"t,a\n1,2\n" + b"#\n" * 2**26, 9))
+    assert said(read_all, path) == ("F: unpacks to more than 100 times its size. Unpack it and look at it first.")
+
+
+@pytest.mark.parametrize("cell", ["x" * 200_000, " " * 200_000 + "x", '"' + "x" * 200_000 + '"'])
+@pytest.mark.parametrize("more", ["", ",3"])
+def test_a_very_long_cell_is_named_at_once(cell: str, more: str, tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text(f"t,a,b\n1,2,3\n2,{cell}{more}\n")
+    assert "line 3" in said(read_all, path)
+
+
+def test_empty_cells_among_many_blanks_are_filled(tmp_path: Path) -> None:
+    path = tmp_path / "a.csv"
+    path.write_text("t,a,b\n1,2,3\n2," + " " * 200_000 + ',3\n3, "" ,5\n')
+    assert np.isnan(read_all(path)[1]).tolist() == [False, True, True]
+
+
+def test_keys_of_very_many_dots_are_refused_at_once() -> None:
+    with pytest.raises(BadDescription, match="a line has 500000 dots; no description has keys as deep"):
+        parse_toml("a" + ".a" * 500_000 + " = 1", "log.toml")
+
+
+@pytest.mark.skipif(not Path("/dev/zero").is_char_device(), reason="there are no devices here")
+def test_a_document_is_read_no_further_than_it_may_be_long() -> None:
+    assert said(lambda path: load_json(path, "a result", ""), Path("/dev/zero")) == (
+        "F: a result is a small JSON text; this file has 64000001 bytes."
+    )
+
+
+def test_a_parquet_file_is_bounded_by_its_rows_and_texts_are_not_unpacked(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    arrow, parquet = pytest.importorskip("pyarrow"), pytest.importorskip("pyarrow.parquet")
+    path = tmp_path / "a.parquet"
+    parquet.write_table(arrow.table({"t": np.zeros(3 * 2**17), "name": ["x" * 1000] * (3 * 2**17)}), path)
+    assert len(open_table(path).read([0])[0]) == 3 * 2**17
+    monkeypatch.setattr(parquet, "read_table", None)
+    assert said(read_all, path) == 'F: column "name" must hold numbers; it holds string.'
+    monkeypatch.setattr(bounds, "MOST_BYTES", 2**20)
+    assert said(lambda path: open_table(path).read([0]), path) == TOO_MUCH

@@ -18,7 +18,7 @@ def require_bounded(path: Path, size: int, most: int | None = None) -> None:
     if size > most:
         raise BadFile(
             f"{path}: holds {size / 1024**2:.0f} MiB, more than the {most // 1024**2} MiB that are read. "
-            "Give fewer rows or points at once."
+            "Give fewer rows, points or views at once."
         )
 
 
