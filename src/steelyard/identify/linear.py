@@ -65,7 +65,8 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
     """Return the linear parameters (p,) of `passes` weighted solutions, W renewed from each for the next.
 
     The data are the design T (p, 6, Z), the scatter (C, Z, Z) of every noise class, and the variances (C, 6) of its
-    acceleration and its wrench, angular part and moment first. The first pass knows no parameters, so that W is that of the wrench noise alone.
+    acceleration and its wrench, angular part and moment first. The first pass knows no parameters, so that W is that
+    of the wrench noise alone.
     """
     linear = np.zeros(len(T))
     for _ in range(passes):
