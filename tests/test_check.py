@@ -31,6 +31,21 @@ def test_frozen_copies_what_others_could_change_and_nothing_else() -> None:
     assert check.frozen(frozen) is frozen
 
 
+def test_whole_numbers_keep_their_values_and_shape() -> None:
+    given = np.array([[1.0, -2.0, 3.0]])
+    whole = check.whole("x", given)
+    assert (whole.dtype, whole.tolist(), whole.flags.writeable) == (np.int64, [[1, -2, 3]], False)
+    assert check.whole("x", []).shape == (0,)
+    mine = np.arange(3)
+    assert not np.shares_memory(check.whole("x", mine), mine)
+
+
+@pytest.mark.parametrize("wrong", [0.5, np.nan, -np.inf, 1e300])
+def test_what_is_no_whole_number_is_refused(wrong: float) -> None:
+    with pytest.raises(BadValue, match=r"x must be (whole numbers; got|finite; 1 entry is not)"):
+        check.whole("x", [0.0, wrong])
+
+
 def test_no_rotations_at_all_are_fine() -> None:
     assert check.rotations("R", np.zeros((0, 3, 3))).shape == (0, 3, 3)
 

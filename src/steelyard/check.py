@@ -15,6 +15,7 @@ Mask = NDArray[np.bool_]
 # What NumPy and Python raise where numbers degenerate: a fit that has diverged, or data of no body.
 BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
 _IDENTITY = np.eye(3)
+_LARGEST_WHOLE = 2.0**53  # beyond it float64 holds no longer every integer
 _ORTHONORMAL = 1e-6  # how far R^T R of a rotation may be from the identity, entry by entry
 
 
@@ -41,6 +42,19 @@ def finite(name: str, values: ArrayLike) -> Array:
         many = "1 entry is" if len(bad) == 1 else f"{len(bad)} entries are"
         raise BadValue(f"{name} must be finite; {many} not, the first at index {where}.")
     return array
+
+
+def whole(name: str, values: ArrayLike) -> Integers:
+    """Return `values` as read-only int64 of the same shape, or say which would lose its fraction."""
+    array = np.asarray(values)
+    if array.dtype.kind not in "iub":
+        numbers = finite(name, values)
+        bad = (numbers != np.rint(numbers)) | (np.abs(numbers) > _LARGEST_WHOLE)
+        if bad.any():
+            raise BadValue(f"{name} must be whole numbers; got {numbers[bad].flat[0]:g}.")
+    out = np.array(array, dtype=np.int64)
+    out.flags.writeable = False
+    return out
 
 
 def vectors(name: str, values: ArrayLike, size: int = 3) -> Array:

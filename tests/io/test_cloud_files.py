@@ -86,6 +86,12 @@ def test_runs_that_repeat_are_undone() -> None:
     assert out.tobytes() == b"abababababa"
 
 
+def packed(points: int) -> bytes:
+    """Return a file of a few bytes that says that it unpacks to very many points."""
+    header = f"FIELDS x y z\nSIZE 4 4 4\nTYPE F F F\nPOINTS {points}\nDATA binary_compressed\n"
+    return header.encode() + struct.pack("<II", 10, 12 * points) + bytes(10)
+
+
 @pytest.mark.parametrize(
     ("name", "content", "message"),
     [
@@ -102,6 +108,15 @@ def test_runs_that_repeat_are_undone() -> None:
         ("a.pcd", labelled("nan"), 'field "label" holds nan; expected integers from 0 to 255'),
         ("a.pcd", labelled("256"), 'field "label" holds 256; expected integers from 0 to 255'),
         ("a.pcd", labelled("-1"), 'field "label" holds -1; expected integers from 0 to 255'),
+        ("a.pcd", labelled("1.5"), r'field "label" holds 1\.5; expected integers from 0 to 255'),
+        ("a.pcd", labelled("1" * 500), "a point holds a word that is no number"),
+        (
+            "a.pcd",
+            b"FIELDS" + b" x" * 1001 + b"\nPOINTS 1\nDATA ascii\n",
+            "has 1001 fields, more than the 1000 that are read",
+        ),
+        ("a.pcd", packed(1_000_000), "the compressed points are damaged"),
+        ("a.pcd", packed(300_000_000), "holds 3433 MiB, more than the 2048 MiB that are read"),
         ("a.pcd", b"FIELDS _ _0 x\nSIZE 4 4 4\nTYPE F F F\nPOINTS 1\nDATA ascii\n1 2 3\n", '"y" is missing'),
         ("a.ply", b"x", "expected a PLY file"),
         ("a.npz", b"x", "expected an NPZ file"),

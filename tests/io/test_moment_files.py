@@ -97,5 +97,5 @@ def test_a_damaged_array_is_named(tmp_path: Path) -> None:
     content = bytearray(path.read_bytes())
     content[len(content) // 2] ^= 255
     path.write_bytes(content)
-    with pytest.raises(BadFile, match="an array is damaged"):
+    with pytest.raises(BadFile, match='array "scatter" is damaged'):
         read_moments(path)

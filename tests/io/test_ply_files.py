@@ -112,6 +112,16 @@ BAD: dict[str, tuple[Callable[[], bytes], str]] = {
         'F: property "vertex_indices" of element "face" holds 4.29497e+09; expected integers from -2147483648 to '
         "2147483647. Save the file again.",
     ),
+    "a fraction in integers": (
+        swapped("3 0 1 2", "3 0 1.5 2"),
+        'F: property "vertex_indices" of element "face" holds 1.5; expected integers from -2147483648 to 2147483647. '
+        "Save the file again.",
+    ),
+    "a long word": (swapped("1 0 0", "1 0 0." + "0" * 500), 'F: element "vertex" holds a word that is no number.'),
+    "many properties": (
+        swapped("property float z\n", "property float z\n" + "".join(f"property char a{k}\n" for k in range(2000))),
+        "F: the PLY header has more than 1000 elements and properties.",
+    ),
     "quads": (
         swapped("3 0 1 2", "4 0 1 2 0"),
         "F: faces have 4 corners. Save every face as a triangle.",

@@ -12,6 +12,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile
+from steelyard.io import bounds, view_folders
 from steelyard.io.view_folders import read_views, write_views
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
@@ -184,3 +185,22 @@ def test_wrong_folders(folder: Path, make: Callable[[Path], object], message: st
     make(folder)
     with pytest.raises(BadFile, match=message):
         read_views(folder)
+
+
+def test_more_views_than_fit_are_refused_before_one_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr(bounds, "MOST_BYTES", 3 * 24 * 32 * 5 - 1)
+    with pytest.raises(BadFile, match=r"holds 0 MiB, more than the 0 MiB that are read\. Give fewer rows, points or"):
+        read_views(folder)
+    monkeypatch.setattr(view_folders, "MOST_VIEWS", 2)
+    with pytest.raises(BadFile, match=r"poses\.csv: these are more than 2 views\. Leave views out\."):
+        read_views(folder)
+
+
+@pytest.mark.skipif(not Path("/dev/zero").is_char_device(), reason="there are no devices here")
+def test_links_to_a_device_are_refused(folder: Path) -> None:
+    for name in ("depth/0001.png", "poses.csv"):
+        path = folder / name
+        path.unlink()
+        path.symlink_to("/dev/zero")
+        with pytest.raises(BadFile, match=r"0001\.png: this is a device|poses\.csv: a table of poses is a small CSV"):
+            read_views(folder)

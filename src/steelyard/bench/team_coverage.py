@@ -6,7 +6,7 @@ encoder and force noise, both correlated with a corner at 2 Hz, and case D with 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import replace
 from types import MappingProxyType
 from typing import Any
@@ -64,20 +64,11 @@ def trial(job: tuple[str, int]) -> dict[str, tuple[Array, Array]]:
     return errors(made, JointTeam().identify(made.log))
 
 
-def coverage(
-    trials: int = 400,
-    noises: tuple[str, ...] = tuple(NOISES),
-    progress: Callable[[int], None] | None = None,
-    workers: int = 1,
-) -> dict[str, Any]:
+def coverage(trials: int = 400, workers: int = 1) -> dict[str, Any]:
     """Return by noise and kind: share of 95 % intervals that hold the truth, mean half-width over the rms error."""
     out: dict[str, Any] = {"trials": trials}
-    for noise in noises:
-        rows = []
-        for row in spread(trial, [(noise, FIRST_SEED + k) for k in range(trials)], workers):
-            rows.append(row)
-            if progress is not None:
-                progress(len(rows))
+    for noise in NOISES:
+        rows = list(spread(trial, [(noise, FIRST_SEED + k) for k in range(trials)], workers))
         out[noise] = {kind: pooled([row[kind] for row in rows]) for kind in KINDS}
     return out
 

@@ -10,10 +10,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
-from steelyard.report.numbers import decimals, places_of
+from steelyard.report.numbers import LARGE_INERTIA, fixed, places_of, spread
 
-LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
-_MILLIONTH = 1e-6
 INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
@@ -21,14 +19,12 @@ def plus_minus(value: float, std: float, unit: str) -> str:
     """Return 'value ± std unit' with two figures of the standard deviation."""
     if not np.isfinite(std):
         return f"{value:.4g} ± ? {unit}"
-    places = places_of(value, std)
-    # Adding zero turns a minus zero, which rounding leaves, into a plain one.
-    return f"{round(value, places) + 0.0:.{places}f} ± {spread(std)} {unit}"
+    return _plain(f"{fixed(value, places_of(value, std))} ± {spread(std)} {unit}")
 
 
-def spread(std: float) -> str:
-    """Return two figures of a standard deviation, in powers of ten below a millionth."""
-    return f"{std:.1e}" if 0 < std < _MILLIONTH else f"{std:.{decimals(std)}f}"
+def _plain(text: str) -> str:
+    """Return a text with the minus of keyboards: what a terminal shows is searched and pasted."""
+    return text.replace("−", "-")
 
 
 def estimate_table(
@@ -72,7 +68,7 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
         if truth is not None:
             beside = f"truth {truth[k] * scales[k]:.{places_of(value, std)}f}"
         elif jackknife is not None:
-            beside = f"leave-one-out ± {spread(float(jackknife[k] * scales[k]))}"
+            beside = _plain(f"leave-one-out ± {spread(float(jackknife[k] * scales[k]))}")
         rows.append((name, plus_minus(value, std, units[k]), beside))
     return rows
 

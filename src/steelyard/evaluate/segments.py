@@ -50,7 +50,12 @@ def score_segments(true: ArrayLike, found: ArrayLike) -> SegmentScores:
 
 
 def contingency(true: ArrayLike, found: ArrayLike) -> Array:
-    """Return the number of points (G, S) in every pair of true part and segment; neither has an empty one."""
+    """Return the number of points (G, S) in every pair of true part and segment; neither has an empty one.
+
+    true, found  (N,) label of the part, and of the segment, that each point lies in
+
+    Raises BadValue where the two are not of one length, or of no point.
+    """
     labels = [np.asarray(values) for values in (true, found)]
     if labels[0].ndim != 1 or labels[0].shape != labels[1].shape or not len(labels[0]):
         raise BadValue(

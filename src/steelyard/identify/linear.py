@@ -30,7 +30,7 @@ def normal_equations(T: Array, scatter: Array, weights: Array) -> tuple[Array, A
 
 @numba.njit(cache=True)
 def right_side(T: Array, scatter: Array, weights: Array) -> Array:
-    """Return g (p,) of `normal_equations`."""
+    """Return g (p,) of `normal_equations`, from the same T (p, 6, Z), scatter (C, Z, Z) and weights (C, 6, 6)."""
     g = np.zeros(T.shape[0])
     start, row, column, value = entries(T)
     for c in range(scatter.shape[0]):
@@ -57,14 +57,16 @@ def unit_diagonal(matrix: Array) -> tuple[Array, Array]:
 
 @numba.njit(cache=True)
 def solve_scaled(H: Array, g: Array) -> Array:
-    """Return the least-norm x of H x = g after scaling H to a unit diagonal."""
+    """Return the least-norm x (p,) of H x = g after scaling H (p, p) to a unit diagonal."""
     return times(inverse_scaled(H), g)
 
 
 def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, passes: int) -> Array:
     """Return the linear parameters (p,) of `passes` weighted solutions, W renewed from each for the next.
 
-    The first pass knows no parameters, so that W is that of the wrench noise alone.
+    The data are the design T (p, 6, Z), the scatter (C, Z, Z) of every noise class, and the variances (C, 6) of its
+    acceleration and its wrench, angular part and moment first. The first pass knows no parameters, so that W is that
+    of the wrench noise alone.
     """
     linear = np.zeros(len(T))
     for _ in range(passes):

@@ -170,9 +170,12 @@ def cost_derivatives(
     u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
 ) -> tuple[float, Array, Array]:  # fmt: skip
-    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias].
+    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias] (p,), where p is 10 or 16.
 
-    The bias prior has mean (6,) and precision (6, 6).
+    T                     (p, 6, Z) design of the linear parameters
+    scatter               (C, Z, Z) scatter matrix of every noise class
+    acceleration, wrench  (C, 6) variances of a class: moment or angular part first
+    bias, bias_precision  mean (6,) and inverse covariance (6, 6) of the prior of the bias, moment first [N m, N]
     """
     U = factor(u)
     Q, g, H = derivatives(residual_map_of(T, linear_of(u)), T, scatter, acceleration, wrench)
@@ -215,7 +218,9 @@ def minimise(
     start: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
     gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array, iterations: int,
 ) -> tuple[Array, float, bool]:  # fmt: skip
-    """Return the minimum u, its cost and whether Newton converged, from `start` by damped Newton steps.
+    """Return the minimum u (p,), its cost and whether Newton converged, from `start` (p,) by damped Newton steps.
+
+    The data and priors are those of `cost_derivatives`.
 
     A Hessian that is not positive definite has its negative curvatures turned round (saddle-free Newton); the step is
     kept within a trust length of 1 in log coordinates and halved until the cost falls.

@@ -111,7 +111,10 @@ def value(K: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple
 
 @numba.njit(cache=True)
 def derivatives(K: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array) -> tuple[float, Array, Array]:
-    """Return Q, its gradient (p,) and exact Hessian (p, p) in the linear parameters, for the design T (p, 6, Z)."""
+    """Return Q, its gradient (p,) and exact Hessian (p, p) in the linear parameters, for the design T (p, 6, Z).
+
+    K (6, Z), scatter (C, Z, Z) and the variances (C, 6) are those of `value`.
+    """
     size = T.shape[0]
     total, gradient, hessian = 0.0, np.zeros(size), np.zeros((size, size))
     sparse = entries(T)

@@ -35,6 +35,8 @@ class InertialParameters:
         mass         (...) [kg]
         com          (..., 3) centre of mass in the frame [m]
         inertia_com  (..., 3, 3) about the centre of mass in the frame's axes [kg m^2], symmetric
+
+        Raises BadValue where they are not finite, not symmetric or do not broadcast; the body need not be consistent.
         """
         m = check.finite("mass", mass)[..., None]
         c = check.vectors("centre of mass", com)
@@ -63,7 +65,7 @@ class InertialParameters:
 
     @classmethod
     def from_point_masses(cls, masses: ArrayLike, points: ArrayLike) -> InertialParameters:
-        """Return the body of point masses (n,) [kg] at points (n, 3) [m] in the frame."""
+        """Return the body of point masses (n,) [kg] at points (n, 3) [m] in the frame; raises BadValue."""
         m, p = check.finite("masses", masses), check.vectors("points", points)
         if m.ndim != 1 or p.shape != (*m.shape, 3):
             raise BadValue(f"masses and points must have shapes (n,) and (n, 3); got {m.shape} and {p.shape}.")

@@ -12,17 +12,29 @@ import zlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from tokenize import TokenError
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.lib import format as npy
 
 from steelyard.errors import BadFile
+from steelyard.io.bounds import require_bounded
 from steelyard.io.table_header import Columns, Header
 
 _WIDEST = 4096
-# What reading an array of a damaged NPZ raises.
-_DAMAGED = (ValueError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
+_MOST_COLUMNS = 65_536
+_PACKINGS = (zipfile.ZIP_STORED, zipfile.ZIP_DEFLATED)  # those of numpy
+# What reading an array of a damaged NPZ raises, and what Python's parser does at the text of its header.
+_DAMAGED = (ValueError, TypeError, OSError, EOFError, RuntimeError, KeyError, zlib.error, zipfile.BadZipFile)
+_NO_HEADER = (*_DAMAGED, TokenError, MemoryError)
+
+
+class ArrayHeader(NamedTuple):
+    """What an array says of itself before it is read: its shape, and its size [bytes]."""
+
+    shape: tuple[int, ...]
+    size: int
 
 
 @dataclass(frozen=True)
@@ -39,7 +51,7 @@ class ArrayTable:
         names: list[str] = []
         sources: list[tuple[str, int]] = []
         groups: dict[str, tuple[int, ...]] = {}
-        for key, shape in array_shapes(path).items():
+        for key, (shape, _) in array_headers(path).items():
             if len(shape) == 1:
                 names.append(key)
                 sources.append((key, 0))
@@ -47,63 +59,63 @@ class ArrayTable:
                 groups[key] = tuple(range(len(names), len(names) + width))
                 names += [f"{key}[{i}]" for i in range(width)]
                 sources += [(key, i) for i in range(width)]
+            if len(names) > _MOST_COLUMNS:
+                raise BadFile(f"{path}: holds more than {_MOST_COLUMNS} columns. Save the quantities of the log alone.")
         if not names:
             raise BadFile(f"{path}: no array with rows is in this NPZ. Save one array per quantity, rows first.")
         return cls(path, Header(tuple(names), len(names), groups), tuple(sources))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
-        """Return columns by number; raises BadFile where an array is not of numbers."""
+        """Return columns by number; raises BadFile where an array is damaged or not of numbers."""
         out: Columns = {}
-        arrays: dict[str, np.ndarray[Any, np.dtype[Any]]] = {}
-        with np.load(self.path, allow_pickle=False) as archive:
-            for number in columns:
-                key, inner = self.sources[number]
-                if key not in arrays:
-                    arrays[key] = numeric_array(self.path, key, archive)
-                column = arrays[key].reshape(len(arrays[key]), math.prod(arrays[key].shape[1:]))[:, inner]
-                keep = number in exact and column.dtype.kind in "iu"
-                out[number] = column.astype(np.int64 if keep else np.float64)
+        arrays = read_numbers(self.path, list(dict.fromkeys(self.sources[number][0] for number in columns)))
+        for number in columns:
+            key, inner = self.sources[number]
+            column = arrays[key].reshape(len(arrays[key]), math.prod(arrays[key].shape[1:]))[:, inner]
+            keep = number in exact and column.dtype.kind in "iu"
+            out[number] = column.astype(np.int64 if keep else np.float64)
         return out
 
 
-def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs") -> dict[str, Any]:
+def read_numbers(path: Path, names: Sequence[str]) -> dict[str, Any]:
+    """Return named arrays of an NPZ file; raises BadFile where one is missing, damaged or not of real numbers."""
+    found = read_arrays(path, names)
+    for name, array in found.items():
+        if array.dtype.kind not in "fiub":
+            raise BadFile(f'{path}: array "{name}" must hold real numbers; it holds {array.dtype}.')
+    return found
+
+
+def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs", most: int | None = None) -> dict[str, Any]:
     """Return arrays of an NPZ file by name, all where none is named; raises BadFile where one is missing or damaged.
 
-    of  begins what is said of the names where one of them is missing
+    of    begins what is said of the names where one of them is missing
+    most  [bytes] that the arrays may have together; raises BadFile where they have more, before one is unpacked
     """
     ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
-    held = array_shapes(path)  # other members of the zip are passed over
+    held = array_headers(path)  # other members of the zip are passed over
     if missing := [name for name in names if name not in held]:
         raise BadFile(f'{path}: array "{missing[0]}" is missing. {of} {", ".join(names)}.')
-    try:
-        with np.load(path, allow_pickle=False) as archive:
-            return {name: archive[f"{name}.npy"] for name in names or held}
-    except _DAMAGED as error:
-        raise BadFile(f"{path}: an array is damaged ({error}). Save the file again.") from None
+    wanted = names or list(held)
+    require_bounded(path, sum(held[name].size for name in wanted), most)
+    with np.load(path, allow_pickle=False) as archive:
+        return {name: _array(path, name, archive) for name in wanted}
 
 
-def numeric_array(path: Path, key: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
-    """Return an array of an open NPZ file; raises BadFile where it is damaged or not of real numbers."""
+def _array(path: Path, name: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:
     try:
-        array: np.ndarray[Any, np.dtype[Any]] = archive[f"{key}.npy"]
+        array: np.ndarray[Any, np.dtype[Any]] = archive[f"{name}.npy"]
     except _DAMAGED as error:
-        raise BadFile(f'{path}: array "{key}" is damaged ({error}). Save the file again.') from None
-    require_numbers(path, key, array)
+        raise BadFile(f'{path}: array "{name}" is damaged ({error}). Save the file again.') from None
     return array
 
 
-def require_numbers(path: Path, key: str, array: Any) -> None:
-    """Raise BadFile where an array of an NPZ holds anything but real numbers."""
-    if array.dtype.kind not in "fiub":
-        raise BadFile(f'{path}: array "{key}" must hold real numbers; it holds {array.dtype}.')
-
-
-def array_shapes(path: Path) -> dict[str, tuple[int, ...]]:
-    """Return the shape of every array of an NPZ file, pickles refused by their header; raises BadFile."""
+def array_headers(path: Path) -> dict[str, ArrayHeader]:
+    """Return what every array of an NPZ file says of itself, pickles refused by it; raises BadFile."""
     try:
         with zipfile.ZipFile(path) as archive:
             members = [name for name in archive.namelist() if name.endswith(".npy")]
-            return {name.removesuffix(".npy"): _shape(path, archive, name) for name in members}
+            return {name.removesuffix(".npy"): _header(path, archive, name) for name in members}
     except OSError as error:
         raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
     except (zipfile.BadZipFile, RuntimeError):  # the latter of a zip of another make or version
@@ -112,21 +124,23 @@ def array_shapes(path: Path) -> dict[str, tuple[int, ...]]:
         ) from None
 
 
-def _shape(path: Path, archive: zipfile.ZipFile, name: str) -> tuple[int, ...]:
-    key = name.removesuffix(".npy")
+def _header(path: Path, archive: zipfile.ZipFile, name: str) -> ArrayHeader:
+    key, member = name.removesuffix(".npy"), archive.getinfo(name)
+    if member.compress_type not in _PACKINGS:
+        raise BadFile(f'{path}: array "{key}" is packed as numpy packs none. Save the file with numpy.savez.')
     try:
-        with archive.open(name) as member:
-            version = npy.read_magic(member)
+        with archive.open(name) as content:
+            version = npy.read_magic(content)
             read = npy.read_array_header_1_0 if version == (1, 0) else npy.read_array_header_2_0
-            shape, _, dtype = read(member)
-    except _DAMAGED:
+            shape, _, dtype = read(content)
+    except _NO_HEADER:
         raise BadFile(f'{path}: "{key}" in this NPZ is not an array. Save the file with numpy.savez.') from None
-    size = archive.getinfo(name).file_size
     if dtype.hasobject:
         raise BadFile(
             f'{path}: array "{key}" holds pickled Python objects, which can run code when opened; '
             "it was not opened. Save it as plain numbers (float64)."
         )
-    if dtype.itemsize * math.prod(shape) > size:
+    size = max(dtype.itemsize, 1) * math.prod(shape)  # texts of no length count too: each becomes a value
+    if size > member.file_size:
         raise BadFile(f'{path}: array "{key}" is damaged (shorter than its header says). Save the file again.')
-    return tuple(shape)
+    return ArrayHeader(tuple(shape), size)

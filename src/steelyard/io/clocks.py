@@ -17,6 +17,9 @@ from steelyard.io.units import TIME
 # [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
 _CLOSEST, _FURTHEST = 1e-7, 3600.0
 _FEW_STEPS = 10
+# Signals are put on even stamps: a clock that was set in the middle of a log would make them fill the memory.
+_LONGEST_S = 3 * 86400.0  # from the first row to the last
+_MOST_STEPS, _MOST_HOLES = 20e6, 10.0  # in steps of the rows' median, and beside the number of rows
 # Excel counts days since 1900: these are 2000 to 2100. No log has 50 000 rows a second in just these seconds.
 _DAYS, _FASTEST = (36526.0, 73051.0), 2e-5
 _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them to a nanosecond
@@ -72,7 +75,9 @@ class Clock:
             )
         if len(steps) > _FEW_STEPS:
             self._refuse_days()
-            require_likely_step(float(np.median(steps)) / self.per_second or _CLOSEST, self.where)
+            step = float(np.median(steps)) / self.per_second or _CLOSEST
+            require_likely_step(step, self.where)
+            self._refuse_jumps(steps, step)
 
     def _refuse_days(self) -> None:
         """Raise BadValue where the stamps are Excel's dates: days, whose fractions would pass for seconds."""
@@ -82,6 +87,17 @@ class Clock:
             raise BadValue(
                 f"{self.where}: these look like Excel's dates, counted in days: {first:.10g} to {last:.10g}. Add a "
                 "column of seconds, = (A2 - A$2) * 86400 formatted as a number with all its digits, and name that one."
+            )
+
+    def _refuse_jumps(self, steps: np.ndarray[Any, np.dtype[Any]], step: float) -> None:
+        """Raise BadValue where stamps `step` [s] apart leap so far that the clock was set, or two logs were joined."""
+        span = float(steps.sum()) / self.per_second
+        if span > min(_LONGEST_S, step * max(_MOST_STEPS, _MOST_HOLES * len(steps))):
+            i = int(np.argmax(steps))
+            leap = float(steps[i]) / self.per_second
+            raise BadValue(
+                f"{self.where}: time jumps by {leap:.3g} s from row {i + 1} to row {i + 2}, "
+                f"where rows are {step:.2g} s apart: the clock was set, or two logs were joined. Cut the log there."
             )
 
     def seconds_after(self, origin: int) -> Array:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.array_table import ArrayTable, array_shapes, numeric_array
+from steelyard.io.array_table import ArrayTable, array_headers, read_numbers
 from steelyard.io.in_file import in_file
 from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
@@ -81,9 +81,10 @@ def _of_arrays(path: Path) -> tuple[Any, ...]:
     if "xyz" not in header.groups:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
-    held, wanted = array_shapes(path), ("xyz", _coloured(header.groups), "label", "normals", "seen")
-    with np.load(path, allow_pickle=False) as archive:
-        return tuple(numeric_array(path, name, archive) if name in held else None for name in wanted)
+    wanted = ("xyz", _coloured(header.groups), "label", "normals", "seen")
+    held = array_headers(path)
+    found = read_numbers(path, [name for name in wanted if name in held])
+    return tuple(found.get(name) for name in wanted)
 
 
 def _coloured(names: Any) -> str:

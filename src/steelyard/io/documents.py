@@ -11,6 +11,7 @@ from steelyard.errors import BadDescription, BadFile
 
 _LARGEST_JSON = 64_000_000
 _LARGEST_TOML = 4_000_000
+_MOST_DOTS = 200  # in a line: Python takes the square of their number of steps for a key with dots
 
 
 def load_json(path: Path, what: str, hint: str) -> dict[str, Any]:
@@ -20,7 +21,7 @@ def load_json(path: Path, what: str, hint: str) -> dict[str, Any]:
     hint  ends what is said of a file that is something else
     """
     try:
-        values = json.loads(_text(path, what, "JSON", _LARGEST_JSON))
+        values = json.loads(small_text(path, what, "JSON", _LARGEST_JSON))
     except UnicodeDecodeError:
         raise BadFile(f"{path}: not {what}: a binary file, where JSON was expected. {hint}") from None
     except (ValueError, RecursionError) as error:  # ValueError also of a number with thousands of digits
@@ -33,7 +34,7 @@ def load_json(path: Path, what: str, hint: str) -> dict[str, Any]:
 def load_toml(path: Path) -> dict[str, Any]:
     """Return the tables of a description; raises BadFile or BadDescription."""
     try:
-        text = _text(path, "a log description", "TOML", _LARGEST_TOML)
+        text = small_text(path, "a log description", "TOML", _LARGEST_TOML)
     except UnicodeDecodeError:
         raise BadFile(f"{path}: expected a TOML text in UTF-8; found a binary file.") from None
     return parse_toml(text, str(path))
@@ -41,18 +42,26 @@ def load_toml(path: Path) -> dict[str, Any]:
 
 def parse_toml(text: str, where: str) -> dict[str, Any]:
     """Return the tables of a TOML text; `where` it stands begins the message. Raises BadDescription."""
+    deepest = max((line.count(".") for line in text.split("\n")), default=0)
+    if deepest > _MOST_DOTS:
+        raise BadDescription(f"{where}: a line has {deepest} dots; no description has keys as deep.")
     try:
         return tomllib.loads(text)
     except (ValueError, RecursionError) as error:
         raise BadDescription(f"{where}: not valid TOML: {error}.") from None
 
 
-def _text(path: Path, what: str, kind: str, largest: int) -> str:
-    """Return the text of a small file; raises BadFile, and UnicodeDecodeError where it is none."""
+def small_text(path: Path, what: str, kind: str, largest: int) -> str:
+    """Return a text of at most `largest` bytes; raises BadFile, and UnicodeDecodeError where it is none.
+
+    No more is read than that: a pipe or a device does not tell its size before.
+    """
     try:
-        size = path.stat().st_size
-        if size > largest:
+        with path.open("rb") as file:
+            content = file.read(largest + 1)
+        if len(content) > largest:
+            size = max(path.stat().st_size, len(content))
             raise BadFile(f"{path}: {what} is a small {kind} text; this file has {size} bytes.")
-        return path.read_bytes().decode("utf-8-sig")
     except OSError as error:
         raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
+    return content.decode("utf-8-sig")

@@ -72,9 +72,9 @@ class Entry:
             raise self.error(f'"{key}" must be a section that starts with [{key}]; got {value!r}.')
         return Entry(value, f"{self.where}, [{key}]")
 
-    def text(self, key: str, default: str | None = None) -> str | None:
-        """Return a string, or the default where it is left out."""
-        value = self.values.get(key, default)
+    def text(self, key: str) -> str | None:
+        """Return a string, None where it is left out."""
+        value = self.values.get(key)
         if value is not None and not isinstance(value, str):
             raise self.error(f'"{key}" must be text in quotes; got {value!r}.')
         return value

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
+from steelyard.io.bounds import read_whole
 from steelyard.shape.mesh import Colours
 from steelyard.shape.views import Depths
 from steelyard.whole_files import write_bytes
@@ -47,10 +48,11 @@ def read_colour(path: Path) -> Colours:
 
 def _opened(path: Path) -> Any:
     pillow = _pillow()
+    if not path.exists():
+        raise BadFile(f"{path}: this image is missing.")
+    content = read_whole(path)
     try:
-        image = pillow.open(io.BytesIO(path.read_bytes()), formats=("PNG",))
-    except FileNotFoundError:
-        raise BadFile(f"{path}: this image is missing.") from None
+        image = pillow.open(io.BytesIO(content), formats=("PNG",))
     except pillow.DecompressionBombError:
         raise BadFile(f"{path}: this image has more pixels than any depth camera.") from None
     except (OSError, ValueError, SyntaxError):

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.io.array_table import ArrayTable, read_arrays, require_numbers
+from steelyard.io.array_table import ArrayTable, read_numbers
 from steelyard.io.documents import load_json
 from steelyard.io.entries import is_number
 from steelyard.io.in_file import in_file
@@ -150,7 +150,7 @@ def _masses(path: Path, facts: dict[str, Any], parts: Parts) -> Array | None:
 
 def _cloud(path: Path, mesh: TriangleMesh) -> Cloud:
     """Return the points; every label must be one of the mesh."""
-    arrays = _arrays(path, ("xyz", "rgb", "label"))
+    arrays = read_numbers(path, ("xyz", "rgb", "label"))
     cloud: Cloud = in_file(path, lambda: Cloud(arrays["xyz"], arrays["rgb"], arrays["label"]))
     strange = np.setdiff1d(cloud.labels, mesh.labels)
     if len(strange):
@@ -163,13 +163,5 @@ def read_track(path: Path | str) -> Track:
     path = Path(path)
     down = set(_DOWN.values()) <= set(ArrayTable.open(path).header.groups)
     names = {**MOTION, **(_DOWN if down else {})}
-    arrays = _arrays(path, tuple(names.values()))
+    arrays = read_numbers(path, tuple(names.values()))
     return in_file(path, lambda: Track(**{field: arrays[name] for field, name in names.items()}))
-
-
-def _arrays(path: Path, names: tuple[str, ...]) -> dict[str, Any]:
-    """Return named arrays of an NPZ file; raises BadFile where one is missing or no array of numbers."""
-    found = read_arrays(path, names)
-    for name, values in found.items():
-        require_numbers(path, name, values)
-    return found

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
+from steelyard.io.bounds import require_bounded
 from steelyard.io.table_header import Columns, Header
 
 
@@ -43,21 +44,31 @@ class ParquetTable:
         """Return columns by number; nulls become NaN. Raises BadFile where a column is not of numbers."""
         arrow, parquet = _pyarrow()
         names = self.header.names or ()
+        wanted = sorted({names[n] for n in columns})
         try:
-            table = parquet.read_table(self.path, columns=sorted({names[n] for n in columns}))
+            said = parquet.read_metadata(self.path)
+            require_bounded(self.path, 8 * len(wanted) * said.num_rows)
+            self._require_numbers(arrow, parquet.read_schema(self.path), wanted)
+            table = parquet.read_table(self.path, columns=wanted)
         except (arrow.ArrowException, OSError) as error:
             raise BadFile(f"{self.path}: this Parquet file is damaged ({error}).") from None
-        return {n: self._column(arrow, table.column(names[n]), n, n in exact) for n in columns}
+        return {n: self._column(arrow, table.column(names[n]), n in exact) for n in columns}
 
-    def _column(self, arrow: Any, column: Any, number: int, exact: bool) -> np.ndarray[Any, np.dtype[Any]]:
+    def _require_numbers(self, arrow: Any, schema: Any, names: Sequence[str]) -> None:
+        """Raise BadFile where a column holds anything else, before its rows are unpacked: texts have no bound."""
+        number = (arrow.types.is_timestamp, arrow.types.is_decimal, arrow.types.is_integer, arrow.types.is_floating)
+        for name in names:
+            kind = schema.field(name).type
+            if not any(is_one(kind) for is_one in number):
+                raise BadFile(f'{self.path}: column "{name}" must hold numbers; it holds {kind}.')
+
+    @staticmethod
+    def _column(arrow: Any, column: Any, exact: bool) -> np.ndarray[Any, np.dtype[Any]]:
         kind = column.type
         if arrow.types.is_timestamp(kind):
             column, kind = column.cast(arrow.int64()), arrow.int64()
         if arrow.types.is_decimal(kind):
             column, kind = column.cast(arrow.float64()), arrow.float64()
-        if not (arrow.types.is_integer(kind) or arrow.types.is_floating(kind)):
-            name = (self.header.names or ())[number]
-            raise BadFile(f'{self.path}: column "{name}" must hold numbers; it holds {kind}.')
         if exact and arrow.types.is_integer(kind) and column.null_count == 0:
             return np.asarray(column.to_numpy(), dtype=np.int64)
         return np.asarray(column.to_numpy(), dtype=np.float64)

@@ -7,7 +7,6 @@ twice (volumes, centroids) must agree.
 from __future__ import annotations
 
 import io
-import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -57,13 +56,12 @@ class SavedParts:
     turn_std: float = 0.0
 
     def __post_init__(self) -> None:
-        labels = np.array(self.labels, np.int64)
+        labels = check.whole("labels", self.labels)
         if labels.shape != (len(self.solid),):
             raise BadValue(f"each of the {len(self.solid)} cells needs one label; got {labels.shape}.")
         used = np.unique(labels)
         if not np.array_equal(used, np.arange(len(used))):
             raise BadValue("labels must be 0, 1, 2 ... with at least one cell each; these leave numbers out.")
-        labels.flags.writeable = False
         object.__setattr__(self, "labels", labels)
         if self.rgb is not None:
             rgb = check.vectors("part colours", self.rgb)
@@ -174,40 +172,37 @@ def read_parts(path: Path | str) -> SavedParts:
     if len(arrays["tets"]) > MOST_CELLS:
         raise BadFile(f"{path}: {len(arrays['tets'])} cells are more than the {MOST_CELLS} that can be handled.")
     try:
-        solid = TetMesh(arrays["vertices"], _whole(path, arrays, "tets"))
+        solid = TetMesh(arrays["vertices"], arrays["tets"])
         if float(np.ptp(solid.vertices, axis=0).max()) > _LONGEST_M:
             raise BadValue(f"the solid is over {_LONGEST_M:g} m long. Vertices are in metres; are these millimetres?")
         tree = None
         if all(name in arrays for name in _TREE):
-            tree = Hierarchy(_whole(path, arrays, "piece"), _whole(path, arrays, "merges"), arrays["cost"])
-        names = tuple(str(name)[:_LONGEST_NAME] for name in arrays["names"].ravel()) if "names" in arrays else ()
+            tree = Hierarchy(arrays["piece"], arrays["merges"], arrays["cost"])
+        names = tuple(str(name)[:_LONGEST_NAME] for name in _texts(path, arrays, len(solid)))
         unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
-        saved = SavedParts(solid, _whole(path, arrays, "labels"), arrays.get("rgb"), tree, names, *unsure)
+        saved = SavedParts(solid, arrays["labels"], arrays.get("rgb"), tree, names, *unsure)
         _agree(saved, arrays)
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
     return saved
 
 
-def _arrays(path: Path) -> dict[str, Array]:
+def _arrays(path: Path) -> dict[str, Any]:
     """Return the arrays of numbers in the file, sizes bounded first."""
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
-    except (zipfile.BadZipFile, RuntimeError):
-        size = 0  # the next line says what the file should be
-    if size > MOST_BYTES:
-        raise BadFile(
-            f"{path}: holds {size / 1024**2:.0f} MiB, more than the {MOST_BYTES // 1024**2} MiB that are read."
-        )
-    found = read_arrays(path)
+    found = read_arrays(path, most=MOST_BYTES)
     for name, array in found.items():
         kinds, wanted = ("U", "text") if name == "names" else ("fiub", "real numbers")
         if array.dtype.kind not in kinds:
             raise BadFile(f'{path}: array "{name}" must hold {wanted}; it holds {array.dtype}.')
     return found
+
+
+def _texts(path: Path, arrays: dict[str, Array], cells: int) -> Array:
+    """Return the names (P,), none where they are missing; each becomes a value, so they are counted first."""
+    names = arrays.get("names", np.array([], "U1"))
+    if names.size > cells:
+        raise BadFile(f'{path}: array "names" holds {names.size} names for {cells} cells.')
+    return names.ravel()
 
 
 def _number(path: Path, arrays: dict[str, Array], name: str) -> float:
@@ -216,14 +211,6 @@ def _number(path: Path, arrays: dict[str, Array], name: str) -> float:
     if array.size != 1:
         raise BadFile(f'{path}: array "{name}" must hold one number; it has the shape {array.shape}.')
     return float(array.ravel()[0])
-
-
-def _whole(path: Path, arrays: dict[str, Array], name: str) -> Integers:
-    """Return an array of whole numbers."""
-    array = arrays[name]
-    if array.dtype.kind == "f" and not (np.isfinite(array).all() and (array == np.rint(array)).all()):
-        raise BadFile(f'{path}: array "{name}" must hold whole numbers.')
-    return np.asarray(array, np.int64)
 
 
 def _agree(saved: SavedParts, arrays: dict[str, Array]) -> None:

@@ -10,18 +10,21 @@ import numba
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.ascii_columns import typed
+from steelyard.io.ascii_columns import numbers, typed
+from steelyard.io.bounds import read_whole, require_bounded
 
 _TYPES = {
     ("F", "4"): "<f4", ("F", "8"): "<f8", ("U", "1"): "u1", ("U", "2"): "<u2", ("U", "4"): "<u4", ("U", "8"): "<u8",
     ("I", "1"): "i1", ("I", "2"): "<i2", ("I", "4"): "<i4", ("I", "8"): "<i8",
 }  # fmt: skip
 _WIDEST = 65_536  # numbers in one field of a point
+_MOST_FIELDS = 1000
+_DENSEST = 88  # LZF writes at most 264 bytes for three
 
 
 def read_pcd(path: Path) -> dict[str, Any]:
     """Return field -> values (N,), padding left out; raises BadFile."""
-    content = path.read_bytes()
+    content = read_whole(path)
     mark = content.find(b"\nDATA ")
     end = content.find(b"\n", mark + 1)
     if mark < 0 or end < 0:
@@ -54,6 +57,8 @@ def _layout(path: Path, header: dict[str, list[str]]) -> tuple[np.dtype[Any], in
         types = [_TYPES[kind] for kind in kinds]
     except (KeyError, IndexError, ValueError):
         raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.") from None
+    if len(names) > _MOST_FIELDS:
+        raise BadFile(f"{path}: the PCD header has {len(names)} fields, more than the {_MOST_FIELDS} that are read.")
     sound = points >= 0 and all(1 <= width <= _WIDEST for width in widths)
     if not names or len({len(names), len(types), len(widths)}) > 1 or not sound:
         raise BadFile(f"{path}: the PCD header needs FIELDS, SIZE, TYPE and POINTS that fit each other.")
@@ -70,6 +75,10 @@ def _short(path: Path, count: int) -> BadFile:
     return BadFile(f"{path}: the file ends before its {count} points.")
 
 
+def _damaged(path: Path) -> BadFile:
+    return BadFile(f"{path}: the compressed points are damaged. Save the file again.")
+
+
 def _whole(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> Any:
     if len(body) < count * dtype.itemsize:
         raise _short(path, count)
@@ -81,10 +90,7 @@ def _ascii(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> Any:
     words = body.split()
     if len(words) < count * width:
         raise _short(path, count)
-    try:
-        values = np.array(words[: count * width], dtype="S").astype(np.float64).reshape(count, width)
-    except ValueError:
-        raise BadFile(f"{path}: a point holds a word that is no number.") from None
+    values = numbers(path, "a point", words[: count * width]).reshape(count, width)
     table, column = np.zeros(count, dtype), 0
     for name in dtype.names or ():
         size = int(np.prod(dtype[name].shape))
@@ -102,9 +108,12 @@ def _compressed(path: Path, body: bytes, dtype: np.dtype[Any], count: int) -> An
     packed, size = struct.unpack("<II", body[:8])
     if size != count * dtype.itemsize or len(body) < 8 + packed:
         raise _short(path, count)
+    require_bounded(path, size)
+    if size > _DENSEST * packed:
+        raise _damaged(path)
     out = np.zeros(size, np.uint8)
     if _inflate(np.frombuffer(body[8 : 8 + packed], np.uint8), out) != size:
-        raise BadFile(f"{path}: the compressed points are damaged. Save the file again.")
+        raise _damaged(path)
     table, place = np.zeros(count, dtype), 0
     for name in dtype.names or ():
         length = count * dtype[name].itemsize

@@ -9,7 +9,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.ascii_columns import typed
+from steelyard.io.ascii_columns import numbers, typed
+from steelyard.io.bounds import read_whole
 from steelyard.io.in_file import in_file
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
@@ -24,6 +25,7 @@ _TYPES = {
 _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_indices", "vertex_index")
 _MOST_DIGITS = 15  # of a number of rows
+_MOST_PROPERTIES = 1000  # of all elements
 
 
 @dataclass(frozen=True)
@@ -36,10 +38,7 @@ class _Element:
 def read_ply(path: Path | str) -> dict[str, dict[str, Column]]:
     """Return element -> column -> values (N,) or, for a list of equal lengths, (N, k); raises BadFile."""
     path = Path(path)
-    try:
-        content = path.read_bytes()
-    except OSError as error:
-        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
+    content = read_whole(path)
     order, elements, body = _header(path, content)
     out, rest = {}, content[body:]
     words = rest.split() if not order else []
@@ -79,6 +78,8 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
                 pass
             case _:
                 raise BadFile(f'{path}: the PLY header has a line that means nothing: "{line.strip()[:60]}".')
+        if len(elements) + sum(len(element.fields) for element in elements) > _MOST_PROPERTIES:
+            raise BadFile(f"{path}: the PLY header has more than {_MOST_PROPERTIES} elements and properties.")
     if order is None:
         raise BadFile(f"{path}: the PLY header names no format among {', '.join(_ORDERS)}.")
     _require_names_apart(path, elements)
@@ -137,10 +138,7 @@ def _ascii(path: Path, element: _Element, words: list[bytes]) -> tuple[dict[str,
     used = width * element.count
     if used > len(words):
         raise _short(path, element)
-    try:
-        table = np.array(words[:used], dtype="S").astype(np.float64).reshape(element.count, width)
-    except ValueError:
-        raise BadFile(f'{path}: element "{element.name}" holds a word that is no number.') from None
+    table = numbers(path, f'element "{element.name}"', words[:used]).reshape(element.count, width)
     out = {}
     for (name, kind, first, k), (_, _, length) in zip(slots, element.fields, strict=True):
         if length and (table[:, first - 1] != k).any():

@@ -15,6 +15,7 @@ from steelyard.errors import BadFile
 _HEAD = 1 << 16
 _BLOCK = 1 << 23
 _LONGEST_LINE = 1 << 20
+_FREE, _DENSEST = 1 << 26, 100  # tables pack to a third or a tenth; a few kB of other texts become many GB
 _BOM = b"\xef\xbb\xbf"
 _CONTROL = re.compile(rb"[\x01-\x08\x0e-\x1f\x7f]")
 
@@ -62,11 +63,18 @@ def _require_text(path: Path, block: bytes) -> None:
 
 def blocks(path: Path, skip: int) -> Iterator[str]:
     """Yield the text below the header, about 8 MB at a time, cut at line ends."""
+    most = max(_FREE, _DENSEST * path.stat().st_size)
     with _open(path) as stream:
         rest = _read(path, stream, _BLOCK)
+        unpacked = len(rest)
         rest = _below(rest.removeprefix(_BOM), skip)
         while True:
             more = _read(path, stream, _BLOCK)
+            unpacked += len(more)
+            if unpacked > most:
+                raise BadFile(
+                    f"{path}: unpacks to more than {_DENSEST} times its size. Unpack it and look at it first."
+                )
             block = rest + more
             _require_text(path, block)
             cut = block.rfind(b"\n") + 1 if more else len(block)

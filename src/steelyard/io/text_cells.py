@@ -32,6 +32,8 @@ def split(line: str, delimiter: str | None) -> tuple[str, ...]:
     """Return the cells of a line without blanks and quotes around them."""
     if delimiter is None:
         return tuple(word.strip('"') for word in _WORDS.findall(line))
+    if len(line) > csv.field_size_limit():  # the reader of csv refuses longer cells, which are no data
+        return tuple(cell.strip().strip('"') for cell in line.split(delimiter))
     return tuple(cell.strip() for cell in next(csv.reader([line], delimiter=delimiter, skipinitialspace=True)))
 
 
@@ -108,7 +110,8 @@ def filled(block: str, delimiter: str | None) -> str:
     if delimiter is None:
         return block
     mark = re.escape(delimiter)
-    empty = rf'^ *(?:"")? *(?={mark})|(?<={mark}) *(?:"")? *(?={mark}|$)'
+    cell = r' *+(?:"" *+)?+'  # never tried again shorter: a million blanks would take their square of steps
+    empty = rf"^{cell}(?={mark})|(?<={mark}){cell}(?={mark}|$)"
     return re.sub(empty, "nan", block, flags=re.MULTILINE)
 
 

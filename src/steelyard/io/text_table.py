@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
+from steelyard.io.bounds import require_bounded
 from steelyard.io.table_header import Columns, Header
 from steelyard.io.text_blocks import blocks, decoded, head_lines
 from steelyard.io.text_cells import (
@@ -91,12 +92,14 @@ class TextTable:
         """Return columns by number; raises BadFile at a cell that is not a number, with its line and text."""
         how = self._how(sorted(set(columns)), exact)
         parts: list[Columns] = []
-        line = self.skip + 1
+        line, size = self.skip + 1, 0
         for block in blocks(self.path, self.skip):
             whole = block if block.endswith("\n") else completed(block, self.delimiter, self.first)
             part = self._parse(with_points(whole) if how.commas else whole, how, line)
             if part:
                 parts.append(part)
+                size += sum(column.nbytes for column in part.values())
+                require_bounded(self.path, size)
             line += block.count("\n")
         if not parts:
             raise BadFile(f"{self.path}: the file has no rows.")

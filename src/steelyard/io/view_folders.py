@@ -3,7 +3,10 @@
 from __future__ import annotations
 
 import csv
+import io
+import itertools
 import json
+from collections import Counter
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -11,7 +14,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.documents import load_json
+from steelyard.io.bounds import require_bounded
+from steelyard.io.documents import load_json, small_text
 from steelyard.io.entries import is_number
 from steelyard.io.images import MOST_PIXELS, read_colour, read_depth, require_images, write_image
 from steelyard.io.in_file import in_file
@@ -22,6 +26,8 @@ from steelyard.whole_files import whole_folder, write_text
 _COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
 _HEADER = ",".join(_COLUMNS)
 _CAMERA = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m")
+MOST_VIEWS = 10_000
+_LARGEST_CSV = 16_000_000
 _UNIT = 1e-3  # how far from 1 the length of a quaternion may be
 
 
@@ -34,8 +40,9 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
     names, X_WC = _poses(folder / "poses.csv")
     intrinsics = in_file(folder / "camera.json", lambda: _intrinsics(camera))
     size = (intrinsics.height, intrinsics.width)
-    depth = np.zeros((len(names), *size), np.uint16)
     coloured = (folder / "color").is_dir()
+    require_bounded(folder, len(names) * size[0] * size[1] * (5 if coloured else 2))
+    depth = np.zeros((len(names), *size), np.uint16)
     rgb = np.zeros((len(names), *size, 3), np.uint8) if coloured else None
     for k, name in enumerate(names):
         depth[k] = _sized(folder / "depth" / f"{name}.png", read_depth, size)
@@ -90,14 +97,17 @@ def _intrinsics(camera: dict[str, float]) -> Intrinsics:
 
 def _poses(path: Path) -> tuple[list[str], Pose]:
     """Return the names of the views and the poses (V,) of the camera in W."""
+    if not path.exists():
+        raise BadFile(f"{path}: this file is missing. It needs the columns {', '.join(_COLUMNS)}.")
     try:
-        with path.open(newline="", encoding="utf-8-sig") as lines:
-            reader = csv.DictReader(lines, skipinitialspace=True)
-            numbered = [(reader.line_num, row) for row in reader]  # blank lines are passed over
-    except FileNotFoundError:
-        raise BadFile(f"{path}: this file is missing. It needs the columns {', '.join(_COLUMNS)}.") from None
-    except (OSError, UnicodeDecodeError, csv.Error) as error:
+        lines = io.StringIO(small_text(path, "a table of poses", "CSV", _LARGEST_CSV), newline="")
+        reader = csv.DictReader(lines, skipinitialspace=True)
+        # blank lines are passed over
+        numbered = [(reader.line_num, row) for row in itertools.islice(reader, MOST_VIEWS + 1)]
+    except (UnicodeDecodeError, csv.Error) as error:
         raise BadFile(f"{path}: cannot be read as CSV; {error}.") from None
+    if len(numbered) > MOST_VIEWS:
+        raise BadFile(f"{path}: these are more than {MOST_VIEWS} views. Leave views out.")
     line, rows = [number for number, _ in numbered], [row for _, row in numbered]
     missing = [key for key in _COLUMNS if not rows or key not in rows[0]]
     if len(missing) == len(_COLUMNS):
@@ -114,9 +124,9 @@ def _poses(path: Path) -> tuple[list[str], Pose]:
                 raise BadFile(
                     f'{path}: line {line[k]}, column "{key}": expected a number; found "{row[key]}".'
                 ) from None
-    if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise BadFile(f'{path}: the view "{twice}" is named {names.count(twice)} times. Give each view its own name.')
+    for name, times in Counter(names).items():
+        if times > 1:
+            raise BadFile(f'{path}: the view "{name}" is named {times} times. Give each view its own name.')
     bad = np.flatnonzero(~np.isfinite(numbers).all(1))
     if len(bad):
         raise BadFile(f"{path}: line {line[bad[0]]} holds NaN or infinity; {len(bad)} of {len(rows)} poses do.")

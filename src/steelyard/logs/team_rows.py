@@ -115,7 +115,10 @@ def _vectors(track: Track, name: str) -> Array:
 
 
 def between(known: Array, values: Array, time: Array) -> Array:
-    """Return values at `time`: cubic where samples are near, monotone where they are not; ends held."""
+    """Return values (N, ..) known at rising stamps `known` (N,) [s] at `time` (T,) [s], (T, ..).
+
+    Cubic where samples are near, monotone where they are not; beyond the ends those are held.
+    """
     from scipy.interpolate import PchipInterpolator
 
     inside = np.clip(time, known[0], known[-1])

@@ -5,7 +5,6 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any
 
 import numpy as np
 
@@ -35,7 +34,7 @@ class Hierarchy:
     hull: Array | None = None
 
     def __post_init__(self) -> None:
-        piece, merges = _whole(self.piece), _whole(self.merges).reshape(-1, 2)
+        piece, merges = check.whole("piece", self.piece), check.whole("merges", self.merges).reshape(-1, 2)
         cost = check.frozen(self.cost)
         count = len(merges) + 1
         if piece.ndim != 1 or not len(piece) or len(np.unique(piece)) != count or piece.min() or piece.max() >= count:
@@ -146,9 +145,3 @@ def _ancestors(parent: Integers, nodes: Integers) -> Integers:
         above[level] = True
         level = parent[level]
     return np.flatnonzero(above)
-
-
-def _whole(values: Any) -> Integers:
-    array = np.array(values, dtype=np.int64)
-    array.flags.writeable = False
-    return array

@@ -43,7 +43,7 @@ class Parts:
 
     def __post_init__(self) -> None:
         moments = check.vectors("part moments", self.moments, 10)
-        label = np.asarray(self.label, np.int64)
+        label = check.whole("part labels", self.label)
         if moments.ndim != 2 or label.shape != moments.shape[:1]:
             raise BadValue(
                 f"parts need one label and ten moments each; got labels {label.shape} and moments {moments.shape}."

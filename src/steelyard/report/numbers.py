@@ -10,6 +10,7 @@ from steelyard.inertia import forms
 from steelyard.report.markup import Html, tag
 from steelyard.spatial import Rotation
 
+LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
 _MILLIONTH = 1e-6
 _THIN, _BOUND = "\u202f", "\u00a0"  # no line breaks at either
 
@@ -75,7 +76,7 @@ def mass_unit(mass: float) -> tuple[float, str]:
 
 def inertia_unit(moment: float) -> tuple[float, str]:
     """Return factor and unit for a moment of inertia [kg m^2]."""
-    return (1e6, "kg mm²") if abs(moment) < 0.1 else (1.0, "kg m²")
+    return (1e6, "kg mm²") if abs(moment) < LARGE_INERTIA else (1.0, "kg m²")
 
 
 def rpy_deg(rotation: Rotation) -> Array:

@@ -71,6 +71,9 @@ def scene_of_solid(
     labels  (T,) part of each cell
     cloud   gives every vertex the colour of its nearest point
     rgb     (P, 3) mean colours 0..255 of the parts, labels rising, used where the cloud has none
+    X_SO    where the object sits in the sensor, None where nothing says
+
+    Raises BadValue where cells and labels differ in number.
     """
     labels = np.asarray(labels, np.int64)
     if labels.shape != (len(solid),):

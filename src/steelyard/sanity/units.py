@@ -16,6 +16,7 @@ from steelyard.sanity.glance import channel
 # No arm moves its hand faster [m/s], or stands in poses further apart [m]: such numbers are millimetres.
 FASTEST, FURTHEST = 10.0, 20.0
 # A length of gravity in this range is one g, not metres per second squared.
+_MOST_PLACES = 2_000_000  # looked at, of positions over time
 ONE_G = (0.9, 1.1)
 
 
@@ -96,7 +97,7 @@ def _far(stream: Stream, values: Array) -> str:
         spread = float(np.linalg.norm(np.ptp(values, axis=0)))
         return f"spreads over {spread:.4g} m" if spread > FURTHEST else ""
     span = float(stream.time[-1] - stream.time[0])
-    grid = np.linspace(stream.time[0], stream.time[-1], max(int(span * 20), 2))
+    grid = np.linspace(stream.time[0], stream.time[-1], min(max(int(span * 20), 2), _MOST_PLACES))
     where = np.stack([np.interp(grid, stream.time, column) for column in values.T], 1)
     speed = np.linalg.norm(np.diff(where, axis=0), axis=1) / max(float(grid[1] - grid[0]), 1e-9)
     top = float(np.quantile(speed, 0.98))

@@ -50,7 +50,8 @@ class Cloud:
         if self.rgb is not None:
             object.__setattr__(self, "rgb", _colours(self.rgb, xyz.shape))
         if self.label is not None:
-            object.__setattr__(self, "label", _column("labels", self.label, xyz.shape[:1], np.int64))
+            label = check.whole("labels", self.label)
+            object.__setattr__(self, "label", _column("labels", label, xyz.shape[:1], np.int64))
         if self.normals is not None:
             object.__setattr__(self, "normals", _unit(_column("normals", self.normals, xyz.shape, np.float64)))
         if self.seen is not None:

@@ -102,6 +102,27 @@ def held(camera: Any, R: Any, p: Any, height: int, width: int, points: Any) -> A
 
 
 @numba.njit(cache=True, nogil=True)
+def _normal_of(
+    image: Any, unit: float, fx: float, fy: float, a: float, b: float, z: float, u: int, v: int, step: int, noise: float
+) -> tuple[bool, float, float]:  # fmt: skip
+    """Return whether the neighbours of pixel (u, v) give a normal toward the camera, and its x and y there, z being -1.
+
+    a, b  direction of the pixel's ray at depth 1
+    z     its depth [m]
+    """
+    left, right = image[v, u - step] * unit, image[v, u + step] * unit
+    up, down = image[v - step, u] * unit, image[v + step, u] * unit
+    most = _STEEP * step * z / fx + 4 * noise * z * z
+    left, west = _beside(left, z, most, -step / fx)
+    right, east = _beside(right, z, most, step / fx)
+    up, north = _beside(up, z, most, -step / fy)
+    down, south = _beside(down, z, most, step / fy)
+    if west == east or north == south:
+        return False, 0.0, 0.0
+    return _facing(a, b, left, right, up, down, west, east, north, south)
+
+
+@numba.njit(cache=True, nogil=True)
 def surfels(
     depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int, step: int, mask: Any, low: Any, pitch: float,
     cell: float, floor: float, layers: int, noise: float,
@@ -142,16 +163,7 @@ def surfels(
                 layer = int(np.floor((h - floor) / cell))
                 if layer < 0 or layer >= layers:
                     continue
-                left, right = depth[k, v, u - step] * unit, depth[k, v, u + step] * unit
-                up, down = depth[k, v - step, u] * unit, depth[k, v + step, u] * unit
-                most = _STEEP * step * z / fx + 4 * noise * z * z
-                left, west = _beside(left, z, most, -step / fx)
-                right, east = _beside(right, z, most, step / fx)
-                up, north = _beside(up, z, most, -step / fy)
-                down, south = _beside(down, z, most, step / fy)
-                if west == east or north == south:
-                    continue
-                faces, nxc, nyc = _facing(a, b, left, right, up, down, west, east, north, south)
+                faces, nxc, nyc = _normal_of(depth[k], unit, fx, fy, a, b, z, u, v, step, noise)
                 if not faces:
                     continue
                 nxw = R[k, 0, 0] * nxc + R[k, 0, 1] * nyc - R[k, 0, 2]

@@ -34,7 +34,7 @@ class TriangleMesh:
 
     def __post_init__(self) -> None:
         vertices = check.vectors("mesh vertices", self.vertices)
-        triangles, part = _frozen(self.triangles, np.int64), _frozen(self.part, np.int64)
+        triangles, part = check.whole("triangles", self.triangles), check.whole("part labels", self.part)
         if vertices.ndim != 2 or triangles.ndim != 2 or triangles.shape[1] != 3 or not len(triangles):
             raise BadValue(
                 f"a mesh needs vertices (V, 3) and triangles (F, 3), F > 0; got {vertices.shape} and {triangles.shape}."

@@ -36,7 +36,7 @@ class TetMesh:
 
     def __post_init__(self) -> None:
         vertices = check.vectors("vertices", self.vertices)
-        tets = np.array(self.tets, dtype=np.int64)
+        tets = np.array(check.whole("tets", self.tets))
         if vertices.ndim != 2 or tets.ndim != 2 or tets.shape[1] != 4 or not len(tets):
             raise BadValue(f"a solid needs vertices (V, 3) and tets (T, 4), T > 0; got {vertices.shape}, {tets.shape}.")
         if tets.min() < 0 or tets.max() >= len(vertices):

@@ -22,7 +22,8 @@ def unit_noise(rng: np.random.Generator, rows: int, columns: int, spectrum: Spec
 
     "white": independent rows. "2hz": white noise through a digital second-order Butterworth low-pass
     (bilinear) with its -3 dB point at 2 Hz, divided by the filter's own gain for white noise, after 5 s of
-    settling from rest (the transient is then below 1e-19): stationary from the first row.
+    settling from rest (the transient is then below 1e-19): stationary from the first row. Raises BadValue for any
+    other spectrum.
     """
     if spectrum == "white":
         return rng.standard_normal((rows, columns))

@@ -100,7 +100,11 @@ def unexplained(first: Array, second: Array, noise: Array) -> float:
 
 
 def bodies(twist: Array, noise: Array) -> list[tuple[int, ...]]:
-    """Return the groups of robots that move as one body each."""
+    """Return the groups of robots, by number, that move as one body each.
+
+    twist  (T, N, 6) of every robot in axes of its own, angular part first [rad/s, m/s]
+    noise  (N, 2) of turning and of moving, as `unexplained` takes it
+    """
     groups: list[list[int]] = []
     for i in range(twist.shape[1]):
         for group in groups:

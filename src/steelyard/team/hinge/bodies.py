@@ -36,7 +36,9 @@ def least_mass(seven: Array) -> float:
 
 
 def second_body(parameters: Array) -> Array:
-    """Return ten parameters of the second body that go with the seventeen, its mass in the middle of its range.
+    """Return ten parameters (10,) of the second body that go with the seventeen (17,), all in the hinge's frame H.
+
+    Its mass is in the middle of its range.
 
     How far it reaches along the hinge, which nothing shows, is taken from how far the whole does.
     """

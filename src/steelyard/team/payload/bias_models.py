@@ -63,12 +63,12 @@ def ladder_shares(evidence: Array, ladder: Array) -> Array:
 
 
 def gain_spread(weight: Array, ladder: Array) -> float:
-    """Return how much gains err, drawn anew or lasting."""
+    """Return the rms share by which gains err, drawn anew or lasting: mean over the ladder (L, 4) by weight (L,)."""
     return float(np.sqrt(weight @ np.square(ladder[:, 2:]).sum(1)))
 
 
 def without_gain(weight: Array, ladder: Array) -> float:
-    """Return the share of the evidence that gains have no error."""
+    """Return the share of the weight (L,) on the ladder (L, 4) that says that gains have no error."""
     return float(weight[~ladder[:, 2:].any(1)].sum())
 
 

@@ -120,7 +120,12 @@ def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[A
 
 
 def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> Pose:
-    """Return the star of pairs with the reference, in closed form from the scatter; `level` as in `fit_twists`."""
+    """Return the pose (N,) of every grasp in the reference's from its pair with it, in closed form from the scatter.
+
+    level  (N, 3, 3) as in `fit_twists`
+
+    Raises CannotAnswer where a robot never spoke together with the reference.
+    """
     turns, places = [], []
     for i in range(data.count):
         if i == reference:
