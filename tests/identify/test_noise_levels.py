@@ -8,9 +8,12 @@ import numpy as np
 import pytest
 from bench_logs import BIAS, MOTIONS, OBJECTS, bench_log, truth
 
+from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.noise_levels import with_declared, with_noise
 from steelyard.identify.rest import RIPPLE, at_rest
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.noise import rounding
 
 
 def found_over_true(log: MotionLog) -> list[tuple[bool, np.ndarray, np.ndarray]]:
@@ -117,3 +120,26 @@ def test_logs_that_cannot_be_judged_stay_as_they_are() -> None:
 def test_noise_refuses_negative_variances() -> None:
     with pytest.raises(Exception, match=r"^wrench variances must not be negative; got \["):
         Noise(np.ones(6), -np.ones(6))
+
+
+@pytest.mark.parametrize(("newton", "newton_metre"), [(2, 3), (1, 2)])
+def test_bars_hold_the_digits_of_a_typed_table(newton: int, newton_metre: int) -> None:
+    down = -9.80665 * np.concatenate([np.eye(3), -np.eye(3)])
+    z = []
+    for seed in range(20):
+        rng = np.random.default_rng(seed)
+        body = InertialParameters.from_com(rng.uniform(0.5, 2), [*rng.uniform(-0.03, 0.03, 2), 0.08], 1e-3 * np.eye(3))
+        wrench = MotionLog.of_poses(np.zeros((6, 6)), down).predicted(body.vector) + rng.uniform(-1, 1, 6)
+        typed = np.column_stack([wrench[:, :3].round(newton_metre), wrench[:, 3:].round(newton)])
+        found = NoiseAware().identify(MotionLog.of_poses(typed, down))
+        z.append((np.append(found.mass, found.com) - np.append(body.mass, body.com)) / found.std[:4])
+    # All rows are rounded alike, so that residuals show next to nothing: bars of what they show are left behind.
+    assert np.sqrt(np.mean(np.square(z))) < 1.3
+    assert np.abs(z).max() < 3
+
+
+def test_full_doubles_have_no_rounding() -> None:
+    rng = np.random.default_rng(0)
+    assert not rounding(rng.normal(size=(50, 6))).any()
+    coarse = np.column_stack([rng.normal(size=(50, 3)).round(3), np.zeros((50, 3))])
+    assert rounding(coarse) == pytest.approx(np.repeat([1e-6 / 12, 0.0], 3))

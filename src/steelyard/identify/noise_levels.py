@@ -14,7 +14,7 @@ from steelyard.identify.regressor import design
 from steelyard.identify.rest import RIPPLE
 from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
-from steelyard.logs.noise import robust_std
+from steelyard.logs.noise import robust_std, rounding
 
 # Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
 # and an axis that looks quiet by chance would be over-weighted.
@@ -158,7 +158,9 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
     """
     moments = Moments.of_log(log, by_block=False)
     noise = log.noise or ()
-    out, shares = np.tile(SMALLEST, (len(noise), 1)), np.zeros(len(noise))
+    # In a table of poses that are alike up to signs all rows are rounded alike: by half a step, and none averages out.
+    least = np.maximum(SMALLEST, rounding(log.wrench) * (3.0 if log.time is None else 1.0))
+    out, shares = np.tile(least, (len(noise), 1)), np.zeros(len(noise))
     T = design(with_bias)
     acceleration = np.stack([noise[c].acceleration for c in moments.noise_class])
     wrench = np.stack([noise[c].wrench for c in moments.noise_class])
@@ -180,9 +182,9 @@ def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array
             unsure = 2 * np.sqrt(2 / rows) if resting else 0.0
             left = (1 - unsure) * miss - (K[:, :6] ** 2) @ acceleration[group]
             left = np.maximum(left, 0.0 if resting else LEAST_SHARE * miss)
-        out[c] = np.maximum(_pooled(_of_heard(left, log.dead), int(rows)), SMALLEST)
+        out[c] = np.maximum(_pooled(_of_heard(left, log.dead), int(rows)), least)
         shares[c] = rows / moments.samples
-    quiet = np.min(out[resting], axis=0) if resting else SMALLEST
+    quiet = np.min(out[resting], axis=0) if resting else least
     # A few rows in one pose can be fitted without any residual; they are not better than the sensor is elsewhere.
     return np.asarray(np.maximum(np.maximum(out, quiet), QUIETEST * shares @ out))
 

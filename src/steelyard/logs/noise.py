@@ -12,11 +12,37 @@ from steelyard.logs.log import Noise
 from steelyard.spatial import cross_matrix
 
 _FEWEST_ROWS = 30
+# Finer steps than this are never the largest error.
+_MOST_DECIMALS = 6
 
 
 def robust_std(values: Array) -> Array:
     """Return the standard deviation (k,) of normal values (N, k) about zero, from the median of their sizes."""
     return np.asarray(1.4826 * np.median(np.abs(values), axis=0))
+
+
+def rounding(wrench: Array) -> Array:
+    """Return the variances (6,) that rounding leaves in wrenches (N, 6), typed or printed with so many decimals.
+
+    Of full doubles it is zero. A residual does not show it where poses are alike up to signs.
+    """
+    steps = np.repeat([_step(wrench[:, :3]), _step(wrench[:, 3:])], 3)
+    return np.asarray(steps**2 / 12)
+
+
+def _step(values: Array) -> float:
+    """Return the largest power of ten, at most one, of which all values are multiples; zero if it is a tiny one."""
+    if not values.any():
+        return 0.0
+    for decimals in range(_MOST_DECIMALS + 1):
+        # Most logs are full doubles: a few rows tell.
+        if all(_whole(part * 10.0**decimals) for part in (values[:_FEWEST_ROWS], values)):
+            return 10.0**-decimals
+    return 0.0
+
+
+def _whole(values: Array) -> bool:
+    return bool((np.abs(values - np.rint(values)) < 1e-9 * np.maximum(np.abs(values), 1.0)).all())
 
 
 def classes(still: Mask, alpha_variance: Array) -> Integers:
