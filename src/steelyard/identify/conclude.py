@@ -11,6 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.identify import noise_cost
+from steelyard.identify.correlated import NOTHING, Score
 from steelyard.identify.dense import eigen, product, product_transposed
 from steelyard.identify.estimate import Estimate, Evidence
 from steelyard.identify.holdout import leave_one_out
@@ -60,11 +61,11 @@ def _taken(H: Array, problem: Problem, solution: Solution) -> float:
 
 
 def conclude(
-    problem: Problem, solution: Solution, method: str, score: Array | None = None, response: Array | None = None
+    problem: Problem, solution: Solution, method: str, score: Score = NOTHING, response: Array | None = None
 ) -> Estimate:
     """Return the Estimate of a solution.
 
-    `score` (p, p) is the variance of the score where the log's own correlation is known; else noise is taken as white.
+    `score` tells the variance of the score where the log's own correlation is known; else noise is taken as white.
     Where a shape makes the answer together with the log, `response` (p, p) is how it follows the score: then the
     covariance, still that of the log alone, and its widening are left to the caller, and nothing must be fixed by the
     log alone. Else raises CannotAnswer where mass or centre of mass are not fixed, and names the inertia that is not.
@@ -85,10 +86,11 @@ def conclude(
     if solution.weights is not None:
         bread, _ = normal_equations(problem.T, problem.scatter, solution.weights)
         meat = max(chi2, 1.0) * problem.fixed_weight_score(solution.linear, solution.weights)
-    meat = meat if score is None else score
+    meat = meat if score.by_noise is None else score.by_noise
     bread, meat = problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
-    covariance = _sandwich(bread, meat, solution.jacobian, solution.prior)
+    covariance = _sandwich(bread, meat + score.by_pose, solution.jacobian, solution.prior)
     body = InertialParameters(solution.linear[:10])
+    # Whether the data fix a number is judged by noise alone: more poses cure no error that comes back with them.
     seen = meat if solution.weights is None else problem.plus_bias_prior(white)
     F, G, _, _ = without_bias(problem.plus_bias_prior(H), seen)
     sight = Sight(*_sight(F, G, solution.linear[:10]))

@@ -33,21 +33,34 @@ LEAST_SHARE = 0.25
 
 @dataclass(frozen=True, eq=False)
 class Score:
-    """What the order of the rows tells of the score: its variance (p, p), None where there is none, and notes."""
+    """What the order of the rows tells of the score, and notes.
 
-    variance: Array | None
+    by_noise  (p, p) its variance by noise that rows remember; None where the rows have no order
+    by_pose   (p, p) what errors that come back with the pose add to it
+    """
+
+    by_noise: Array | None = None
+    by_pose: Array | float = 0.0
     notes: tuple[str, ...] = ()
+
+    @property
+    def variance(self) -> Array | None:
+        """The variance (p, p) of the score, None where the rows have no order."""
+        return None if self.by_noise is None else self.by_noise + self.by_pose
+
+
+NOTHING = Score()
 
 
 def score_in_time(log: MotionLog, problem: Problem, solution: Solution) -> Score:
     """Return the variance of the score under noise that rows remember, and errors that come back with the pose."""
     if log.time is None or len(log) < FEWEST:
-        return Score(None)
+        return NOTHING
     K, D = problem.residual_map(solution.linear), directions(problem)
     rows = _read(log.rows(np.argsort(log.time, kind="stable")), K, D, problem, solution.weights)
     variance = _by_noise(rows, K, problem, solution)
     recurring = pose_errors(problem, solution, D, _along(rows))
-    return Score(variance) if recurring is None else Score(variance + recurring.variance, (recurring.note,))
+    return Score(variance) if recurring is None else Score(variance, recurring.variance, (recurring.note,))
 
 
 def _by_noise(rows: _Rows, K: Array, problem: Problem, solution: Solution) -> Array:

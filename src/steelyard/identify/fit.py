@@ -95,7 +95,7 @@ def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest
     log, problem = prepared(log, bias, rested if verify_rest and log.still.any() else None)
     solution = solver(problem)
     score = score_in_time(log, problem, solution)
-    return conclude(problem, solution, method, score.variance).noted(*score.notes)
+    return conclude(problem, solution, method, score).noted(*score.notes)
 
 
 def prepared(
