@@ -6,7 +6,9 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 
+from steelyard.cli.main import cli
 from steelyard.findings import AT_REST, REMEDIES, UNMEASURED, Finding
 
 ROOT = Path(__file__).parents[1]
@@ -49,3 +51,14 @@ def test_every_decision_is_in_the_index() -> None:
     folder = ROOT / "docs" / "decisions"
     index = (folder / "index.md").read_text()
     assert [path.name for path in folder.glob("[0-9]*.md") if path.name not in index] == []
+
+
+@pytest.mark.parametrize("page", ["parts.md", "shape.md"])
+def test_code_of_a_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    made = CliRunner().invoke(cli, ["workshop", "build", str(tmp_path), "--tools", "hammer", "--noise", "low"])
+    assert made.exit_code == 0, made.output
+    monkeypatch.chdir(tmp_path / "hammer")
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / page).read_text(), re.MULTILINE | re.DOTALL)
+    assert blocks
+    for block in blocks:
+        exec(block.replace("cloud.ply", "points.npz"), {})

@@ -16,3 +16,8 @@ def test_help_shows_the_function_before_and_after_its_room_is_loaded() -> None:
         assert "scan     what was seen of the object instead" in shown
         assert inspect.signature(sy.identify) == inspect.signature(api.identify)
     assert "room" not in shown.split("PACKAGE CONTENTS")[0]
+
+
+def test_every_name_is_there() -> None:
+    for name in sy.__all__:
+        assert getattr(sy, name) is not None

@@ -91,6 +91,28 @@ def test_a_data_sheet_typed_as_a_tool(tmp_path: Path) -> None:
     assert not tool.identified[4:].any()
 
 
+@pytest.mark.parametrize(
+    ("mass", "moments", "why"),
+    [
+        (-1.0, [1, 1, 1], "mass must be above zero, it is -1 kg"),
+        (1.0, [1, 1, 9], "the triangle inequality is broken"),
+        (1.0, [-1, 1, 1], "principal moments must be above zero"),
+    ],
+)
+def test_a_data_sheet_of_no_body(tmp_path: Path, mass: float, moments: list[float], why: str) -> None:
+    values = {"mass_kg": mass, "com_m": [0, 0, 0], "inertia_com_kgm2": np.diag(moments).tolist()}
+    (tmp_path / "t.json").write_text(json.dumps(values))
+    with pytest.raises(BadFile, match=f"no body has these parameters: {why}"):
+        read_result(tmp_path / "t.json")
+
+
+@pytest.mark.parametrize("moments", [[0, 0, 0], [0, 1, 1], [1, 1, 2.005]])
+def test_a_data_sheet_of_a_point_a_rod_or_a_sheet(tmp_path: Path, moments: list[float]) -> None:
+    values = {"mass_kg": 1, "com_m": [0, 0, 0], "inertia_com_kgm2": np.diag(moments).tolist()}
+    (tmp_path / "t.json").write_text(json.dumps(values))
+    assert read_result(tmp_path / "t.json").mass == 1
+
+
 def test_nothing_is_left_where_writing_fails(estimate: Estimate, tmp_path: Path) -> None:
     with pytest.raises(BadFile) as caught:
         write_result(estimate, tmp_path / "no" / "r.json")

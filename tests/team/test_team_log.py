@@ -69,6 +69,17 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         ),
         "'right' has no recording; give one, or leave the robot out of the team.",
     ),
+    "recordings of other names": (
+        lambda: replace(
+            team(),
+            recordings=(
+                TeamRecording("motion", {"left": track()}, "a"),
+                TeamRecording("motion", {"right": track()}, "b"),
+            ),
+        ),
+        "'left' has data in no recording of another robot: it has 'a', others have 'b'. Recordings of one time must "
+        "have one name.",
+    ),
     "empty recording": (
         lambda: TeamRecording("still", {}, "run"),
         "'run' holds no robot's data; give at least one stream.",

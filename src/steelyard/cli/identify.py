@@ -60,12 +60,17 @@ METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
     metavar="M",
     help="Rough longest dimension of the object [m]; used only where the data leave the inertia open.",
 )
+@click.option(
+    "--materials",
+    metavar="LIST",
+    help='What the parts may be made of [kg/m^3]: "steel=7850, rubber=1150+-5%" (2 % where nothing is said).',
+)
 @click.option("--pendant", is_flag=True, help="Type poses and readings by hand, one pose per line.")
 @RESULT_FILE
 @RESULT_AS_JSON
 def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path | None, scan: Path | None,
-             pendant: bool, pose_in_sensor: str | None, output: Path | None, as_json: bool, **chosen: Any
-             ) -> None:  # fmt: skip
+             pendant: bool, pose_in_sensor: str | None, materials: str | None, output: Path | None, as_json: bool,
+             **chosen: Any) -> None:  # fmt: skip
     """Identify what a robot holds from LOG: a description (.toml) or a data file with the usual column names."""
     if pendant == (log is not None):
         raise BadValue("Give either a LOG or --pendant. Example: steelyard identify log.toml")
@@ -75,11 +80,13 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     from steelyard import api
     from steelyard.cli.table import estimate_table
     from steelyard.io import read_pendant, result_dict, write_result
+    from steelyard.parts.material import materials_of
     from steelyard.pipelines.options import Options
 
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
     given = {"tool": tool, "parts": parts, "scan": scan, "pose_in_sensor": pose_in_sensor, "data": data}
-    estimate = api.identify(recording, Options(**chosen), **given)  # type: ignore[arg-type]
+    options = Options(**chosen, materials=() if materials is None else materials_of(materials))
+    estimate = api.identify(recording, options, **given)  # type: ignore[arg-type]
     if output is not None:
         write_result(estimate, output)
     if as_json:

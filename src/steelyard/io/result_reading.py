@@ -18,6 +18,8 @@ from steelyard.io.json_arrays import array_of
 from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
 from steelyard.io.team_results import team_of
 
+# Share of the largest entry of an inertia by which what was typed may be off.
+ROUNDED = 0.01
 _WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
 
 
@@ -84,7 +86,19 @@ def _body(path: Path, values: dict[str, Any]) -> InertialParameters:
             return InertialParameters(_numbers(path, values, "parameters", (10,)))
         return InertialParameters.from_com(mass, com, np.zeros((3, 3)))
     inertia = _numbers(path, values, "inertia_com_kgm2", (3, 3))
-    return in_file(path, lambda: InertialParameters.from_com(mass, com, inertia))
+    body = in_file(path, lambda: InertialParameters.from_com(mass, com, inertia))
+    if "covariance" not in values:
+        _require_body(path, body)
+    return body
+
+
+def _require_body(path: Path, body: InertialParameters) -> None:
+    """Raise BadFile where what was typed is no body's; what noise leaves of a small one need not be one."""
+    # Points, lines and sheets have moments on the edge of what is possible, and data sheets round.
+    slack = ROUNDED * np.abs(body.inertia_com).max() + np.finfo(float).tiny
+    rounded = InertialParameters.from_com(body.mass, body.com, body.inertia_com + slack * np.eye(3))
+    if not rounded.validity().consistent:
+        raise BadFile(f"{path}: no body has these parameters: {body.validity()}. Correct mass_kg and inertia_com_kgm2.")
 
 
 def _numbers(path: Path, values: dict[str, Any], key: str, shape: tuple[int, ...]) -> Array:

@@ -136,6 +136,17 @@ class TeamLog:
                 raise BadValue(
                     f"'{name}' must measure how it turns; none of its recordings has a rotation or an angular velocity."
                 )
+        for name in self.names:
+            if not any(len(recording.tracks) > 1 for recording, _ in self.tracks_of(name)):
+                own, others = (self._recordings_with(name, has) for has in (True, False))
+                raise BadDescription(
+                    f"'{name}' has data in no recording of another robot: it has {own}, others have {others}. "
+                    "Recordings of one time must have one name."
+                )
+
+    def _recordings_with(self, name: str, has: bool) -> str:
+        """Return the names of the recordings in which a robot has data, or in which it has none."""
+        return ", ".join(f"'{r.name}'" for r in self.recordings if (name in r.tracks) == has) or "none"
 
     @property
     def names(self) -> tuple[str, ...]:

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from steelyard.errors import BadValue
+from steelyard.parts.material import Material
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 # How the note begins that says that the bias may drift.
@@ -21,6 +22,7 @@ class Options:
     drift        the bias may grow linearly over the log; it does so by itself where the log shows it
     gravity      "given": its direction in W is trusted, unless the log shows a clear tilt; "unknown": it is estimated
     object_size  rough longest dimension of the object [m], used only where the data leave the inertia open
+    materials    what the object's parts may be made of; none: any density. They need parts or a scan
     """
 
     method: Literal["auto", "noise-aware", "least-squares", "geodesic"] = "auto"
@@ -28,6 +30,7 @@ class Options:
     drift: bool = False
     gravity: Literal["given", "unknown"] = "given"
     object_size: float | None = None
+    materials: tuple[Material, ...] = ()
 
     def __post_init__(self) -> None:
         choices = {"method": METHODS, "bias": ("free", "none"), "drift": (False, True), "gravity": ("given", "unknown")}

@@ -192,5 +192,6 @@ def require_runs(kinds: Sequence[object]) -> None:
     """Raise CannotAnswer where no kind of recording has rows to weigh the payload by."""
     if not kinds:
         raise CannotAnswer(
-            "no recording has rows in which every robot that carries measured a wrench, for long enough to use them."
+            "no recording has rows in which every robot that carries measured a wrench, for long enough. Give "
+            "the force of every robot; if all are there, record longer or faster, or correct the unit of time."
         )

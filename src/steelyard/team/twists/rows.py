@@ -65,10 +65,21 @@ def twist_stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[TwistStret
                 _read(made, i, track.shifted(-late.get(robot.name, 0.0)), robot.gravity, robot.base == "moving")
         out.append(made)
     if not any(made.seen.any() for made in out):
-        raise CannotAnswer(
-            "robots whose bases move must measure twists: give angular_velocity and linear_velocity of every grasp."
-        )
+        raise CannotAnswer(_no_twists(log))
     return tuple(out)
+
+
+def _no_twists(log: TeamLog) -> str:
+    """Return what to give where nobody has twists, and not all have poses in a base that stands still."""
+    still = [robot.name for robot in log.robots if robot.base == "still"]
+    posed = {name for name in still for _, track in log.tracks_of(name) if track.has("rotation", "position")}
+    placeless = ", ".join(f"'{name}'" for name in still if name not in posed)
+    if placeless:
+        return (
+            f"no recording of {placeless} has both rotation and position: give them, or angular_velocity and "
+            "linear_velocity of every grasp."
+        )
+    return "robots whose bases move must measure twists: give angular_velocity and linear_velocity of every grasp."
 
 
 def _read(made: TwistStretch, i: int, track: Track, gravity: Array | None, moving: bool) -> None:
