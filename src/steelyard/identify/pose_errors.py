@@ -3,8 +3,8 @@
 In slow motion all that such an error does to mass and centre of mass goes through its part that is linear in gravity as
 S sees it (in a - g where S accelerates): 18 numbers, six channels by three axes. A body takes up four of them and
 leaves the others as residual. All of one kind, of forces or of torques, are taken to be drawn alike, so that those that
-show tell how large those are that do not; gains of the six channels, which look
-like mass in the mean, may be larger. Unlike noise, all this is no smaller in a longer log.
+show tell how large those are that do not. Gains of the three channels of a kind, which in the mean look like mass or a
+first moment, may be larger. Unlike noise, all this is no smaller in a longer log.
 Source: own; a random-effects model whose variances are found by moments.
 """
 
@@ -27,6 +27,7 @@ SPREAD = 0.5
 SEEN = 2.0
 # Gains of which less than this shows look like mass or a first moment.
 PLAIN, ROUNDS = 0.1, 20
+TINY = 1e-100
 
 
 def directions(problem: Problem) -> Array:
@@ -72,33 +73,43 @@ def pose_errors(problem: Problem, solution: Solution, D: Array, noise: Array) ->
     D      (K, Z) as from `directions`
     noise  (6, K, K) what noise makes the variance of the mean over the rows of a channel's residual times D z
     """
-    weights = solution.weights
-    if weights is None:
-        weights = weights_at(solution.linear, problem.T, problem.acceleration, problem.wrench)
-    size, shown, along = len(problem.T), 6 * len(D), problem.scatter @ D.T
-    # How each error pulls at the parameters, how each parameter looks like errors, and what the fit leaves of an error.
-    pull = np.einsum("cij,pjz,czk->pik", weights, problem.T, along, optimize=True).reshape(size, shown)
-    alike = (problem.T @ along.sum(0)).reshape(size, shown) / problem.samples
-    left = np.eye(shown) - alike.T @ _response(problem, solution, weights) @ pull
-    found = left @ (problem.residual_map(solution.linear) @ along.sum(0)).ravel() / problem.samples
-    by_noise = np.zeros((6, len(D), 6, len(D)))
-    by_noise[np.arange(6), :, np.arange(6)] = noise
-    seen = _Seen(found, left, left @ by_noise.reshape(shown, shown) @ left.T)
+    along, channels = problem.scatter @ D.T, np.repeat(problem.heard, len(D))
+    seen, pull = _seen(problem, solution, along, noise)
     # Six channels, torques and then forces.
-    kinds = np.repeat(np.eye(2), 3 * len(D), axis=0) * np.repeat(problem.heard, len(D))[:, None]
+    kinds = np.repeat(np.eye(2), 3 * len(D), axis=0) * channels[:, None]
     square, quiet, count = seen.of(kinds)
-    if not square @ (count / np.maximum(quiet, 1e-300)) > SEEN * count.sum() > 0:
+    if not square @ (count / np.maximum(quiet, TINY)) > SEEN * count.sum() > 0:
         return None
     gains = _gains(motion_map(solution.linear[:10]) @ along.sum(0)[:12] / problem.samples, problem.heard)
-    axes, plain = _axes(left, gains, kinds)
+    torques, forces = (_axes(seen.left @ gains[:, of]) for of in (slice(0, 3), slice(3, 6)))
+    axes, _ = np.linalg.qr(np.concatenate([torques[0], forces[0]], 1))
     square, quiet, count = seen.without(axes).of(kinds)
     beyond = np.maximum(square - quiet, 0.0)
     variance = kinds @ (beyond / np.maximum(count, 1.0) * _student(count))
-    # Gains of the channels may differ by more than the rest says.
-    of_gains = seen.along(axes / plain, variance)
-    score = (pull * variance) @ pull.T + of_gains * (pull @ gains) @ (pull @ gains).T
-    each = of_gains * (gains.reshape(2, 3, -1) ** 2).sum((1, 2)) / 3
+    # Gains of forces, and those of torques, may differ by more than the rest says.
+    of_gains = np.repeat([seen.along(axes / plain, variance) for axes, plain in (torques, forces)], 3)
+    score = (pull * variance) @ pull.T + ((pull @ gains) * of_gains) @ (pull @ gains).T
+    each = ((gains.reshape(2, 3 * len(D), 6) ** 2) @ of_gains).sum(1) / 3
     return PoseErrors(np.sqrt(len(D) * beyond / np.maximum(count, 1.0) + each), score)
+
+
+def _seen(problem: Problem, solution: Solution, along: Array, noise: Array) -> tuple[_Seen, Array]:
+    """Return what residuals show of the 6 K errors, and how each pulls at the parameters (p, 6 K).
+
+    along  (C, Z, K) sums over the rows of z times a - g along the axes
+    """
+    weights = solution.weights
+    if weights is None:
+        weights = weights_at(solution.linear, problem.T, problem.acceleration, problem.wrench)
+    size, shown = len(problem.T), 6 * along.shape[2]
+    pull = np.einsum("cij,pjz,czk->pik", weights, problem.T, along, optimize=True).reshape(size, shown)
+    # How each parameter looks like errors, and what the fit leaves of an error.
+    alike = (problem.T @ along.sum(0)).reshape(size, shown) / problem.samples
+    left = np.eye(shown) - alike.T @ _response(problem, solution, weights) @ pull
+    found = left @ (problem.residual_map(solution.linear) @ along.sum(0)).ravel() / problem.samples
+    by_noise = np.zeros((6, along.shape[2], 6, along.shape[2]))
+    by_noise[np.arange(6), :, np.arange(6)] = noise
+    return _Seen(found, left, left @ by_noise.reshape(shown, shown) @ left.T), pull
 
 
 def _student(count: Array) -> Array:
@@ -125,14 +136,16 @@ class _Seen:
 
     def along(self, axes: Array, variance: Array) -> float:
         """Return the variance along axes (n, r), one for all, beyond noise and errors of `variance` (n,)."""
+        if not axes.size:
+            return 0.0
         square = (axes.T @ self.found) ** 2
         quiet = np.diag(axes.T @ (self.noise + (self.left * variance) @ self.left.T) @ axes)
         found = float(np.maximum(square - quiet, 0.0).max(initial=0.0))
         # Most likely where each is weighted by how well it tells.
         for _ in range(ROUNDS):
-            told = (found + quiet) ** -2.0
+            told = np.maximum(found + quiet, TINY) ** -2.0
             found = max(float(told @ (square - quiet) / told.sum()), 0.0)
-        return found * float(_student(((found / (found + quiet)) ** 2).sum()))
+        return found * float(_student(((found / np.maximum(found + quiet, TINY)) ** 2).sum()))
 
 
 def _response(problem: Problem, solution: Solution, weights: Array) -> Array:
@@ -152,11 +165,8 @@ def _gains(felt: Array, heard: Mask) -> Array:
     return out.reshape(-1, 6)
 
 
-def _axes(left: Array, gains: Array, kinds: Array) -> tuple[Array, Array]:
-    """Return orthonormal axes (n, r) along which gains (n, 6) show, and how plainly (r,)."""
-    size = np.sqrt((kinds.T @ gains**2).sum(1))
-    scale = kinds @ (1 / np.maximum(size, 1e-300))
-    shape = left @ gains
-    _, plain, mixed = np.linalg.svd(scale[:, None] * shape, full_matrices=False)
-    U, seen, _ = np.linalg.svd(shape @ mixed[plain > PLAIN * plain.max(initial=0.0)].T, full_matrices=False)
-    return np.asarray(U), np.asarray(seen)
+def _axes(shape: Array) -> tuple[Array, Array]:
+    """Return orthonormal axes (n, r) along which gains show, that look like `shape` (n, 3), and how plainly (r,)."""
+    axes, plain, _ = np.linalg.svd(shape, full_matrices=False)
+    shown = plain > PLAIN * max(float(plain.max(initial=0.0)), TINY)
+    return np.asarray(axes[:, shown]), np.asarray(plain[shown])
