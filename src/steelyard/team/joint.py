@@ -8,11 +8,13 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import partial
 
 from steelyard import check
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
+from steelyard.team.changes.whose_slip import whose_slip
 from steelyard.team.changes.yielding import Yields, stiffened
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.search import F, searched
@@ -49,12 +51,15 @@ class JointTeam:
     wrists      mass [kg] that moves with each named robot's grasp between its force sensor and the payload: it is
                 taken out, as a point at the grasp. It moves like the payload and cannot be told from it by any motion
     highest_hz  of what motion and wrench are compared at; above, a payload carried by robots hardly moves
+    slipped     with two robots: which slips, the clearest first, are those of the robot that shows them less; None =
+                what the wrenches say
     """
 
     clocks: bool = True
     gains: bool = True
     wrists: Mapping[str, float] = field(default_factory=dict)
     highest_hz: float = 4.0
+    slipped: tuple[bool, ...] | None = None
 
     def __post_init__(self) -> None:
         check.positive("highest_hz", self.highest_hz)
@@ -63,12 +68,14 @@ class JointTeam:
         """Return the team's answer in the reference grasp. Raises CannotAnswer where the data leave it open."""
         require_wrenches(log)
         self._require_wrists(log)
+        if self.slipped is None:
+            return whose_slip(log, lambda slipped: replace(self, slipped=slipped).identify(log))
         seen = self._from_twists(log) if needs_twists(log) else self._from_poses(log)
         return seen if isinstance(seen, TeamEstimate) else weighed(seen, self.wrists, self.gains, self.highest_hz)
 
     def _from_twists(self, log: TeamLog) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
-        log, moving, begun = self._fitted(log, TwistTeam.of)
+        log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=self.slipped or ()))
         if moving.rough:
             require_one_velocity_unit(log, moving)
         apart = rigidity_findings(moving.split, log.names, UNPLACED)
@@ -111,12 +118,13 @@ class JointTeam:
 
         Raises BadValue where one robot's poses are misread.
         """
+        of = partial(PoseTeam.of, other=self.slipped or ())
         try:
-            log, team, begun = self._fitted(log, PoseTeam.of)
+            log, team, begun = self._fitted(log, of)
         except (CannotAnswer, BadValue, *check.BREAKDOWNS):
             require_well_read(log)
             raise
-        log, team, yields = stiffened(log, team, lambda stiff: PoseTeam.of(stiff, self.clocks))
+        log, team, yields = stiffened(log, team, lambda stiff: of(stiff, self.clocks))
         return log, team, begun, yields
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, ClockErrors]:

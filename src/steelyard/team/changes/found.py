@@ -62,26 +62,31 @@ class Fitted(Protocol):
 F = TypeVar("F", bound=Fitted)
 
 
-def without_changes(log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], fitted: Callable[[Edit], F]) -> F:
+def without_changes(
+    log: TeamLog, clocks: bool, raw: tuple[Stretch, ...], fitted: Callable[[Edit], F], other: Sequence[bool] = ()
+) -> F:
     """Return the fit without what robots that let go and grasps that slip say, and with findings that name them.
 
     raw     the recordings as they are, seen where the fit can use them
     fitted  makes the fit of recordings after an edit
+    other   which slips of two robots, the clearest first, are taken for those of the robot that does not show them best
     """
     resting = idle(raw)
     if not any(rows.any() for rows in resting):
-        return _without_slips(log, clocks, fitted(_unchanged), fitted, _unchanged)
+        return _without_slips(log, clocks, fitted(_unchanged), fitted, _unchanged, other)
     off = fitted(lambda parts: _unseen(parts, resting)).off(log)
 
     def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
         return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
 
     found = presence_findings(raw, edit(raw), log.names)
-    team = _without_slips(log, clocks, fitted(edit), fitted, edit)
+    team = _without_slips(log, clocks, fitted(edit), fitted, edit, other)
     return replace(team, findings=(*found, *team.findings))
 
 
-def _without_slips(log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit], F], edit: Edit) -> F:
+def _without_slips(
+    log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit], F], edit: Edit, other: Sequence[bool]
+) -> F:
     """Return the fit with grasps that slip taken out from there on, their wrenches moved to where they were.
 
     Clocks are judged before: one that is set anew passes for slips.
@@ -92,6 +97,8 @@ def _without_slips(log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit]
         found = team.slip(log)
         if found is None:
             break
+        if any(other[len(slips) : len(slips) + 1]):
+            found = replace(found, slip=replace(found.slip, robot=1 - found.slip.robot))
         # Once more without what follows the slip, which has bent the first fit.
         before, again = team, edited(edit, [*slips, found])
         try:

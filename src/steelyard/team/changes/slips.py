@@ -169,6 +169,8 @@ def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool 
     if rows < 4 * (width + gap) or count < 2:
         return None
     best: Slip | None = None
+    # One who is seen alone is where he says, exactly.
+    seen = seen & (seen.sum(1, keepdims=True) > 1)
     # Every row of every robot is a look; a chi-square of six numbers.
     threshold = float(2 * gammainccinv(3.0, CHANCE / (rows * count)))
     for i in range(count):

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -63,13 +63,13 @@ class PoseTeam:
     clocks_left: ClockErrors = NOTHING
 
     @classmethod
-    def of(cls, log: TeamLog, clocks: bool) -> PoseTeam:
+    def of(cls, log: TeamLog, clocks: bool, other: Sequence[bool] = ()) -> PoseTeam:
         """Return the joint fit; raises CannotAnswer where poses or rows in common are missing.
 
-        Robots that let go for a while and grasps that slip are found on the way.
+        Robots that let go for a while and grasps that slip are found on the way; `other` as in `without_changes`.
         """
         raw = stretches(log, {})
-        return without_changes(log, clocks, raw, lambda edit: cls._fitted(log, clocks, raw, edit))
+        return without_changes(log, clocks, raw, lambda edit: cls._fitted(log, clocks, raw, edit), other)
 
     @classmethod
     def _fitted(cls, log: TeamLog, clocks: bool, parts: tuple[Stretch, ...], edit: Edit) -> PoseTeam:

@@ -52,13 +52,13 @@ class TwistTeam:
     reference: int = 0
 
     @classmethod
-    def of(cls, log: TeamLog, clocks: bool) -> TwistTeam:
+    def of(cls, log: TeamLog, clocks: bool, other: Sequence[bool] = ()) -> TwistTeam:
         """Return the joint fit; raises CannotAnswer where twists or rows in common are missing.
 
-        Robots that let go for a while and grasps that slip are found on the way.
+        Robots that let go for a while and grasps that slip are found on the way; `other` as in `without_changes`.
         """
         raw = tuple(part.used for part in twist_stretches(log, {}))
-        return without_changes(log, clocks, raw, lambda edit: cls._fitted(log, clocks, edit))
+        return without_changes(log, clocks, raw, lambda edit: cls._fitted(log, clocks, edit), other)
 
     @classmethod
     def _fitted(cls, log: TeamLog, clocks: bool, edit: Edit) -> TwistTeam:

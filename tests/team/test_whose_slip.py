@@ -1,0 +1,47 @@
+"""Of two robots motion does not show whose grasp slipped; wrenches do, and where they do not, that is said."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import CASES, Slip, TeamScene
+from steelyard.team.joint import JointTeam
+
+
+def made(robot: int, seed: int, start: float) -> TeamTrial:
+    slip = Slip(robot, np.array([0.0, -0.012, 0.01]), start)
+    return simulate_team(
+        TeamScene(CASES["C"], 2, sensing="poses", slip=slip, six_axis=(0, 1), motion_samples=2000), seed
+    )
+
+
+@pytest.mark.parametrize("start", [-1.0, 9.0])
+@pytest.mark.parametrize("robot", [0, 1])
+def test_the_wrenches_tell_whose_grasp_slipped(robot: int, start: float) -> None:
+    for seed in range(3):
+        trial = made(robot, seed, start)
+        found = JointTeam().identify(trial.log)
+        said = [f.message for f in found.findings if f.code == "grasp-slipped"]
+        assert len(said) == 1
+        assert said[0].startswith(f"The grasp of 'robot{robot}' slipped by ")
+        off = np.append(found.mass, found.com) - np.append(trial.truth.body.mass, trial.truth.body.com)
+        assert np.abs(off / found.std[:4]).max() < 4
+
+
+def test_wrenches_that_do_not_tell_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("steelyard.team.changes.whose_slip.TOLD", np.inf)
+    found = JointTeam().identify(made(1, 0, 9.0).log)
+    (said,) = (f.message for f in found.findings if f.code == "grasp-slipped")
+    assert said.endswith("It may have been the other robot's: of two, only wrenches tell, and not here.")
+
+
+def test_a_caller_may_say_whose_it_was() -> None:
+    trial = made(1, 0, 9.0)
+    said = set()
+    for slipped in ((), (True,)):
+        found = JointTeam(slipped=slipped).identify(trial.log)
+        (message,) = (f.message for f in found.findings if f.code == "grasp-slipped")
+        said.add(message.split("'")[1])
+    assert said == {"robot0", "robot1"}
