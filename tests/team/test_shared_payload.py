@@ -61,6 +61,11 @@ def test_missing_rows_are_said_and_cost_only_their_data(method: str) -> None:
     np.testing.assert_allclose(cut.principal_moments, moments, rtol=0.03)
 
 
+@pytest.mark.parametrize(("begin", "end"), [(0, 2), (1498, 1500)])
+def test_streams_need_not_begin_and_end_together(begin: int, end: int) -> None:
+    assert "rows-missing" not in identify_team(with_gap(trial().log, begin, end)).codes()
+
+
 def without(log: TeamLog, number: int, name: str, *channels: str) -> TeamLog:
     """Return the log without one robot's channels in one recording, or without its track where none are named."""
     recordings = list(log.recordings)

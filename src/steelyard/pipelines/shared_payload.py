@@ -16,6 +16,7 @@ from typing import Literal, get_args
 
 import numpy as np
 
+from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.fit import within_numbers
@@ -34,6 +35,8 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 # Share of its rows from which on a robot is said to have lost some.
 ABSENT = 0.1
+# Streams of one robot begin and end within this time [s].
+ENDS_S = 0.25
 # joint  every grasp, home and clock at once, then one fit of the ten parameters to still and moving rows together
 # paper  grasps from twists (eq. 1-8), loops closed, mass and centre of mass at rest (9-16), inertia in motion (17-33)
 ESTIMATORS: Mapping[Method, JointTeam | PublishedTeam] = MappingProxyType(
@@ -82,7 +85,8 @@ def _missing(track: Track | None) -> Iterator[tuple[str, str]]:
     """Yield how many numbers, and what share of the rows, a track lacks, and of which channels."""
     if track is None:
         return
-    lost = {channel: int((~good).sum()) for channel, good in track.valid.items() if not good.all()}
+    lost = {channel: int((~good[_inside(track, good)]).sum()) for channel, good in track.valid.items()}
+    lost = {channel: rows for channel, rows in lost.items() if rows}
     if lost:
         yield f"numbers in {max(lost.values())} of {len(track)} rows", f" ({', '.join(lost)})"
     step = np.diff(track.time)
@@ -90,6 +94,16 @@ def _missing(track: Track | None) -> Iterator[tuple[str, str]]:
     absent = 1 - np.quantile(step, 0.6) / np.mean(step) if len(step) else 0.0
     if absent > ABSENT:
         yield f"about {100 * absent:.0f} % of the rows", ""
+
+
+def _inside(track: Track, good: Mask) -> slice:
+    """Return the rows without those at the ends in which a stream had not begun, or was over."""
+    there = np.flatnonzero(good)
+    if not len(there):
+        return slice(None)
+    first, last = (float(track.time[there[k]]) for k in (0, -1))
+    late, early = first - track.time[0] < ENDS_S, track.time[-1] - last < ENDS_S
+    return slice(int(there[0]) if late else 0, int(there[-1]) + 1 if early else len(good))
 
 
 def _missing_wrenches(log: TeamLog, method: Method) -> Iterator[Finding]:
