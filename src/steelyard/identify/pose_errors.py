@@ -24,9 +24,11 @@ from steelyard.identify.solution import Solution
 # Gravity must spread by this along an axis of S [m/s^2], some three degrees.
 SPREAD = 0.5
 # What shows must be so many times as large, in squares, as noise makes it: by chance in one log of fifty.
-SEEN = 2.0
+SEEN = 2.25
 # Gains of which less than this shows look like mass or a first moment.
 PLAIN, ROUNDS = 0.1, 20
+# A variance may be so many times what was found.
+MOST = 2.0
 TINY = 1e-100
 
 
@@ -73,48 +75,75 @@ def pose_errors(problem: Problem, solution: Solution, D: Array, noise: Array) ->
     D      (K, Z) as from `directions`
     noise  (6, K, K) what noise makes the variance of the mean over the rows of a channel's residual times D z
     """
-    along, channels = problem.scatter @ D.T, np.repeat(problem.heard, len(D))
-    seen, pull = _seen(problem, solution, along, noise)
+    fit = _Fit.of(problem, solution, D)
     # Six channels, torques and then forces.
-    kinds = np.repeat(np.eye(2), 3 * len(D), axis=0) * channels[:, None]
+    kinds = np.repeat(np.eye(2), 3 * len(D), axis=0) * np.repeat(problem.heard, len(D))[:, None]
+    seen = fit.seen(np.full((len(problem.scatter), 6), 1 / problem.samples), noise)
     square, quiet, count = seen.of(kinds)
     if not square @ (count / np.maximum(quiet, TINY)) > SEEN * count.sum() > 0:
         return None
-    gains = _gains(motion_map(solution.linear[:10]) @ along.sum(0)[:12] / problem.samples, problem.heard)
-    torques, forces = (_axes(seen.left @ gains[:, of]) for of in (slice(0, 3), slice(3, 6)))
-    axes, _ = np.linalg.qr(np.concatenate([torques[0], forces[0]], 1))
-    square, quiet, count = seen.without(axes).of(kinds)
-    beyond = np.maximum(square - quiet, 0.0)
-    variance = kinds @ (beyond / np.maximum(count, 1.0) * _student(count))
-    # Gains of forces, and those of torques, may differ by more than the rest says.
-    of_gains = np.repeat([seen.along(axes / plain, variance) for axes, plain in (torques, forces)], 3)
-    score = (pull * variance) @ pull.T + ((pull @ gains) * of_gains) @ (pull @ gains).T
-    each = ((gains.reshape(2, 3 * len(D), 6) ** 2) @ of_gains).sum(1) / 3
-    return PoseErrors(np.sqrt(len(D) * beyond / np.maximum(count, 1.0) + each), score)
-
-
-def _seen(problem: Problem, solution: Solution, along: Array, noise: Array) -> tuple[_Seen, Array]:
-    """Return what residuals show of the 6 K errors, and how each pulls at the parameters (p, 6 K).
-
-    along  (C, Z, K) sums over the rows of z times a - g along the axes
-    """
-    weights = solution.weights
-    if weights is None:
-        weights = weights_at(solution.linear, problem.T, problem.acceleration, problem.wrench)
-    size, shown = len(problem.T), 6 * along.shape[2]
-    pull = np.einsum("cij,pjz,czk->pik", weights, problem.T, along, optimize=True).reshape(size, shown)
-    # How each parameter looks like errors, and what the fit leaves of an error.
-    alike = (problem.T @ along.sum(0)).reshape(size, shown) / problem.samples
-    left = np.eye(shown) - alike.T @ _response(problem, solution, weights) @ pull
-    found = left @ (problem.residual_map(solution.linear) @ along.sum(0)).ravel() / problem.samples
-    by_noise = np.zeros((6, along.shape[2], 6, along.shape[2]))
-    by_noise[np.arange(6), :, np.arange(6)] = noise
-    return _Seen(found, left, left @ by_noise.reshape(shown, shown) @ left.T), pull
+    gains = _gains(motion_map(solution.linear[:10]) @ fit.along.sum(0)[:12] / problem.samples, problem.heard)
+    # Rows at rest may have much less noise than others, and count as much more in the fit: what they show of an error,
+    # noise and all, is about the most that it can be.
+    most = fit.seen(fit.share, np.zeros_like(noise)).at_most(kinds, gains)
+    variance, of_gains = (np.minimum(*both) for both in zip(seen.variances(kinds, gains), most, strict=True))
+    pulled = fit.pull @ gains
+    size = kinds.T @ (variance + gains**2 @ of_gains) / 3
+    return PoseErrors(np.sqrt(size), (fit.pull * variance) @ fit.pull.T + (pulled * of_gains) @ pulled.T)
 
 
 def _student(count: Array) -> Array:
     """Return by how much a variance that `count` numbers told is larger for those who do not know it (Student's t)."""
     return count / np.maximum(count - 2, 0.5)
+
+
+@dataclass(frozen=True, eq=False)
+class _Fit:
+    """The fit, and the 6 K errors along the axes of D.
+
+    residual  (6, Z) the residual map
+    along     (C, Z, K) sums over the rows of z times a - g along the axes, by class
+    pull      (p, 6 K) of each error at the parameters
+    response  (p, p) by which these follow
+    share     (C, 6) how much a row counts for a channel in the fit, one in all
+    """
+
+    T: Array
+    residual: Array
+    D: Array
+    along: Array
+    pull: Array
+    response: Array
+    share: Array
+
+    @classmethod
+    def of(cls, problem: Problem, solution: Solution, D: Array) -> _Fit:
+        """Return what a solution makes of errors along the axes of D (K, Z)."""
+        weights = solution.weights
+        if weights is None:
+            weights = weights_at(solution.linear, problem.T, problem.acceleration, problem.wrench)
+        along = problem.scatter @ D.T
+        pull = np.einsum("cij,pjz,czk->pik", weights, problem.T, along, optimize=True).reshape(len(problem.T), -1)
+        share = weights.diagonal(axis1=1, axis2=2) * problem.heard
+        share = share / np.maximum(problem.scatter[:, 18, 18] @ share, TINY)
+        response = _response(problem, solution, weights)
+        return cls(problem.T, problem.residual_map(solution.linear), D, along, pull, response, share)
+
+    def seen(self, share: Array, noise: Array) -> _Seen:
+        """Return what residuals show of the errors, averaged over rows that count by `share` (C, 6).
+
+        noise  (6, K, K) its variance of the mean, over rows that count alike, of every channel's residual times D z
+        """
+        axes, shown = np.arange(6), self.pull.shape[1]
+        sums = np.einsum("ci,czk->izk", share, self.along)
+        # Errors like themselves, how each parameter looks like them, and what the fit leaves of them.
+        itself, by_noise = np.zeros((2, 6, len(self.D), 6, len(self.D)))
+        itself[axes, :, axes], by_noise[axes, :, axes] = np.swapaxes(self.D @ sums, 1, 2), noise
+        alike = np.einsum("piz,izk->pik", self.T, sums).reshape(len(self.T), shown)
+        whole = np.linalg.pinv(itself.reshape(shown, shown), rcond=1e-6, hermitian=False)
+        left = np.eye(shown) - whole @ alike.T @ self.response @ self.pull
+        found = whole @ np.einsum("iz,izk->ik", self.residual, sums).reshape(shown)
+        return _Seen(left @ found, left, left @ by_noise.reshape(shown, shown) @ left.T)
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +162,23 @@ class _Seen:
         """Return what is seen across some orthonormal axes (n, r)."""
         rest = np.eye(len(self.found)) - axes @ axes.T
         return _Seen(rest @ self.found, rest @ self.left, rest @ self.noise @ rest)
+
+    def variances(self, kinds: Array, gains: Array) -> tuple[Array, Array]:
+        """Return the variances of every error (n,), and of gains (6,) beside them, as far as they are beyond noise."""
+        torques, forces = (_axes(self.left, gains[:, of]) for of in (slice(0, 3), slice(3, 6)))
+        axes, _ = np.linalg.qr(np.concatenate([torques[0], forces[0]], 1))
+        square, quiet, count = self.without(axes).of(kinds)
+        # Few numbers told a variance, which is uncertain itself: that of Student's t.
+        variance = kinds @ (np.maximum(square - quiet, 0.0) / np.maximum(count, 1.0) * _student(count))
+        # Gains of forces, and those of torques, may differ by more than the rest says.
+        return variance, np.repeat([self.along(axes / plain, variance) for axes, plain in (torques, forces)], 3)
+
+    def at_most(self, kinds: Array, gains: Array) -> tuple[Array, Array]:
+        """Return the same, as if nothing of what is found were noise."""
+        axes = [_axes(self.left, gains[:, of]) for of in (slice(0, 3), slice(3, 6))]
+        square, _, count = self.of(kinds)
+        each = [((a.T @ self.found) ** 2).sum() / max(float(plain @ plain), TINY) for a, plain in axes]
+        return kinds @ (MOST * square / np.maximum(count, 1.0)), np.repeat(MOST * np.array(each), 3)
 
     def along(self, axes: Array, variance: Array) -> float:
         """Return the variance along axes (n, r), one for all, beyond noise and errors of `variance` (n,)."""
@@ -165,8 +211,8 @@ def _gains(felt: Array, heard: Mask) -> Array:
     return out.reshape(-1, 6)
 
 
-def _axes(shape: Array) -> tuple[Array, Array]:
-    """Return orthonormal axes (n, r) along which gains show, that look like `shape` (n, 3), and how plainly (r,)."""
-    axes, plain, _ = np.linalg.svd(shape, full_matrices=False)
-    shown = plain > PLAIN * max(float(plain.max(initial=0.0)), TINY)
+def _axes(left: Array, gains: Array) -> tuple[Array, Array]:
+    """Return orthonormal axes (n, r) along which a good part of gains (n, 3) is left, and how plainly (r,)."""
+    axes, plain, _ = np.linalg.svd(left @ gains, full_matrices=False)
+    shown = plain > PLAIN * max(float(np.linalg.norm(gains, 2)), TINY)
     return np.asarray(axes[:, shown]), np.asarray(plain[shown])
