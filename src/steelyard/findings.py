@@ -96,10 +96,10 @@ UNEXPLAINED: dict[str, str] = {
     "inertia-not-identified": "See to the findings above first, then identify again.",
     "stream-delayed": "See to the findings above first: until then, this delay is a guess.",
 }
-# And where a bare data file was read: no description is there to be corrected.
+# And where a bare data file was read, or rows were typed: no description is there to be corrected.
 BARE: dict[str, str] = {
     "wrench-sign-flipped": "Nothing to do if z of the world points up: the answer has the sign found. To say the sign, "
-    'write a description (.toml) of the file with wrench = "on-sensor" in [log], and gravity.',
+    'write a description (.toml) of a file with these rows: wrench = "on-sensor" or "on-object" in [log], and gravity.',
 }
 
 

@@ -39,7 +39,7 @@ def read_pendant(lines: Iterable[str]) -> Recording:
         "torque": check.frozen(table[:, 6:]),
     }
     stream = Stream("pendant", channels, poses=True)
-    return Recording((stream,), default_gravity(), -1, name="pendant")
+    return Recording((stream,), default_gravity(), -1, name="pendant", described=False)
 
 
 def _words(line: str) -> list[str]:

@@ -38,16 +38,15 @@ def _of_matrix(matrix: Array) -> Rotation:
     error = np.abs(_excess(matrix)).max((-1, -2))
     if error.size and float(error.max()) > ROUNDING:
         raise BadValue(
-            f"the rotation is not orthonormal: {_count(error > ROUNDING)}, the worst is row "
-            f"{int(error.argmax()) + 1}, where R^T R is off by {float(error.max()):.3g} "
-            f"(allowed {ROUNDING:g}). "
-            "Check the order and the number of digits of the nine columns."
+            f"the rotation is not orthonormal: {_worst(error, ROUNDING, ', the worst is row {}, where ')}R^T R is "
+            f"off by {float(error.max()):.3g} (allowed {ROUNDING:g}). "
+            f"Check the order and the number of digits of the nine {_cells(error)}."
         )
     mirrored = np.linalg.det(matrix) < 0
     if mirrored.any():
         raise BadValue(
-            f"the rotation is a mirror image (determinant -1): {_count(mirrored)}, first row "
-            f"{int(mirrored.argmax()) + 1}. Check the order and the signs of the nine columns."
+            f"the rotation is a mirror image (determinant -1){_first(mirrored)}. "
+            f"Check the order and the signs of the nine {_cells(mirrored)}."
         )
     for _ in range(3):  # Newton-Schulz: squares the error and keeps the polar factor, much faster than an SVD
         matrix = matrix - 0.5 * matrix @ _excess(matrix)
@@ -63,16 +62,15 @@ def _check_norm(quaternion: Array) -> None:
     norm = np.linalg.norm(quaternion, axis=-1)
     zero = norm < _ZERO
     if zero.any():
-        raise BadValue(
-            f"the quaternion has norm zero: {_count(zero)}, first row {int(zero.argmax()) + 1}. "
-            "Delete the rows where the pose was not known."
-        )
+        remedy = "Delete the rows where the pose was not known." if zero.ndim else "No rotation has four zeros."
+        raise BadValue(f"the quaternion has norm zero{_first(zero)}. {remedy}")
     error = np.abs(norm - 1)
     if error.size and float(error.max()) > NORM:
-        worst = int(error.argmax())
+        length = float(norm.flat[int(error.argmax())])
         raise BadValue(
-            f"the quaternion must have norm 1: {_count(error > NORM)} are off, the worst is row {worst + 1} "
-            f"with norm {float(norm.flat[worst]):.4g}. Check the four columns."
+            f"the quaternion must have norm 1: {_worst(error, NORM, ' are off, the worst is row {} with ')}norm "
+            f"{length:.4g}. "
+            f"Check the four {_cells(norm)}."
         )
 
 
@@ -85,6 +83,21 @@ def _check_angles(angles: Array, form: str) -> None:
             f"{what} reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "
             'degrees. Set unit = "deg".'
         )
+
+
+def _worst(error: Array, allowed: float, words: str) -> str:
+    """Say how many rows are off, and in `words` which is the worst; "" where there is one rotation."""
+    return f"{_count(error > allowed)}{words.format(int(error.argmax()) + 1)}" if error.ndim else ""
+
+
+def _first(bad: np.ndarray[Any, np.dtype[np.bool_]]) -> str:
+    """Say how many rows are bad and which is the first; "" where there is one rotation."""
+    return f": {_count(bad)}, first row {int(bad.argmax()) + 1}" if bad.ndim else ""
+
+
+def _cells(of: np.ndarray[Any, Any]) -> str:
+    """Say what a rotation is written in: columns of a file, or the numbers of a description."""
+    return "columns" if of.ndim else "numbers"
 
 
 def _count(bad: np.ndarray[Any, np.dtype[np.bool_]]) -> str:

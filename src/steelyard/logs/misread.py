@@ -10,9 +10,14 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.findings import Finding
 from steelyard.spatial import Rotation
+
+# Rotation vectors are no longer than the first [rad], but for rounding; one that is costs as much as so many leaps.
+LONGEST, TOO_LONG = np.pi + 0.01, 3.0
+# A leap between rows is so many times the step [rad] that few exceed, and so much beyond.
+LEAP, LEAST_LEAP = 5.0, np.radians(1.0)
 
 
 @dataclass(frozen=True)
@@ -57,13 +62,43 @@ def _vector_in_degrees(rotation: Array) -> Array | None:
 def _vector(rotation: Array) -> Array:
     """Undo a rotation vector read as roll, pitch, yaw.
 
-    Two triples of angles give every matrix; a vector is written no longer than half a turn, so the shorter was.
+    Two triples of angles give every matrix. A vector is written no longer than half a turn; where both are, the rows
+    before and after tell: what is no vector's leaps where an angle goes round. The shorter is taken where both do well.
     """
     near = _angles(rotation)
     far = near - np.copysign(np.pi, near)
     far[:, 1] = np.copysign(np.pi, near[:, 1]) - near[:, 1]
-    shorter = np.linalg.norm(near, axis=1) <= np.linalg.norm(far, axis=1)
-    return Rotation.exp(np.where(shorter[:, None], near, far)).matrix
+    vectors = np.stack([near, far], 1)
+    meant = Rotation.exp(vectors).matrix
+    return np.asarray(meant[np.arange(len(meant)), _smoothest(meant, _cost(np.linalg.norm(vectors, axis=2)))])
+
+
+def _cost(length: Array) -> Array:
+    """Return what rotation vectors of such lengths (N, 2) [rad] cost, in leaps: those of all rows are below one."""
+    return np.asarray(TOO_LONG * (length > LONGEST) + 0.1 * length / (np.pi * max(len(length), 1)))
+
+
+def _smoothest(rotation: Array, cost: Array) -> Integers:
+    """Return which of two rotations to take of each row (N, 2, 3, 3), so that few leap: the cheapest path (N,).
+
+    cost  (N, 2) of taking one, where a leap costs one
+    """
+    rows = len(rotation)
+    traces = np.einsum("naij,nbij->nab", rotation[:-1], rotation[1:])
+    steps = np.arccos(np.clip((traces - 1) / 2, -1.0, 1.0))
+    least = steps.reshape(-1, 4).min(1)
+    leaps = steps > LEAP * np.quantile(least, 0.9) + LEAST_LEAP if rows > 1 else steps > np.inf
+    came = np.zeros((rows, 2), np.int64)
+    total = [float(v) for v in cost[0]] if rows else [0.0, 0.0]
+    for k, (leap, own) in enumerate(zip(leaps.tolist(), cost[1:].tolist(), strict=True), 1):
+        via = [[total[a] + leap[a][b] for a in (0, 1)] for b in (0, 1)]
+        came[k] = [int(v[1] < v[0]) for v in via]
+        total = [min(v) + c for v, c in zip(via, own, strict=True)]
+    path = np.zeros(rows, np.int64)
+    path[-1:] = int(total[1] < total[0])
+    for k in range(rows - 1, 0, -1):
+        path[k - 1] = came[k, path[k]]
+    return path
 
 
 def _angles(rotation: Array) -> Array:

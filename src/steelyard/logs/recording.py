@@ -90,7 +90,7 @@ class Recording:
     dead          channels of the wrench [tau, f] in S that do not measure: nothing may be concluded from them
     findings      what reading it already showed: rows that missed a number and were left out
     notes         what reading it had to assume, in words
-    described     whether a description says sign, gravity and units; a bare data file has none to correct
+    described     whether a description says sign, gravity and units; bare data files and typed rows have none
     """
 
     streams: tuple[Stream, ...]

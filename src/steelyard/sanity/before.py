@@ -8,8 +8,8 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
 from steelyard.sanity.clock_unit import examine_clock
-from steelyard.sanity.conventions import examine_conventions
-from steelyard.sanity.leaps import examine_leaps, examine_sparse
+from steelyard.sanity.conventions import examine_conventions, examine_turns
+from steelyard.sanity.leaps import examine_sparse
 from steelyard.sanity.memory import examine_memory
 from steelyard.sanity.rows import dead_channels, examine_rows
 from steelyard.sanity.silent import without_silent
@@ -32,8 +32,9 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     recording, rows = examine_rows(recording)
     recording = replace(recording, dead=dead_channels(recording))
     recording, units = examine_units(recording)
-    recording = examine_memory(examine_leaps(recording))
-    recording, conventions = examine_conventions(recording)
+    recording, turns = examine_turns(recording)
+    recording, conventions = examine_conventions(examine_memory(recording))
+    conventions = (*turns, *conventions)
     # Misread rotations leave a channel unexplained, too.
     recording, silent = (recording, ()) if conventions else without_silent(recording)
     return recording, (*read, *clock, *rows, *units, *conventions, *silent)

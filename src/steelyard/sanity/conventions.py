@@ -17,6 +17,7 @@ from steelyard.logs.recording import Recording
 from steelyard.sanity.blind_tilt import blind_tilt
 from steelyard.sanity.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.glance import Glance, glance
+from steelyard.sanity.leaps import examine_leaps
 from steelyard.sanity.level import examine_level
 from steelyard.sanity.readings import Reading, as_read, best_rival, reading_of, rival_finding, sign_of
 from steelyard.sanity.static_fit import StaticFit
@@ -67,6 +68,22 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     if not found:
         require_weight(view, recording.gravity, reading.rotation, reading.fit)
     return recording, tuple(found)
+
+
+def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with pauses where its poses leap, unless they only leap as they were misread.
+
+    Then it comes back with its rotations as they were meant, and a finding.
+    """
+    paused = examine_leaps(recording)
+    view = None if paused is recording else glance(paused)
+    if view is None:
+        return paused, ()
+    given = reading_of(view, "", recording.gravity, view.rotation)
+    best = best_rival(paused, view, given)
+    if best is None or best.misread is None:
+        return paused, ()
+    return examine_leaps(as_read(recording, best)), (rival_finding(best, given),)
 
 
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:

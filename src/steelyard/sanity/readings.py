@@ -67,7 +67,7 @@ def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | 
     bar = MUCH_BETTER * given.fit.force_share
     able = [
         r
-        for r in (*_rivals(view, given.gravity), *_in_other_axes(recording, given))
+        for r in (*_rivals(recording, view, given.gravity), *_in_other_axes(recording, given))
         if r.fit.force_share < min(bar, 0.5)
         and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
         and r.fit.sign != 0
@@ -80,15 +80,18 @@ def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | 
     return best if best is not None and not _outdone(best, view, given.gravity) else None
 
 
-def _rivals(view: Glance, gravity: Array) -> Iterator[Reading]:
-    """Yield the ways in which rotation or gravity are commonly misread."""
+def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Reading]:
+    """Yield the ways in which rotation or gravity are commonly misread.
+
+    Rotations are put right row by row before they are averaged: misread ones may leap.
+    """
     R = view.rotation
     if R is None:
         return
     for misread in MISREAD:
-        meant = misread.right(R)
-        if meant is not None:
-            yield reading_of(view, misread.words, gravity, meant, misread)
+        meant = glance(put) if (put := _put_right(recording, misread)) is not None else None
+        if meant is not None and meant.rotation is not None:
+            yield reading_of(view, misread.words, gravity, meant.rotation, misread)
     size = float(np.linalg.norm(gravity))
     for axis in range(3):
         if abs(gravity[axis]) < 0.8 * size:
@@ -156,9 +159,14 @@ def as_read(recording: Recording, best: Reading) -> Recording:
         return in_other_axes(recording)
     if best.misread is None:
         return replace(recording, gravity=best.gravity)
-    streams = []
+    return _put_right(recording, best.misread) or recording
+
+
+def _put_right(recording: Recording, misread: Misread) -> Recording | None:
+    """Return the recording with the mistake undone in all rotations; None where it cannot be in any."""
+    streams, able = [], False
     for stream in recording.streams:
-        if (read := stream.channels.get("rotation")) is not None and (meant := best.misread.right(read)) is not None:
-            stream = replace(stream, channels={**stream.channels, "rotation": meant})
+        if (read := stream.channels.get("rotation")) is not None and (meant := misread.right(read)) is not None:
+            stream, able = replace(stream, channels={**stream.channels, "rotation": meant}), True
         streams.append(stream)
-    return replace(recording, streams=tuple(streams))
+    return replace(recording, streams=tuple(streams)) if able else None
