@@ -38,6 +38,20 @@ def test_materials_need_a_shape(hammer: Path) -> None:
     assert "give parts or a scan with them" in str(done.exception)
 
 
+def test_a_log_of_the_tool_has_no_materials(hammer: Path) -> None:
+    asked = [
+        "identify",
+        str(hammer / "log.toml"),
+        "--parts",
+        str(hammer / "mesh.ply"),
+        "--tool",
+        str(hammer / "log.toml"),
+    ]
+    done = CliRunner().invoke(cli, [*asked, "--materials", "steel=7850"])
+    # The tool is the same as the load, of which nothing is left; but it was weighed.
+    assert not isinstance(done.exception, BadValue), done.exception
+
+
 def test_a_list_is_read() -> None:
     assert materials_of("steel=7850, cast iron=7.2e3 +- 3%,oak=700±8%") == (
         Material("steel", 7850.0), Material("cast iron", 7200.0, 0.03), Material("oak", 700.0, 0.08),

@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, Slip, TeamScene
+from steelyard.team.changes.whose_slip import DOUBT, whose_slip
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
 
@@ -34,7 +38,22 @@ def test_wrenches_that_do_not_tell_are_said(monkeypatch: pytest.MonkeyPatch) -> 
     monkeypatch.setattr("steelyard.team.changes.whose_slip.TOLD", np.inf)
     found = JointTeam().identify(made(1, 0, 9.0).log)
     (said,) = (f.message for f in found.findings if f.code == "grasp-slipped")
-    assert said.endswith("It may have been the other robot's: of two, only wrenches tell, and not here.")
+    assert said.endswith(DOUBT)
+
+
+def test_doubt_about_one_slip_outlives_the_next() -> None:
+    whole = JointTeam().identify(made(1, 0, 9.0).log)
+    (slip,) = (f for f in whole.findings if f.code == "grasp-slipped")
+
+    def answer(other: tuple[bool, ...]) -> TeamEstimate:
+        """Return an answer with two slips: the first might be either's, the second is the other robot's."""
+        torque = 0.1 if other[1:2] == (True,) else 1.0
+        evidence = replace(whole.evidence, residual_force_N=1.0, residual_torque_Nm=torque)
+        return replace(whole, findings=(slip, slip), evidence=evidence)
+
+    first, second = whose_slip(made(1, 0, 9.0).log, answer).findings
+    assert first.message.endswith(DOUBT)
+    assert second.message == slip.message
 
 
 def test_a_caller_may_say_whose_it_was() -> None:

@@ -40,10 +40,9 @@ RANK_INFORMATION = 4.0
 OPEN, UNSEEN = 0.1, 1e-12
 
 
-def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
+def _sandwich(H: Array, V: Array, solution: Solution) -> Array:
     """Return the covariance (p, p) of the linear parameters, the prior counted as data of its own strength."""
-    J = np.eye(len(H))
-    J[:10, :10] = jacobian
+    J, prior = solution.chain(len(H)), solution.prior
     A, score = J.T @ H @ J, J.T @ V @ J
     A[:10, :10] += prior
     score[:10, :10] += prior
@@ -53,8 +52,7 @@ def _sandwich(H: Array, V: Array, jacobian: Array, prior: Array) -> Array:
 
 def _taken(H: Array, problem: Problem, solution: Solution) -> float:
     """Return how many degrees of freedom the fit took of the residuals, of the information H (p, p)."""
-    J = np.eye(len(H))
-    J[:10, :10] = solution.jacobian
+    J = solution.chain(len(H))
     prior = problem.plus_bias_prior(np.zeros_like(H))
     prior[:10, :10] += solution.prior
     return fitted(J.T @ H @ J, prior)
@@ -88,7 +86,7 @@ def conclude(
         meat = max(chi2, 1.0) * problem.fixed_weight_score(solution.linear, solution.weights)
     meat = meat if score.by_noise is None else score.by_noise
     bread, meat = problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
-    covariance = _sandwich(bread, meat + score.by_pose, solution.jacobian, solution.prior)
+    covariance = _sandwich(bread, meat + score.by_pose, solution)
     body = InertialParameters(solution.linear[:10])
     # Whether the data fix a number is judged by noise alone: more poses cure no error that comes back with them.
     seen = meat if solution.weights is None else problem.plus_bias_prior(white)

@@ -140,7 +140,7 @@ class _Fit:
         itself, by_noise = np.zeros((2, 6, len(self.D), 6, len(self.D)))
         itself[axes, :, axes], by_noise[axes, :, axes] = np.swapaxes(self.D @ sums, 1, 2), noise
         alike = np.einsum("piz,izk->pik", self.T, sums).reshape(len(self.T), shown)
-        whole = np.linalg.pinv(itself.reshape(shown, shown), rcond=1e-6, hermitian=False)
+        whole = np.linalg.pinv(itself.reshape(shown, shown), rcond=1e-6)
         left = np.eye(shown) - whole @ alike.T @ self.response @ self.pull
         found = whole @ np.einsum("iz,izk->ik", self.residual, sums).reshape(shown)
         return _Seen(left @ found, left, left @ by_noise.reshape(shown, shown) @ left.T)
@@ -196,8 +196,7 @@ class _Seen:
 
 def _response(problem: Problem, solution: Solution, weights: Array) -> Array:
     """Return how the parameters follow the score, (p, p)."""
-    J = np.eye(len(problem.T))
-    J[:10, :10] = solution.jacobian
+    J = solution.chain(len(problem.T))
     H = problem.plus_bias_prior(normal_equations(problem.T, problem.scatter, weights)[0])
     A = J.T @ H @ J
     A[:10, :10] += solution.prior

@@ -29,6 +29,12 @@ class Solution:
         """Return a solution whose coordinates are the parameters themselves, without a prior."""
         return cls(linear, np.eye(10), np.zeros((10, 10)), weights)
 
+    def chain(self, size: int) -> Array:
+        """Return J (size, size), the derivative of the linear parameters by the coordinates; a bias is its own."""
+        J = np.eye(size)
+        J[:10, :10] = self.jacobian
+        return J
+
     @property
     def bias(self) -> Array:
         """The wrench bias (6,) [tau, f]; zero where it was not estimated."""

@@ -38,8 +38,6 @@ def estimator_for(
         given = f"was scanned, in {len(cuts)} cuts" if len(cuts) > 1 else f"is given in {_counted(len(cuts[0]))}"
         why = f"method: auto chose part-masses, because the shape {given}"
         return PartCuts(cuts, weights, bias, options.materials, shape_error=error, tool=tool), (why,)
-    if options.materials:
-        raise BadValue("materials are of the parts of a shape: give parts or a scan with them, or leave them out.")
     if options.method == "least-squares":
         return LeastSquares(bias=bias), ()
     if options.method == "geodesic":

@@ -22,7 +22,7 @@ class Options:
     drift        the bias may grow linearly over the log; it does so by itself where the log shows it
     gravity      "given": its direction in W is trusted, unless the log shows a clear tilt; "unknown": it is estimated
     object_size  rough longest dimension of the object [m], used only where the data leave the inertia open
-    materials    what the object's parts may be made of; none: any density. They need parts or a scan
+    materials    what the object's parts may be made of; none: any density. A body without parts has none
     """
 
     method: Literal["auto", "noise-aware", "least-squares", "geodesic"] = "auto"

@@ -6,7 +6,7 @@ explanations put the centre of mass apart by the slip.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -18,6 +18,7 @@ from steelyard.team.estimate import TeamEstimate
 
 # Residuals of forces times those of torques, beside the other explanation's, from which on the wrenches tell.
 TOLD = 1.25
+DOUBT = "It may have been the other robot's: of two, only wrenches tell, and not here."
 Other = tuple[bool, ...]
 
 
@@ -30,6 +31,7 @@ def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEst
     if len(log.names) != 2:
         return found
     chosen: Other = ()
+    doubtful = []
     for number in range(_slips(found)):
         try:
             turned = answer((*chosen, True))
@@ -40,8 +42,8 @@ def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEst
         chosen = (*chosen, better > 1)
         found = turned if better > 1 else found
         if 1 / TOLD < better < TOLD:
-            found = _doubted(found, number)
-    return found
+            doubtful.append(number)
+    return _doubted(found, doubtful)
 
 
 def _slips(found: TeamEstimate) -> int:
@@ -52,13 +54,13 @@ def _misfit(found: TeamEstimate) -> float:
     return found.evidence.residual_force_N * found.evidence.residual_torque_Nm
 
 
-def _doubted(found: TeamEstimate, number: int) -> TeamEstimate:
-    """Return the answer with a word at one of its slips that it may be the other robot's."""
-    places = [place for place, finding in enumerate(found.findings) if finding.code == "grasp-slipped"]
-    findings = list(found.findings)
-    for place in places[number : number + 1]:
-        message = (
-            f"{findings[place].message} It may have been the other robot's: of two, only wrenches tell, and not here."
-        )
-        findings[place] = replace(findings[place], message=message)
+def _doubted(found: TeamEstimate, doubtful: Sequence[int]) -> TeamEstimate:
+    """Return the answer with a word at some of its slips, by number, that they may be the other robot's."""
+    findings, number = [], 0
+    for finding in found.findings:
+        if finding.code == "grasp-slipped":
+            if number in doubtful:
+                finding = replace(finding, message=f"{finding.message} {DOUBT}")
+            number += 1
+        findings.append(finding)
     return replace(found, findings=tuple(findings))
