@@ -6,9 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 
+from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate.handling import RATE_HZ, motion_arrays
 from steelyard.simulate.noise import Spectrum, unit_noise
+from steelyard.spatial import Rotation
 from steelyard.workshop.catalogue import build
 
 BODY = build("hammer").truth_in_sensor
@@ -42,3 +44,28 @@ def rows(recording: Recording, which: np.ndarray, restamped: bool = False) -> Re
     time = np.arange(len(time)) / RATE_HZ if restamped else time
     cut = Stream(stream.name, {q: v[which] for q, v in stream.channels.items()}, time)
     return Recording((cut,), recording.gravity, noise=recording.noise)
+
+
+def swaying(seed: int, amplitude: float = 1.0, noise: float = 1.0) -> Recording:
+    """Return 40 s of the hammer in slow motion without a stop: turns of about `amplitude` [rad] in 10 to 30 s."""
+    rng = np.random.default_rng(seed)
+    time = np.arange(0, 40, 1 / 125)
+
+    def waves(size: float) -> np.ndarray:
+        rates, phases = rng.uniform(0.03, 0.12, (3, 3)), rng.uniform(0, 2 * np.pi, (3, 3))
+        return np.asarray(size / 2 * np.sin(2 * np.pi * rates * time[:, None, None] + phases).sum(2))
+
+    R, position = Rotation.exp(waves(amplitude)).matrix, waves(0.2)
+
+    def change(values: np.ndarray) -> np.ndarray:
+        return np.asarray(np.gradient(values, time, axis=0, edge_order=2))
+
+    turning = np.swapaxes(R, 1, 2) @ change(R)
+    omega = 0.5 * np.stack([turning[:, i, j] - turning[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1)
+    gravity = np.array([0, 0, -9.81])
+    down, moved = np.einsum("nji,j->ni", R, gravity), np.einsum("nji,nj->ni", R, change(change(position)))
+    wrench = MotionLog(np.zeros((len(time), 6)), down, moved, omega, change(omega)).predicted(BODY.vector)
+    wrench = wrench + noise * rng.normal(size=wrench.shape) * np.repeat([TORQUE, FORCE], 3) + 0.1
+    position = position + 2e-5 * rng.normal(size=position.shape)
+    channels = {"rotation": R, "position": position, "force": wrench[:, 3:], "torque": wrench[:, :3]}
+    return Recording((Stream("log", channels, time),), gravity)

@@ -9,7 +9,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from sanity.held_poses import BODY, of_the_tip, recorded
+from sanity.held_poses import BODY, of_the_tip, recorded, swaying
 from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.alignment import align
@@ -184,3 +184,33 @@ def test_a_tip_at_the_end_of_a_rod_or_at_its_middle_is_no_sign_and_no_unit(times
     assert "times too small beside" not in told
     if times > 1:
         assert "the positions were those of a point" in told
+
+
+def bars(found: Estimate) -> float:
+    """Return how many standard deviations mass and centre of mass are off at most."""
+    return float(np.abs(np.append(found.mass - BODY.mass, found.com - BODY.com) / found.std[:4]).max())
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_in_slow_motion_noise_does_not_hide_the_tip_of_a_tool(seed: int) -> None:
+    """There white noise is nearly all of the residual; what lasts a second tells."""
+    found = identify(of_the_tip(swaying(seed, 0.8), (0.0, 0.0, 0.05)))
+    assert "motion-mismatch" in found.codes()
+    assert bars(found) < 3
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_slow_motion_of_the_sensor_is_left_alone(seed: int) -> None:
+    recording = swaying(seed, 0.8)
+    made = rows.rows_to_fit(recording, (), Options())
+    assert made.place is None
+    assert made.maybe is None
+
+
+@pytest.mark.parametrize("seed", [0, 3])
+def test_a_point_that_may_be_one_is_in_the_bars(seed: int) -> None:
+    recording = of_the_tip(swaying(seed, 0.4, 2.0), (0.0, 0.0, 0.1))
+    found = identify(recording)
+    assert "motion-mismatch" not in found.codes()
+    assert any("moves as if the positions were those of a point" in note for note in found.notes)
+    assert bars(found) < 3

@@ -45,6 +45,7 @@ class FitRows:
     unmeasured  note on rows that were left out since their acceleration is not known
     touched     findings about time in which a hand or another load spoiled the wrench
     place       the point whose positions the recording has, where it is not the origin of S
+    maybe       the same where that is not beyond doubt: the rows are those of the origin
     units       findings that forces and torques do not belong together, where such a point would be no point
     """
 
@@ -54,6 +55,7 @@ class FitRows:
     unmeasured: tuple[str, ...]
     touched: tuple[Finding, ...]
     place: Misplaced | None = None
+    maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
 
     @property
@@ -78,9 +80,12 @@ def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Opti
         return replace(rows, units=units)
     if place is not None:
         place = replace(place, measured=rows.aligned.acceleration_from == MEASURED)
+    if place is not None and not place.seen:
+        rows = replace(rows, maybe=place)
+    elif place is not None:
         rows, how = _placed(place, recording, before, options)
     if rows.delayed and (turn := turn_of(rows.log, recording, before, options.drift)) is not None:
-        rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place)
+        rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place, maybe=rows.maybe)
     return rows
 
 

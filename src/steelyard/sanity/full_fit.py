@@ -21,6 +21,7 @@ from steelyard.spatial import cross_matrix
 _MOST_ROWS = 3000
 _BLOCKS = 12
 _SMALLEST = 1e-9
+_MEAN_S = 1.0  # of what is slow in a residual
 RANK = 1e-9  # of the largest eigenvalue: what is below is not told
 
 
@@ -82,6 +83,20 @@ class Rows:
             parts = np.stack([_solution(total - s, size) for s in scatter])
             spread = np.sqrt((blocks - 1) / blocks * ((parts - solution) ** 2).sum(0))
         return FullFit(solution, spread, max(left, 0.0))
+
+    def slowly(self, fit: FullFit, extra: Array | None = None) -> float:
+        """Return the weighted sum of squares of what a fit with extra columns (N, 6, k) leaves in means over a second.
+
+        White noise hardly lasts that long. Rows of a table are taken one by one.
+        """
+        X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
+        miss = (self.values - X @ fit.solution) * np.sqrt(self.weights)
+        if self.log.time is None:
+            return float((miss**2).sum())
+        at = np.unique(np.floor(self.log.time / _MEAN_S), return_inverse=True)[1]
+        total = np.zeros((int(at.max()) + 1, 6))
+        np.add.at(total, at, miss)
+        return float((total**2 / np.bincount(at)[:, None]).sum())
 
     def tilting(self, phi: Array, rotation: Array, gravity: Array) -> Array:
         """Return the derivative (N, 6, 3) of the wrench by a small turn of gravity (3,) in W [rad]."""

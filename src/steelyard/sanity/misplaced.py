@@ -24,6 +24,10 @@ from steelyard.spatial import cross_matrix
 # A point this far [m] from S is worth a word, if it is so many standard deviations from none, by leaving out stretches,
 # and leaves less of the squared residual. No tool's tip is farther than the last.
 APART, SURE, LEFT, FARTHEST = 0.01, 8.0, 0.95, 2.0
+# In slow motion noise hides what a point does: then what it leaves of means over a second tells. Sound logs keep 0.96.
+SLOWLY = 0.93
+# From so many standard deviations on a point is held by the bars.
+MAYBE = 2.5
 # Noise of an acceleration draws the point to the centre of mass by its share of the variance; so many times that is
 # allowed, and no point is told above the second share.
 NOISE, CALM = 3.0, 0.05
@@ -44,6 +48,7 @@ class Misplaced:
 
     place, std  (3,) [m] from the origin of S, in S, with standard deviations by leaving out stretches of the log
     left        squared residual beside that with the origin of S
+    slowly      the same, of means over a second
     moved       (10,) what the parameters are less with it
     com         (3,) [m] centre of mass with it
     trace       [kg m^2] sum of the moments of inertia about it that a free fit has
@@ -56,6 +61,7 @@ class Misplaced:
     place: Array
     std: Array
     left: float
+    slowly: float
     moved: Array
     com: Array
     trace: float
@@ -73,8 +79,17 @@ class Misplaced:
         """Whether it is another point than the origin of S beyond doubt."""
         far = float(np.linalg.norm(self.place))
         least = APART + NOISE * self.noise * float(np.linalg.norm(self.com))
-        shown = bool((np.abs(self.place) > SURE * self.std).any()) and self.noise < CALM
-        return shown and least < far < FARTHEST and self.left < LEFT
+        return self._stands_out(SURE) and least < far < FARTHEST
+
+    @property
+    def maybe(self) -> bool:
+        """Whether it may well be another point than the origin of S."""
+        return self._stands_out(MAYBE) and float(np.linalg.norm(self.place)) < FARTHEST
+
+    def _stands_out(self, times: float) -> bool:
+        """Whether it is so many standard deviations from the origin of S, and explains what that leaves."""
+        far = bool((np.abs(self.place) > times * self.std).any())
+        return far and self.noise < CALM and (self.left < LEFT or self.slowly < SLOWLY)
 
     @property
     def of_a_unit(self) -> bool:
@@ -102,14 +117,23 @@ class Misplaced:
     @property
     def finding(self) -> Finding:
         """What is said of it."""
-        where = ", ".join(f"{1e3 * v:.1f}" for v in self.place + 0.0)
-        size = f"({where}) ± {1e3 * float(np.linalg.norm(self.std)):.1g} mm from the origin of S"
-        what, such = "the positions were those of", ", such as the tip of a tool"
-        remedy = "Set the controller's TCP to S, or correct the positions."
-        if self.measured:
-            what, such, remedy = "the accelerations were those of", "", "Correct the accelerometer's mount by as much."
-        text = f"The load moves as if {what} a point {size}{such}{self._blind_words}. The answer assumes this."
+        what, such, remedy = self._what
+        text = f"The load moves as if {what} a point {self._size}{such}{self._blind_words}. The answer assumes this."
         return Finding("motion-mismatch", text, remedy)
+
+    @property
+    def _size(self) -> str:
+        """Say where it is."""
+        where = ", ".join(f"{1e3 * v:.1f}" for v in self.place + 0.0)
+        return f"({where}) ± {1e3 * float(np.linalg.norm(self.std)):.1g} mm from the origin of S"
+
+    @property
+    def _what(self) -> tuple[str, str, str]:
+        """Say what is of it, what it may be, and what to do."""
+        if self.measured:
+            return "the accelerations were those of", "", "Correct the accelerometer's mount by as much."
+        remedy = "Set the controller's TCP to S, or correct the positions."
+        return "the positions were those of", ", such as the tip of a tool", remedy
 
     @property
     def _blind_words(self) -> str:
@@ -117,6 +141,13 @@ class Misplaced:
         if self.blind is None:
             return ""
         return f"; where it is along ({axis_words(self.blind)}) of S, turns about that axis alone do not show"
+
+    def allowed(self, estimate: Estimate) -> Estimate:
+        """Return the estimate of the origin of S with bars that hold all that the point would change."""
+        wider = replace(estimate, covariance=estimate.covariance + np.outer(self.moved, self.moved))
+        return wider.noted(
+            f"the load moves as if {self._what[0]} a point {self._size}; error bars hold what that changes"
+        )
 
     def widened(self, estimate: Estimate) -> Estimate:
         """Return the estimate with bars that hold how well the point is known."""
@@ -155,10 +186,12 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
         if np.linalg.norm(place - before) < SETTLED:
             break
     left = fit.left / once.left if once.left else 1.0
+    slow = rows.slowly(once)
+    slowly = rows.slowly(fit, missed @ axes) / slow if slow else 1.0
     std, moved = np.sqrt(axes**2 @ fit.spread[at:] ** 2), once.solution[:10] - phi
     com = phi[1:4] / phi[0]
     trace = float(phi[4] + phi[7] + phi[9] - 2 * phi[0] * com @ com)
-    return Misplaced(place, std, left, moved, com, trace, noise_share(log), blind)
+    return Misplaced(place, std, left, slowly, moved, com, trace, noise_share(log), blind)
 
 
 def examine_place(
@@ -166,6 +199,7 @@ def examine_place(
 ) -> tuple[Misplaced | None, tuple[Finding, ...]]:
     """Return the point whose acceleration the log gives where it is not S and is the best cause, or `force-unit`.
 
+    It is seen beyond doubt, or only may be one.
     Two masses, or a turned sensor, must leave more of the residual. A point where another unit or sign puts it is none.
 
     known  what was found before: where the motion or the wrench is no body's, no point is looked for
@@ -173,12 +207,14 @@ def examine_place(
     if {f.code for f in known} & ELSEWHERE:
         return None, ()
     found = misplaced(log, drift)
-    if found is None or not found.seen:
+    if found is None or not (found.seen or found.maybe):
         return None, ()
     if any(r is not None and found.left >= r.left for r in (two_masses(log), sensor_matrix(log, drift))):
         return None, ()
     if not found.of_a_unit:
         return found, ()
+    if not found.seen:
+        return None, ()
     ratio, std = found.larger
     # A point at the centre of mass itself has no ratio that tells.
     return None, compared(ratio, std) if std < TOLD * abs(ratio) else ()
