@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from sanity.held_poses import recorded
+from sanity.held_poses import recorded, swaying
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.held_object import identify
@@ -89,3 +89,28 @@ def test_a_log_too_slow_to_show_a_motion_is_left_alone() -> None:
     few = replace(stream, channels={q: v[::100] for q, v in stream.channels.items()}, time=stream.time[::100])
     codes = {f.code for f in examine(replace(recording, streams=(few,)))[1]}
     assert "time-unit" not in codes
+
+
+@pytest.mark.parametrize("seed", range(4))
+def test_a_slow_motion_shows_the_unit_though_its_acceleration_is_weak(seed: int) -> None:
+    """The mass that is accelerated is known to a tenth, and by ten of its standard deviations not none."""
+    recording = swaying(seed, 0.2, 3.0)
+    read, found = examine(stamped(recording, 1e3))
+    assert "time-unit" in {f.code for f in found}
+    np.testing.assert_allclose(read.streams[0].time, recording.streams[0].time, rtol=1e-12)
+
+
+@pytest.mark.parametrize("noise", [0.0, 1.0])
+@pytest.mark.parametrize("seed", range(3))
+def test_hours_with_rare_rows_are_left_alone(seed: int, noise: float) -> None:
+    """What moves so slowly feels no acceleration: a note asks, and no unit is named."""
+    recording = swaying(seed, 0.8)
+    (stream,) = recording.streams
+    down = np.einsum("nji,j->ni", stream.channels["rotation"], recording.gravity)
+    felt = noise * np.random.default_rng(seed).normal(size=down.shape)
+    still = {"force": -2.0 * down + 0.05 * felt, "torque": np.cross(down, [0.02, 0.0, 0.1]) + 0.0025 * felt}
+    hours = stamped(replace(recording, streams=(replace(stream, channels={**stream.channels, **still}),)), 1e3)
+    read, found = examine(hours)
+    assert "time-unit" not in {f.code for f in found}
+    assert any("in a smaller unit" in note for note in read.notes)
+    assert read.streams[0].time[-1] == hours.streams[0].time[-1]
