@@ -31,9 +31,9 @@ from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
 _FEWEST_ROWS = 12
-# [s] No delay beyond the first, nor beyond a tenth of the log, is looked for; one below the second, or below three of
-# its standard deviations, counts as none.
-_LONGEST_DELAY_S, _SMALLEST_DELAY_S = 0.25, 0.5e-3
+# [s] No delay beyond the first, nor beyond a tenth of the log, is looked for; one below the second, or below so many of
+# its standard deviations, counts as none: loads of 50 g reach four without any.
+_LONGEST_DELAY_S, _SMALLEST_DELAY_S, _SURE = 0.25, 0.5e-3, 5.0
 _INTERPOLATION = 0.01  # of a sampling step
 
 
@@ -177,7 +177,8 @@ def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str
     late = given.unknown
     while True:
         # A delay must stay significant in the fit that is told of in the end.
-        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(_SMALLEST_DELAY_S, 3 * clocks.delays_std_s[n]))
+        stds = clocks.delays_std_s
+        sure = tuple(n for n in late if abs(clocks.delays_s[n]) > max(_SMALLEST_DELAY_S, _SURE * stds[n]))
         if sure == late:
             return clocks, late
         late, none = sure, {n: 0.0 for n in given.unknown if n not in sure}
