@@ -135,7 +135,7 @@ def test_the_mount_printed_for_a_large_turn_mends_it(degrees: tuple[float, float
 
 
 def test_a_turned_sensor_is_no_delay(recording: Recording) -> None:
-    turn = (0.0, float(np.radians(8.0)), 0.0)
+    turn = (0.0, float(np.radians(20.0)), 0.0)
     wrong = misread(recording, np.array(turn))
     assert any(align(wrong).delays_s.values())
     assert not any(align(wrong, AlignOptions(turn=turn)).delays_s.values())
