@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from parts_blocks import body, inside, solid
 from scipy.spatial import cKDTree
 
-from steelyard.parts.colours import colour_modes
+from steelyard.parts.colours import _without_blends, colour_modes
 from steelyard.parts.light import Light
 from steelyard.parts.prints import without_prints
 from steelyard.parts.skin import skin_of
@@ -192,3 +194,14 @@ def test_no_side_is_black_however_little_tells_of_it():
     light = Light(np.array([0.9, 0, 0, 0, 0, 0, -0.9, 0, 0, 0, 0.0]))
     assert light.on(SIDES).min() == pytest.approx(0.1)
     np.testing.assert_allclose(light.on(SIDES)[[0, 1, 2]], [1.45, 1.45, 1.0])
+
+
+def test_a_colour_that_no_point_has_any_more_is_dropped_without_a_warning():
+    label = np.repeat([0, 2], 10)
+    modes = np.array([[0.1, 0.1, 0.1], [0.5, 0.5, 0.5], [0.9, 0.9, 0.9]])
+    near = np.arange(20)[:, None] + np.arange(1, 5) - np.where(np.arange(20) < 10, 0, 10)[:, None]
+    with np.errstate(all="raise"), warnings.catch_warnings():
+        warnings.simplefilter("error")
+        found, left = _without_blends(label, modes, near % 20, modes[label], 0.03)
+    np.testing.assert_array_equal(found, np.repeat([0, 1], 10))
+    np.testing.assert_array_equal(left, modes[[0, 2]])

@@ -170,6 +170,8 @@ def _without_blends(
     size = np.bincount(label, minlength=count)
     for m in np.argsort(size, kind="stable") if count > 2 else ():
         mine = label == m
+        if not mine.any():  # its points have all been given to others
+            continue
         votes = _votes(label, near, count)[mine]
         beside = np.where(np.arange(count) == m, 0, votes.sum(0))
         two = np.argsort(-beside, kind="stable")[:2]
