@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 from steelyard.errors import BadInput, BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording, read_result
+from steelyard.io.in_file import in_file
 from steelyard.io.object_pose import ObjectPose, read_object_pose
-from steelyard.io.ply_files import read_mesh
+from steelyard.io.ply_files import read_mesh_noting
 from steelyard.io.team_files import read_team
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
@@ -67,13 +68,15 @@ def identify(
     if isinstance(log, MotionLog):
         known = _tool(tool, data)
         known = held_object.identify(known, options) if isinstance(known, Recording) else known
-        seen = _parts(parts) if scan is None else shape_of(scan)
-        return held_object.identify_rows(log, options, known, seen, *(() if place is None else (place.pose, place.std)))
+        seen, notes = _parts(parts) if scan is None else (shape_of(scan), ())
+        where = () if place is None else (place.pose, place.std)
+        return held_object.identify_rows(log, options, known, seen, *where).noted(*notes)
     recording = log if isinstance(log, Recording) else read_recording(log, data)
     if place is not None:
         recording = replace(recording, object_pose=place.pose, object_pose_std=place.std)
     known = _tool(recording.tool if tool is None else tool, data)
-    return held_object.identify(recording, options, known, _parts(parts) if scan is None else shape_of(scan))
+    seen, notes = _parts(parts) if scan is None else (shape_of(scan), ())
+    return held_object.identify(recording, options, known, seen).noted(*notes)
 
 
 def identify_team(
@@ -93,15 +96,17 @@ def identify_team(
     return shared_payload.identify_team(log if isinstance(log, TeamLog) else read_team(log, data), method)
 
 
-def _parts(parts: str | Path | Parts | None) -> Parts | None:
-    """Return the parts, read where they are given as a path."""
+def _parts(parts: str | Path | Parts | None) -> tuple[Parts | None, tuple[str, ...]]:
+    """Return the parts, read where they are given as a path, and what must be said of how they were read."""
     if not isinstance(parts, str | Path):
-        return parts
-    if Path(parts).suffix.lower() == ".npz":
+        return parts, ()
+    path = Path(parts)
+    if path.suffix.lower() == ".npz":
         from steelyard.io.parts_files import read_parts
 
-        return read_parts(parts).parts
-    return parts_of_mesh(read_mesh(Path(parts)))
+        return read_parts(path).parts, ()
+    mesh, notes = read_mesh_noting(path)
+    return in_file(path, lambda: parts_of_mesh(mesh)), notes
 
 
 def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None, cells: str = "delaunay") -> Shape:

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile
-from steelyard.io.ply_files import read_mesh, read_ply, write_mesh
+from steelyard.io.ply_files import read_mesh, read_mesh_noting, read_ply, write_mesh
 from steelyard.shape.mesh import TriangleMesh
 
 RNG = np.random.default_rng(0)
@@ -189,3 +189,12 @@ def test_elements_without_rows_or_properties_are_passed_over(tmp_path: Path) -> 
 def test_a_missing_file_is_said(tmp_path: Path) -> None:
     with pytest.raises(BadFile, match=r"m\.ply: cannot be read \(No such file or directory\)\.$"):
         read_mesh(tmp_path / "m.ply")
+
+
+def test_faces_without_a_part_are_one_part_and_a_note_says_so(tmp_path: Path) -> None:
+    (tmp_path / "m.ply").write_text(ASCII)
+    write_mesh(MESH, tmp_path / "parts.ply")
+    mesh, notes = read_mesh_noting(tmp_path / "m.ply")
+    assert mesh.part.tolist() == [0]
+    assert notes == ('m.ply: its faces have no "part": all of it was taken as one part of one density',)
+    assert read_mesh_noting(tmp_path / "parts.ply")[1] == ()

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from itertools import product
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -116,3 +118,26 @@ def test_a_drift_is_taken_out_with_parts_and_without(bar: Parts, held: InertialP
     steady, moving = (api.identify(log, Options(drift=drift), parts=parts) for drift in (False, True))
     assert abs(moving.mass - float(held.mass)) < 4 * moving.std[0] < 0.2 * steady.std[0]
     assert abs(moving.mass - float(held.mass)) < 2e-3
+
+
+def block_file(path: Path, half: tuple[float, float, float], faces: int = 12) -> Path:
+    """Write a mesh of a box about the origin without parts, or only some of its faces."""
+    corners = np.array(list(product((-1, 1), repeat=3))) * half
+    rows = ["0 1 3", "0 3 2", "4 6 7", "4 7 5", "0 4 5", "0 5 1", "2 3 7", "2 7 6", "0 2 6", "0 6 4", "1 5 7", "1 7 3"]
+    header = "ply\nformat ascii 1.0\nelement vertex 8\nproperty float x\nproperty float y\nproperty float z\n"
+    header += f"element face {faces}\nproperty list uchar int vertex_indices\nend_header\n"
+    lines = [" ".join(map(str, row)) for row in corners] + [f"3 {row}" for row in rows[:faces]]
+    path.write_text(header + "\n".join(lines) + "\n")
+    return path
+
+
+def test_a_mesh_without_parts_is_one_part_and_a_note_says_so(held: InertialParameters, tmp_path: Path) -> None:
+    mesh = block_file(tmp_path / "bar.ply", (0.1, 0.02, 0.02))
+    found = api.identify(handling_log(held, noise="low", seed=0), parts=mesh)
+    assert any(note.startswith('bar.ply: its faces have no "part"') for note in found.notes)
+
+
+def test_the_error_of_an_open_mesh_names_its_file(held: InertialParameters, tmp_path: Path) -> None:
+    mesh = block_file(tmp_path / "bar.ply", (0.1, 0.02, 0.02), faces=11)
+    with pytest.raises(BadFile, match=r"bar\.ply: part 0 is not closed: 3 edges"):
+        api.identify(handling_log(held, noise="low", seed=0), parts=mesh)

@@ -26,6 +26,7 @@ _ORDERS = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}
 _INDICES = ("vertex_indices", "vertex_index")
 _MOST_DIGITS = 15  # of a number of rows
 _MOST_PROPERTIES = 1000  # of all elements
+_ONE_PART = 'its faces have no "part": all of it was taken as one part of one density'
 
 
 @dataclass(frozen=True)
@@ -161,6 +162,11 @@ def read_mesh(path: Path | str) -> TriangleMesh:
 
     Raises BadFile where the file is no mesh of triangles.
     """
+    return read_mesh_noting(path)[0]
+
+
+def read_mesh_noting(path: Path | str) -> tuple[TriangleMesh, tuple[str, ...]]:
+    """Return the triangles of a PLY file as `read_mesh`, and a note where its faces have no `part`; raises BadFile."""
     path = Path(path)
     elements = read_ply(path)
     vertex, face = elements.get("vertex", {}), elements.get("face", {})
@@ -175,7 +181,9 @@ def read_mesh(path: Path | str) -> TriangleMesh:
     colours = [face[name] for name in ("red", "green", "blue") if name in face]
     xyz = np.stack([vertex[axis] for axis in "xyz"], axis=1)
     rgb = np.stack(colours, axis=1) if len(colours) == 3 else None
-    return in_file(path, lambda: TriangleMesh(xyz, indices, face.get("part", np.zeros(len(indices))), rgb))
+    part = face.get("part", np.zeros(len(indices)))
+    notes = () if "part" in face else (f"{path.name}: {_ONE_PART}",)
+    return in_file(path, lambda: TriangleMesh(xyz, indices, part, rgb)), notes
 
 
 def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> None:
