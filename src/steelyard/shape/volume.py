@@ -54,8 +54,8 @@ _CLEARER = 0.5  # of that doubt: no more is left without such normals
 # that is left where points alone tell better.
 _TORN, _MENDED = 0.004, 0.8
 # Standard deviation of the volume: of any solid; per share between points of round surfaces and their chords; per share
-# of cells unsure; where walls blur; per share left open.
-_STD, _CHORDS, _UNSURE, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.5, 1.0
+# of cells unsure; per share that a skin as thick as the noise has; where walls blur; per share left open.
+_STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,7 +112,7 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
     used = working_cloud(cloud, points)
     made, doubt = _made(used)
-    if doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _is_open(made)):
+    if used.along or doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _is_open(made)):
         return made
     # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
     other = working_cloud(cloud, points, settle=not used.noise)
@@ -316,9 +316,8 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
     unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
     wrong = thin or any(finding.code == "table-in-cloud" for finding in findings)
     few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
-    std = float(
-        np.sqrt(max(_STD, few) ** 2 + (_UNSURE * unsure) ** 2 + (_THIN * wrong) ** 2 + (_HOLE * gap * hole) ** 2)
-    )
+    skin = used.noise * total * diagonal**2 / solid.volume
+    std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
     kept = replace(used.cloud, normals=surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
 

@@ -11,6 +11,7 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.known_sides import settled_along
 from steelyard.shape.left_table import left_table
 from steelyard.shape.mesh import Integers
 from steelyard.shape.noisy_points import settled
@@ -31,17 +32,21 @@ _LINKS = 12  # neighbours by which pieces hang together
 
 
 class WorkingCloud(NamedTuple):
-    """The points to make a solid from, the noise that was averaged out of them [m], and what was done to them."""
+    """The points to make a solid from, the noise that was averaged out of them [m], and what was done to them.
+
+    along  whether they were moved along normals that came with them
+    """
 
     cloud: Cloud
     noise: float
     findings: tuple[Finding, ...]
+    along: bool = False
 
 
 def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> WorkingCloud:
     """Return the points to make a solid from, at most about `most`.
 
-    settle  whether noise is averaged out; None where points enough for it must go
+    settle  whether noise is averaged out; None where points enough for it must go, or normals tell of it
 
     Millimetres become metres, repeated points one, strays go, and of several objects the largest stays. Raises
     BadValue where fewer than twenty points remain or all lie in a plane.
@@ -52,7 +57,8 @@ def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> Workin
     _require_solid(cloud.xyz)
     # What views gave stands on a table that was found and taken away.
     table = left_table(cloud.xyz, float(np.median(cloud.near.spacing))) if cloud.seen is None else None
-    return WorkingCloud(cloud, thin.noise, (*found, *thin.findings, *last, *([table] if table else [])))
+    findings = (*found, *thin.findings, *last, *([table] if table else []))
+    return thin._replace(cloud=cloud, findings=findings)
 
 
 def _in_metres(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
@@ -87,7 +93,9 @@ def _thinned(cloud: Cloud, most: int, settle: bool | None) -> WorkingCloud:
     """Return at most about `most` well-spread points, of a fair draw where there are many more."""
     if len(cloud) <= 1.04 * most:
         whole = WorkingCloud(cloud, 0.0, ())
-        return _settled(whole, float(np.median(cloud.near.spacing)), len(cloud)) if settle else whole
+        if settle is False or (cloud.normals is None and not settle):
+            return whole
+        return _settled(whole, float(np.median(cloud.near.spacing)), len(cloud), sheets=bool(settle))
     drawn = np.random.default_rng(0).permutation(len(cloud))[: _DRAWN * most]
     chosen = cloud.chosen(np.sort(drawn))
     kept, apart = _spread(chosen, most)
@@ -105,18 +113,24 @@ def _thinned(cloud: Cloud, most: int, settle: bool | None) -> WorkingCloud:
             kept, apart = _spread(drawn_from.cloud, most)
     text = f"Of {len(cloud)} points {len(kept)} were used, {apart * 1e3:.2g} mm apart."
     findings = [Finding.of("cloud-thinned", text), *drawn_from.findings, *findings]
-    return WorkingCloud(drawn_from.cloud.chosen(np.sort(kept)), drawn_from.noise, tuple(findings))
+    return drawn_from._replace(cloud=drawn_from.cloud.chosen(np.sort(kept)), findings=tuple(findings))
 
 
-def _settled(used: WorkingCloud, apart: float, most: int) -> WorkingCloud:
-    """Return at most `most` of the points, brought to the surface they share; as they are if they are not noisy."""
+def _settled(used: WorkingCloud, apart: float, most: int, sheets: bool = True) -> WorkingCloud:
+    """Return at most `most` of the points, brought to the surface they share; as they are if they are not noisy.
+
+    sheets  whether noise is looked for about sheets through neighbours, too, and not by normals alone
+    """
     cloud = used.cloud
     rows = np.linspace(0, len(cloud) - 1, min(most, len(cloud))).astype(np.int64)
-    found = settled(cloud.xyz, cloud.normals, rows, apart)
+    along = None if cloud.normals is None else settled_along(cloud.xyz, cloud.normals, rows, apart)
+    found = settled(cloud.xyz, cloud.normals, rows, apart) if sheets and along is None else along
     if found is None:
         return used
+    rows = rows if along is None else along.rows
     text = f"The points have noise of about {found.noise * 1e3:.2g} mm; each was moved to where its neighbours lie."
-    return WorkingCloud(replace(cloud.chosen(rows), xyz=found.xyz), found.noise, (Finding.of("cloud-noisy", text),))
+    findings = (Finding.of("cloud-noisy", text),)
+    return WorkingCloud(replace(cloud.chosen(rows), xyz=found.xyz), found.noise, findings, along is not None)
 
 
 def _spread(cloud: Cloud, most: int) -> tuple[Integers, float]:
