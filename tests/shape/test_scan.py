@@ -13,6 +13,7 @@ from steelyard.shape.carving import carved
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import fuse
 from steelyard.shape.thinning import spread
+from steelyard.shape.underside import Underside
 from steelyard.shape.views import Intrinsics, Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import D435, disturbed
@@ -117,6 +118,21 @@ def test_a_surface_of_which_few_views_show_little_is_named(count: int, few: bool
     told = [f for f in enclose(scan.cloud).findings if f.code == "thin-thickened"]
     assert not few or told[0].message.startswith(f"Cameras saw only {share} of the points")
     assert not any("Cameras" in f.message for f in told) or few
+
+
+def test_what_closes_the_underside_and_hangs_by_itself_is_left_out(
+    box: Scanned, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    points = Underside.points
+
+    def more(bottom: Underside) -> tuple[np.ndarray, np.ndarray]:
+        xyz, down = points(bottom)
+        return np.vstack([xyz, [[0.15, 0.1, 0.008], [0.155, 0.1, 0.008]]]), np.vstack([down, [[0, 0, -1.0]] * 2])
+
+    monkeypatch.setattr(Underside, "points", more)
+    scan = fuse(box.views)
+    assert scan.cloud.xyz[:, 0].max() < 0.06
+    assert "outliers" not in {finding.code for finding in enclose(scan.cloud).findings}
 
 
 def test_what_is_empty_is_outside(box: Scanned) -> None:

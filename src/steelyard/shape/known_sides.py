@@ -31,7 +31,7 @@ _BEYOND = 0.2  # of the noise that a point may lie over such a side
 
 
 class Along(NamedTuple):
-    """Points `rows` (K,) of a cloud, where they were moved to (K, 3) along their normals, and their noise before [m]."""
+    """Points `rows` (K,) of a cloud, moved along their normals to `xyz` (K, 3), and the noise that they had [m]."""
 
     rows: Integers
     xyz: Array
@@ -41,7 +41,10 @@ class Along(NamedTuple):
 def settled_along(xyz: Array, normals: Array, rows: Integers, spacing: float) -> Along | None:
     """Return the points `rows` of a cloud (M, 3) [m] moved along their normals onto their surface; None without noise.
 
+    normals  (M, 3) unit vectors
     spacing  of the points that will be kept of them [m]
+
+    Noise also moves points along their own face, past its edges: those are left out.
     """
     some = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
     noise = 0.0

@@ -23,10 +23,12 @@ from steelyard.shape.lens_error import lens_by_table
 from steelyard.shape.placement import Placement, placement
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, followed, lost_share, scene_of, surface_of, surfels
+from steelyard.shape.spacing import Neighbours
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
 from steelyard.shape.views import Intrinsics, TablePlane, Views
+from steelyard.shape.working_cloud import in_small_pieces
 from steelyard.spatial import Pose, Rotation
 
 POINTS = 3000  # of the cloud, about
@@ -191,6 +193,8 @@ def _closed(scene: Scene, xyz: Array, normal: Array, points: int) -> tuple[Array
     xyz, normal, seen = np.concatenate([xyz, below]), np.concatenate([normal, down]), len(xyz)
     rows, radius = spread_to(xyz, normal, np.arange(len(xyz)), points, scene.pixel)
     rows = np.sort(rows)
+    # What closes the object from below and hangs by itself closes nothing.
+    rows = rows[(rows < seen) | ~in_small_pieces(Neighbours.of(xyz[rows]))]
     return xyz[rows], normal[rows], int((rows < seen).sum()), radius, bottom
 
 

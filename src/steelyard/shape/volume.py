@@ -112,7 +112,7 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
 
     used = working_cloud(cloud, points)
     made, doubt = _made(used)
-    if used.along or doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _is_open(made)):
+    if used.along or (doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _is_open(made))):
         return made
     # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
     other = working_cloud(cloud, points, settle=not used.noise)

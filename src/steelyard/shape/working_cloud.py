@@ -176,6 +176,12 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     return cloud.chosen(piece == main), [Finding.of("several-objects", text)]
 
 
+def in_small_pieces(near: Neighbours) -> Mask:
+    """Return which points (N,) hang together with too few others to be an object."""
+    piece = _pieces(near)[0]
+    return np.asarray((np.bincount(piece) < LEAST)[piece])
+
+
 def _pieces(near: Neighbours) -> tuple[Integers, float]:
     """Return the piece (N,) of each point, joined where nearest neighbours are not far apart, and the spacing [m]."""
     from scipy.sparse import csr_matrix
