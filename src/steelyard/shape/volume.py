@@ -20,6 +20,7 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links, walled
 from steelyard.shape.sheets import sheet_planes, stacked, torn
 from steelyard.shape.tets import TetMesh
+from steelyard.shape.thin_walls import blurred_walls, share_within_noise, within_noise
 from steelyard.shape.ties import Ties
 from steelyard.shape.tree import Tree
 from steelyard.shape.winding import Sight
@@ -36,15 +37,13 @@ _UNCLEAR = 0.38  # doubt above which one thickness of the walls is looked for
 _LEFT = 0.5  # of the volume, at least, or it was not the walls' thickness that was found
 _SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
 _CLEAR = 0.2  # doubt below which no sheets need be looked at
+_FEWER, _LEAST_OF_FEWER = (2, 4), 1000  # one point in so many is tried where noise leaves doubt; not fewer points
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
 # Length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface. Above this a side is
 # missing (0.12 and more without an underside). Patterns of points that are unlike on two sides leave up to 0.10, or
 # 0.135 where one is five times as dense.
 _OPEN = 0.11
-_WITHIN_NOISE = 4.0  # standard deviations of noise that two layers of points must be apart to be told as two
 _NOISY = 0.3  # of the points: so many that are nearer to the other side make the solid doubtful
-_FEW_SEEN = 0.25  # of the points: scans with views from all sides show the colour of about half
-_FACING = -0.5  # cosine between normals of two sides
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Doubt above which normals that come with a cloud may be wrong: thin walls reach 0.44, a tenth of them turned 0.67.
 _BY_CHANCE = 0.6
@@ -108,11 +107,38 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     Walls down to about half the spacing keep their thickness; where they could not be told from gaps the finding
     `thin-thickened` says so. Raises BadValue where the points enclose nothing.
     """
+    made = _enclosed_by(cloud, points)
+    return _of_fewer(cloud, min(points, len(cloud)), made) if cloud.normals is None else made
+
+
+def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
+    """Return the solid of fewer points where one of noisy points is in doubt; as it was made where that is not clear.
+
+    Noise as large as the spacing makes an orientation collapse. Fewer points lie farther apart, and each is the mean of
+    more; walls that are too thin are then so all the more.
+    """
+    from steelyard.shape.working_cloud import working_cloud
+
+    if not _has(made, "thin-thickened"):
+        return made
+    for most in (points // share for share in _FEWER if points >= share * _LEAST_OF_FEWER):
+        used = working_cloud(cloud, most)
+        try:
+            coarse, doubt = _made(used)
+        except BadValue:  # they enclose nothing
+            continue
+        if used.noise and doubt < _CLEAR and not _has(coarse, "thin-thickened", "surface-open"):
+            return coarse
+    return made
+
+
+def _enclosed_by(cloud: Cloud, points: int) -> Solid:
+    """Return the closed volume behind a cloud, of at most about so many points."""
     from steelyard.shape.working_cloud import working_cloud
 
     used = working_cloud(cloud, points)
     made, doubt = _made(used)
-    if used.along or (doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _is_open(made))):
+    if used.along or (doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _has(made, "surface-open"))):
         return made
     # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
     other = working_cloud(cloud, points, settle=not used.noise)
@@ -122,14 +148,14 @@ def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
         changed, left = _made(other._replace(noise=max(used.noise, other.noise)))
     except BadValue:  # they enclose nothing
         return made
-    if left > doubt or _is_open(changed) > _is_open(made):
+    if left > doubt or _has(changed, "surface-open") > _has(made, "surface-open"):
         return made
     return changed if used.noise else _as_doubtful(changed, made)
 
 
 def _as_doubtful(made: Solid, as_given: Solid) -> Solid:
     """Return a solid of few points that were settled, with the doubt that there was about them as they were given."""
-    if any(finding.code == "thin-thickened" for finding in made.findings):
+    if _has(made, "thin-thickened"):
         return made
     doubts = (finding for finding in as_given.findings if finding.code == "thin-thickened")
     std = max(made.volume_std, as_given.volume_std)
@@ -150,8 +176,8 @@ def _made(used: WorkingCloud) -> tuple[Solid, float]:
     return replace(made, mesh=mesh, around=around, cloud=replace(used.cloud, normals=normals)), doubt
 
 
-def _is_open(made: Solid) -> bool:
-    return any(finding.code == "surface-open" for finding in made.findings)
+def _has(made: Solid, *codes: str) -> bool:
+    return any(finding.code in codes for finding in made.findings)
 
 
 def _enclosed(used: WorkingCloud) -> tuple[Solid, TetMesh, float]:
@@ -301,13 +327,13 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
     sure = np.minimum(2 * found.score[found.inside], 1.0)
     total = float(surface.area.sum())
     gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
-    noisy = _share_within(surface, _WITHIN_NOISE * used.noise / diagonal)
+    noisy = share_within_noise(surface, used.noise / diagonal)
     blurred, hole = doubt > _BLURRED, gap > _OPEN
     thin = blurred or noisy > _NOISY
     findings = used.findings + turned
     if thin:
         apart = surface.spacing * diagonal * 1e3
-        findings += (_blur(used.cloud, apart, doubt) if blurred else _within_noise(noisy, used.noise),)
+        findings += (blurred_walls(used.cloud, apart, doubt) if blurred else within_noise(noisy, used.noise),)
     if hole:
         text = (
             f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
@@ -320,25 +346,3 @@ def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[
     std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
     kept = replace(used.cloud, normals=surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
-
-
-def _blur(cloud: Cloud, apart: float, doubt: float) -> Finding:
-    """Return why inside and outside of points `apart` [mm] are hard to tell: few were seen, or else thin walls."""
-    what = f"what should be 1 inside and 0 outside is blurred to {1 - doubt:.2f} inside."
-    if cloud.seen is not None and (share := float(cloud.seen.mean())) < _FEW_SEEN:
-        text = f"Cameras saw only {100 * share:.0f} % of the points, and the rest closes what is left: {what}"
-        return Finding("thin-thickened", text, "Take more views, from all sides and heights.")
-    text = f"Walls are too thin for points {apart:.2g} mm apart to tell them from gaps: {what}"
-    return Finding.of("thin-thickened", text)
-
-
-def _within_noise(share: float, noise: float) -> Finding:
-    """Return that walls or gaps at a share of the points are thinner than their noise [m] lets see."""
-    text = f"Walls or gaps at {100 * share:.0f} % of the points are thinner than {_WITHIN_NOISE:.0f} times their "
-    return Finding.of("thin-thickened", f"{text}noise of {noise * 1e3:.2g} mm.")
-
-
-def _share_within(surface: Oriented, reach: float) -> float:
-    """Return the share of points with the other side of a wall or gap nearer than `reach`."""
-    facing = np.einsum("nd,nkd->nk", surface.normals, surface.normals[surface.near.index]) < _FACING
-    return float((facing & (surface.near.distance < reach)).any(1).mean())
