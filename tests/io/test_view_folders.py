@@ -13,6 +13,8 @@ import pytest
 
 from steelyard.errors import BadFile
 from steelyard.io import bounds, view_folders
+from steelyard.io.object_pose import read_object_pose
+from steelyard.io.object_writing import write_object_views
 from steelyard.io.view_folders import read_views, write_views
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
@@ -90,9 +92,16 @@ def test_views_are_written_whole_or_not_at_all(tmp_path: Path, monkeypatch: pyte
         raise BadFile(f"{path.name}: cannot be written (the disk is full).")
 
     monkeypatch.setattr(view_folders, "write_image", fails)
-    with pytest.raises(BadFile, match="the disk is full"):
-        write_views(VIEWS, tmp_path / "new")
-    assert list(tmp_path.iterdir()) == []
+    for write in (write_views, lambda views, folder: write_object_views(views, Pose.identity(), folder)):
+        with pytest.raises(BadFile, match="the disk is full"):
+            write(VIEWS, tmp_path / "new")
+        assert list(tmp_path.iterdir()) == []
+
+
+def test_views_of_an_object_lie_beside_where_they_sit(tmp_path: Path) -> None:
+    write_object_views(VIEWS, Pose.identity(), tmp_path)
+    assert len(read_views(tmp_path)) == 3
+    assert read_object_pose(str(tmp_path / "object.toml")).pose.position.tolist() == [0, 0, 0]
 
 
 def camera(**change: object) -> Callable[[Path], None]:

@@ -133,6 +133,12 @@ MESSAGES = {
 }  # fmt: skip
 
 
+def test_colours_of_triangles_may_be_floats_from_0_to_1() -> None:
+    colours = np.tile([0.0, 0.5, 1.0], (12, 1))
+    coloured = TriangleMesh(BOX.vertices, BOX.triangles, BOX.part, colours)
+    assert coloured.rgb[0].tolist() == [0, 128, 255]
+
+
 @pytest.mark.parametrize("case", MESSAGES)
 def test_each_wrong_mesh_has_one_clear_error(case: str) -> None:
     make, text = MESSAGES[case]

@@ -10,7 +10,7 @@ import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
 from steelyard.io.bounds import read_whole
-from steelyard.shape.mesh import Colours
+from steelyard.shape.eight_bits import Colours
 from steelyard.shape.views import Depths
 from steelyard.whole_files import write_bytes
 

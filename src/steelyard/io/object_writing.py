@@ -77,8 +77,7 @@ def write_object_views(views: Views, X_SW: Pose, folder: Path | str) -> None:
 
     `steelyard identify log.toml --scan FOLDER --pose-in-sensor FOLDER/object.toml` then runs as it stands.
     """
-    write_views(views, folder)
-    write_text(Path(folder) / "object.toml", object_table(X_SW, of="the world of the views"))
+    write_views(views, folder, {"object.toml": object_table(X_SW, of="the world of the views")})
 
 
 def _npz(arrays: dict[str, Any]) -> bytes:

@@ -7,7 +7,7 @@ import io
 import itertools
 import json
 from collections import Counter
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from pathlib import Path
 from typing import Any
 
@@ -168,8 +168,10 @@ def _table(path: Path) -> TablePlane:
     return in_file(path, lambda: TablePlane(axes, _number(path, "offset_m", values["offset_m"])))
 
 
-def write_views(views: Views, folder: Path | str) -> None:
+def write_views(views: Views, folder: Path | str, beside: Mapping[str, str] | None = None) -> None:
     """Write views as a folder, all of it or nothing; images are named 0000, 0001, ... Raises BadFile.
+
+    beside  text files of the same folder by name
 
     Of views written here before, what these lack goes: their table, colours and further images. Other files stay, and
     where they would be read as a table or colours that these views lack, nothing is written.
@@ -193,6 +195,8 @@ def write_views(views: Views, folder: Path | str) -> None:
         if views.table is not None:
             table = {"normal": views.table.normal.tolist(), "offset_m": views.table.offset}
             write_text(new / "table.json", json.dumps(table))
+        for name, text in (beside or {}).items():
+            write_text(new / name, text)
         stale = [path for path in old if not (new / path.relative_to(folder)).exists()]
     for path in stale:
         path.unlink(missing_ok=True)

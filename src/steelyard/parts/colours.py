@@ -10,7 +10,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.parts.light import Light, light_on
 from steelyard.parts.skin import OPPOSITE, Skin
-from steelyard.shape.mesh import Colours, Integers
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.mesh import Integers
 
 NEIGHBOURS = 8
 # Distances between colours 0..1 (black to white is 1.7). Steps of eight bits and of a compressed texture are below the

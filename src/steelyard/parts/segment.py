@@ -28,7 +28,8 @@ from steelyard.parts.prints import without_prints
 from steelyard.parts.seams import seam_tree
 from steelyard.parts.skin import Skin, skin_of
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Colours, Integers
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import cross
 

@@ -13,7 +13,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.report.surfaces import compact, evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Colours, Integers, TriangleMesh
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.mesh import Integers, TriangleMesh
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
 

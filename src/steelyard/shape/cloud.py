@@ -11,12 +11,10 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Colours, Integers
+from steelyard.shape.eight_bits import Colours, eight_bits
+from steelyard.shape.mesh import Integers
 from steelyard.shape.spacing import Neighbours
 from steelyard.spatial import Pose
-
-_BRIGHT = 2.0  # floats up to here are 0..1, some of them overexposed: read as 0..255 they would all be black
-
 
 # Normals this near to unit vectors are left as they are.
 _ONE = 1e-3
@@ -48,7 +46,7 @@ class Cloud:
             raise BadValue(f"a cloud needs points (N, 3), N > 0; got {xyz.shape}.")
         object.__setattr__(self, "xyz", xyz)
         if self.rgb is not None:
-            object.__setattr__(self, "rgb", _colours(self.rgb, xyz.shape))
+            object.__setattr__(self, "rgb", _column("colours", eight_bits(self.rgb), xyz.shape, np.uint8))
         if self.label is not None:
             label = check.whole("labels", self.label)
             object.__setattr__(self, "label", _column("labels", label, xyz.shape[:1], np.int64))
@@ -115,22 +113,3 @@ def _unit(normals: Array) -> Array | None:
     if np.abs(length - 1).max() < _ONE:
         return normals
     return check.frozen(normals / length[:, None])
-
-
-def _colours(values: Any, shape: tuple[int, ...]) -> Colours:
-    """Return colours (N, 3) as 8 bits, of numbers 0..255, floats 0..1 or 16-bit numbers; what is not known is black."""
-    array = np.asarray(values)
-    if array.dtype == np.uint8 or array.dtype.kind not in "fiu" or array.shape != shape:
-        return np.asarray(_column("colours", array, shape, np.uint8))
-    levels = np.nan_to_num(array.astype(np.float64))
-    least, most = float(levels.min()), float(levels.max())
-    if array.dtype.kind == "f" and most <= _BRIGHT:
-        levels = 255 * np.minimum(levels, 1.0)
-    elif array.dtype == np.uint16 and most > 255:
-        levels /= 257
-    if levels.min() <= -1 or levels.max() >= 256:  # rounding may lead a little beyond
-        raise BadValue(
-            f"colours must be numbers 0 to 255, or floats 0 to 1; they go from {least:.4g} to {most:.4g}. "
-            "Scale them, or leave them out."
-        )
-    return np.asarray(_column("colours", np.round(np.clip(levels, 0, 255)), shape, np.uint8))

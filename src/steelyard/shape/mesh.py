@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -12,9 +11,8 @@ from steelyard.check import Array
 from steelyard.check import Integers as Integers
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
+from steelyard.shape.eight_bits import Colours, eight_bits
 from steelyard.spatial import Pose, Rotation, cross
-
-Colours = np.ndarray[Any, np.dtype[np.uint8]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,7 +22,7 @@ class TriangleMesh:
     vertices   (V, 3) [m]
     triangles  (F, 3) numbers of the corners, counter-clockwise seen from outside
     part       (F,) label of the part that each triangle bounds
-    rgb        (F, 3) uint8 colour of each triangle, None where it is not known
+    rgb        (F, 3) uint8 colour of each triangle, None where it is not known; given as floats 0..1 or numbers 0..255
     """
 
     vertices: Array
@@ -49,7 +47,8 @@ class TriangleMesh:
         object.__setattr__(self, "triangles", triangles)
         object.__setattr__(self, "part", part)
         if self.rgb is not None:
-            rgb = _frozen(self.rgb, np.uint8)
+            rgb = eight_bits(self.rgb)
+            rgb.flags.writeable = False
             if rgb.shape != triangles.shape:
                 raise BadValue(f"each of the {len(triangles)} triangles needs one colour; got {rgb.shape}.")
             object.__setattr__(self, "rgb", rgb)
@@ -88,12 +87,6 @@ class TriangleMesh:
     def in_frame(self, X_AB: Pose) -> TriangleMesh:
         """Return the same mesh, given in B, seen from frame A."""
         return TriangleMesh(X_AB.apply(self.vertices), self.triangles, self.part, self.rgb)
-
-
-def _frozen(values: Any, dtype: type) -> Any:
-    array: Any = np.array(values, dtype=dtype)
-    array.flags.writeable = False
-    return array
 
 
 def part_moments(mesh: TriangleMesh) -> Array:

@@ -11,7 +11,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Colours
+from steelyard.shape.eight_bits import Colours
 from steelyard.spatial import Pose
 
 Depths = np.ndarray[Any, np.dtype[np.uint16]]

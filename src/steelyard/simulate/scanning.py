@@ -11,7 +11,8 @@ from scipy.spatial import ConvexHull
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Colours, TriangleMesh, part_moments
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.mesh import TriangleMesh, part_moments
 from steelyard.shape.views import Intrinsics, Views
 from steelyard.simulate.camera import D435, VIEWS, DepthNoise, disturbed, wrist_arc
 from steelyard.spatial import Pose, Rotation, unit_vectors

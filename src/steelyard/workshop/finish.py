@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.mesh import Colours, TriangleMesh
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.spatial import unit_vectors
 from steelyard.workshop.tools import Finish, Tool
 
