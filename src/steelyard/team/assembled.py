@@ -16,10 +16,10 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
-from steelyard.team.payload.bias_models import SHOWN
 from steelyard.team.payload.body_rows import balance_frame, reach
 from steelyard.team.payload.doubt import lost_turns, moved_by_gains, moved_by_grasps
 from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.payload.shown import SHOWN
 from steelyard.team.poses.covariance import Spread
 
 # [m] What is taken for the size of a team where the motion does not show where its grasps are.

@@ -14,15 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.team.hinge.rows import BIAS, COUNT, Bands, Sums, noisy
-from steelyard.team.payload.bias_models import (
-    Models,
-    Recordings,
-    condition_of,
-    gain_spread,
-    ladder_of,
-    shown_of,
-    without_gain,
-)
+from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
 from steelyard.team.payload.model import Normal, least_noise
 
 ROUNDS = 12
@@ -109,11 +101,10 @@ def fit_hinged_payload(
         weights = tuple(_weights(kind, V, phi, started=number > 0) for kind in kinds)
         normals = [_normal(p, k, W, sums, number > 0) for k, W in zip(kinds, weights, strict=True) for p in k.parts]
         models = Models.of(normals, C, ladder, scale)
-        weight = models.share
-        phi, best = models.mean(), int(np.argmax(weight))
+        phi = models.mean()
         if number == 0:
             scale = _units(max(abs(float(phi[0])), 1e-3), size)
-        beside = models.recordings(best)
+        beside = models.recordings(models.best)
         starts = np.cumsum([0, *(len(kind.parts) for kind in kinds)])
         renewed = tuple(
             _judged(kind, W, V, beside, int(s)) for kind, W, s in zip(kinds, weights, starts[:-1], strict=True)
@@ -123,18 +114,13 @@ def fit_hinged_payload(
         if (number > 1 and change < SETTLED) or number == ROUNDS - 1:
             break
         kinds = renewed
-    covariance = models.covariance_about(phi)
-    noise = sum((n.noise for n in normals), np.zeros((COUNT, COUNT))) * np.outer(scale, scale)
-    values, vectors = np.linalg.eigh(models.information[best] * np.outer(scale, scale) - noise)
-    shown = shown_of(values, vectors, noise)
-    root = scale[:, None] * vectors[:, shown]
+    shown = models.shown(scale)
     rows = 7 * sum(float(p.rows.sum()) for k in kinds for p in k.parts)
-    condition = condition_of(values, shown)
     blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
     return HingedPayload(
-        phi, covariance, vectors[:, ~shown], scale, (root / values[shown]) @ root.T,
-        condition, gain_spread(weight, ladder), without_gain(weight, ladder),
-        float(models.chi2[best]) / max(rows - COUNT, 1.0), kinds, weights, blind, sums,
+        phi, models.covariance_about(phi), shown.lost, scale, np.outer(scale, scale) * shown.inverse, shown.condition,
+        models.gain, models.gainless, float(models.chi2[models.best]) / max(rows - COUNT, 1.0), kinds, weights, blind,
+        sums,
     )  # fmt: skip
 
 

@@ -14,9 +14,10 @@ from functools import lru_cache
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.log import Integers, Mask
+from steelyard.logs.log import Integers
 from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.payload.model import Normal
+from steelyard.team.payload.shown import RANK, SHOWN, Shown
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
 BIAS = np.geomspace(1e-3, 10.0, 13)
@@ -30,12 +31,8 @@ NO_GAIN_ERROR = 3.0
 # times as likely as any one size.
 NO_COMMON, NO_LASTING = 1000.0, 1000.0
 GAIN = np.array([0.0, 3e-4, 1e-3, 3e-3, 0.01, 0.03, 0.1])
-# What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
-SHOWN = 0.3
 # Sizes with less than this share of the likeliest's have none: what they would add to a variance is rounding.
 NOTHING = 1e-15
-# Information below this share of the largest is rounding.
-RANK = 1e-11
 
 
 def ladder_of(recordings: int, with_gain: bool) -> Array:
@@ -60,16 +57,6 @@ def ladder_shares(evidence: Array, ladder: Array) -> Array:
     weight = np.exp(chance - chance.max())
     weight[weight < NOTHING] = 0.0
     return np.asarray(weight / weight.sum())
-
-
-def gain_spread(weight: Array, ladder: Array) -> float:
-    """Return the rms share by which gains err, drawn anew or lasting: mean over the ladder (L, 4) by weight (L,)."""
-    return float(np.sqrt(weight @ np.square(ladder[:, 2:]).sum(1)))
-
-
-def without_gain(weight: Array, ladder: Array) -> float:
-    """Return the share of the weight (L,) on the ladder (L, 4) that says that gains have no error."""
-    return float(weight[~ladder[:, 2:].any(1)].sum())
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,13 +88,16 @@ class Recordings:
 class Models:
     """The answers at L sizes (`ladder_of`): P parameters, B of a bias, R recordings.
 
+    ladder (L, 4)
     phi (L, P)     covariance, information (L, P, P)     chi2 (L,)
     share   (L,) of every size by evidence; phi and covariance are zero where it is
     H, g    of the recordings (R, P + B, P + B), (R, P + B)
     narrow  (L', R, B, B) inverse spread of the biases drawn anew, one per kind, `kind` (L,) says which
     common  (L, B, B) V of the common bias, where there is more than one recording
+    noise   (P, P) what noise in the motion adds to the information
     """
 
+    ladder: Array
     phi: Array
     covariance: Array
     information: Array
@@ -118,6 +108,7 @@ class Models:
     narrow: Array
     kind: Integers
     common: Array
+    noise: Array
 
     @classmethod
     def of(cls, normals: Sequence[Normal], C: Array, ladder: Array, scale: Array) -> Models:
@@ -155,10 +146,33 @@ class Models:
         evidence = -0.5 * (chi2 + logarithms(np.eye(size) + full) + told)
         share = ladder_shares(evidence, ladder)
         told_of = np.flatnonzero(share)
-        noise = sum((n.noise for n in normals), np.zeros((size, size))) * unit
+        noise = sum((n.noise for n in normals), np.zeros((size, size)))
         phi, covariance = np.zeros((len(ladder), size)), np.zeros((len(ladder), size, size))
-        phi[told_of], covariance[told_of] = _answers(full[told_of], noise, (scale * right)[told_of])
-        return cls(scale * phi, unit * covariance, plain, share, np.asarray(chi2), H, g, narrow, kind, common[which])
+        phi[told_of], covariance[told_of] = _answers(full[told_of], noise * unit, (scale * right)[told_of])
+        return cls(
+            ladder, scale * phi, unit * covariance, plain, share, np.asarray(chi2), H, g, narrow, kind, common[which],
+            noise,
+        )  # fmt: skip
+
+    @property
+    def best(self) -> int:
+        """The likeliest size."""
+        return int(np.argmax(self.share))
+
+    @property
+    def gain(self) -> float:
+        """Rms share by which gains err, drawn anew or lasting: mean over sizes by their evidence."""
+        return float(np.sqrt(self.share @ np.square(self.ladder[:, 2:]).sum(1)))
+
+    @property
+    def gainless(self) -> float:
+        """Share of the evidence that gains do not err at all."""
+        return float(self.share[~self.ladder[:, 2:].any(1)].sum())
+
+    def shown(self, scale: Array) -> Shown:
+        """Return which directions, in units of `scale` (P,), the rows show at the likeliest size."""
+        unit = np.outer(scale, scale)
+        return Shown.of(self.information[self.best] * unit, self.noise * unit)
 
     def mean(self) -> Array:
         """Return the parameters (P,), averaged over sizes by their evidence."""
@@ -218,23 +232,7 @@ def _answers(full: Array, noise: Array, right: Array) -> tuple[Array, Array]:
         # Every direction is shown, whichever they are.
         inverse = inverses(known)[0]
         return (inverse @ right[..., None])[..., 0], inverse @ full @ inverse
-    values, vectors = np.linalg.eigh(known)
-    shown = shown_of(values, vectors, noise)
-    inverse = (vectors * np.where(shown, 1 / np.where(shown, values, 1.0), 0.0)[:, None]) @ vectors.swapaxes(1, 2)
-    lost = vectors * ~shown[:, None]
+    shown = Shown.of(full, noise)
+    inverse, lost = shown.inverse, shown.vectors * ~shown.told[:, None]
     covariance = inverse @ full @ inverse + lost @ lost.swapaxes(1, 2)
     return (inverse @ right[..., None])[..., 0], covariance
-
-
-def condition_of(values: Array, shown: Mask) -> float:
-    """Return the condition number of the rising information (P,) in what is shown, infinite where nothing is."""
-    return float(np.sqrt(values[-1] / values[shown][0])) if shown.any() else np.inf
-
-
-def shown_of(values: Array, vectors: Array, noise: Array) -> Mask:
-    """Return which rising information (..., P), in units of what a body can be, is more than noise and rounding.
-
-    What noise in the motion alone would seem to say, `noise`, is known to no better than its own size.
-    """
-    seeming = np.einsum("...pk,pq,...qk->...k", vectors, noise, vectors)
-    return np.asarray((values > SHOWN**-2.0) & (values > RANK * values[..., -1:]) & (values > seeming))

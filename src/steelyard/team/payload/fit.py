@@ -15,15 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
-from steelyard.team.payload.bias_models import (
-    Models,
-    Recordings,
-    condition_of,
-    gain_spread,
-    ladder_of,
-    shown_of,
-    without_gain,
-)
+from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
 from steelyard.team.payload.model import Group, least_noise, normal, residual_scatter
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
@@ -76,9 +68,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
             for part in group.parts
         ]
         models = Models.of(normals, C, ladder, scale)
-        weight = models.share
-        phi, best = models.mean(), int(np.argmax(weight))
-        beside = models.recordings(best)
+        phi, beside = models.mean(), models.recordings(models.best)
         renewed = tuple(_judged(g, D, beside, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
         change = max(
             float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max())
@@ -93,18 +83,12 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     # in the noise already.
     last = groups[-1]
     covariance = covariance * (1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0))
-    gain = gain_spread(weight, ladder)
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
-    blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
-    noise = sum((n.noise for n in normals), np.zeros((10, 10)))
-    unit = np.outer(scale, scale)
-    values, vectors = np.linalg.eigh((models.information[best] - noise) * unit)
-    shown = shown_of(values, vectors, noise * unit)
-    condition = condition_of(values, shown)
+    blind, shown = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts)), models.shown(scale)
     return PayloadFit(
-        phi, covariance, vectors[:, ~shown], scale, models.information[best], condition, gain,
-        without_gain(weight, ladder), groups, weights, blind, _residual(groups),
-        float(models.chi2[best]) / max(6 * rows - 10, 1.0),
+        phi, covariance, shown.lost, scale, models.information[models.best], shown.condition, models.gain,
+        models.gainless, groups, weights, blind, _residual(groups),
+        float(models.chi2[models.best]) / max(6 * rows - 10, 1.0),
     )  # fmt: skip
 
 
