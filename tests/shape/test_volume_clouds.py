@@ -21,7 +21,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
-from steelyard.workshop.solids import block, ring, rod
+from steelyard.workshop.solids import block, ring, rod, threaded
 
 Drawn = tuple[np.ndarray, np.ndarray]
 
@@ -80,6 +80,21 @@ def test_sheet_metal_of_which_both_faces_are_seen_stays_thin(body: object, least
     solid = enclose(Cloud(pose.apply(made.cloud.xyz)))
     assert least < solid.mesh.volume / made.volume < 1.1
     assert "thin-thickened" not in codes(solid)
+
+
+@pytest.mark.parametrize("points", [2000, 4000])
+@pytest.mark.parametrize(
+    ("radius", "length", "pitch", "depth"), [(20.0, 120.0, 6.0, 3.0), (16.0, 114.0, 4.3, 2.9), (12.0, 100.0, 4.0, 2.0)]
+)
+def test_threads_as_deep_as_points_are_far_apart_do_not_turn_a_bolt_inside_out(
+    radius: float, length: float, pitch: float, depth: float, points: int
+) -> None:
+    # 0.63 to 0.83 of the volume, without a word, by what was taken for sheets in the thread.
+    head = rod(1.8 * radius, length - 1, length + 25)
+    made = sheet(threaded(radius, 0, length, pitch, depth) + head, points)
+    solid = enclose(made.cloud)
+    assert solid.mesh.volume == pytest.approx(made.volume, rel=0.03)
+    assert codes(solid) == set()
 
 
 def test_small_free_groups_of_cells_go_unless_a_point_needs_them(brick: Sheet) -> None:

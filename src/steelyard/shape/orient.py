@@ -46,6 +46,7 @@ class Oriented:
     tree     of the points
     delaunay  their Delaunay complex
     spacing  median of the points
+    alone    (N, 3) the normals before any sheet was looked at; None where the cloud brought its own
     """
 
     xyz: Array
@@ -55,6 +56,14 @@ class Oriented:
     tree: Tree
     delaunay: Complex
     spacing: float
+    alone: Array | None = None
+
+    @property
+    def without_sheets(self) -> Oriented | None:
+        """The same surface with its normals from dipoles alone; None where the cloud brought its own."""
+        if self.alone is None:
+            return None
+        return replace(self, normals=self.alone, area=areas(self.near, self.alone), alone=None)
 
 
 def oriented(cloud: Cloud) -> Oriented:
@@ -62,11 +71,12 @@ def oriented(cloud: Cloud) -> Oriented:
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
     near, tree = cloud.near.scaled(1 / cloud.diagonal), Tree.of(xyz)
     delaunay, spacing = Complex.of(xyz, tree.order), float(np.median(near.spacing))
-    normals = cloud.normals
+    normals, alone = cloud.normals, None
     if normals is None:
         sight = Sight.of(tree, tree)
-        normals = on_sheets(xyz, consistent(sight, spacing), near, delaunay, sight, spacing, None)
-    return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing)
+        alone = consistent(sight, spacing)
+        normals = on_sheets(xyz, alone, near, delaunay, sight, spacing, None)
+    return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing, alone)
 
 
 def walled(surface: Oriented) -> Oriented | None:
