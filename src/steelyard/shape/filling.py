@@ -67,9 +67,10 @@ def clearer_alone(used: Cloud, surface: Oriented, found: Filled) -> tuple[Orient
     """Return the surface and its cells without what sheets said, where these are clear and clearer.
 
     Relief as deep as the points are far apart, as of threads and ribs, looks like sheets that face each other: what
-    they say of their sides then turns whole rods inside out, where dipoles alone are right.
+    they say of their sides then turns whole rods inside out, where dipoles alone are right. Walls that are two layers
+    are sheets.
     """
-    alone = surface.without_sheets
+    alone = surface.without_sheets if surface.layers is None else None
     if alone is None or float(((alone.normals * surface.normals).sum(1) < 0).mean()) < _UPSET:
         return surface, found
     alone = outward(alone)
@@ -134,7 +135,7 @@ def _blur(volumes: Array, found: Array, votes: Array) -> float:
 def _contradictions(surface: Oriented) -> float:
     """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
     xyz, normals, index = surface.xyz, surface.normals, surface.near.index
-    plane, link = sheet_planes(xyz, index, SLOPE)
+    plane, link = sheet_planes(xyz, index, SLOPE, surface.layers)
     link = signed_links(link, plane, normals, index)
     ties = Ties.of(xyz, normals, index, link, surface.delaunay, surface.spacing)
     return stacked(xyz, normals, index, link) + ties.torn
