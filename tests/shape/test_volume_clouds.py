@@ -21,7 +21,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
-from steelyard.workshop.solids import block, ring, rod, threaded
+from steelyard.workshop.solids import block, knurled, ring, rod, threaded
 
 Drawn = tuple[np.ndarray, np.ndarray]
 
@@ -194,6 +194,21 @@ def test_patches_of_normals_that_are_turned_do_not_cost_the_volume(body: object,
     assert "normals-flipped" not in codes(right)
     assert "normals-flipped" in codes(wrong)
     assert wrong.mesh.volume == pytest.approx(made.volume, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [knurled(40, 0, 20, 36, 8), knurled(40, 0, 20, 32, 8), threaded(24, 0, 80, 7, 4)],
+    ids=["gear", "cog", "worm"],
+)
+def test_right_normals_in_narrow_grooves_are_kept(body: object) -> None:
+    # Facing flanks nearer than their neighbours looked like patches of turned normals.
+    made = sheet(body)
+    xyz, normals, *_ = spread_evenly(made.mesh, np.random.default_rng(1), 2000)
+    solid = enclose(Cloud(xyz, normals=normals))
+    assert codes(solid) == set()
+    assert solid.cloud.normals == pytest.approx(normals, abs=1e-9)
+    assert score(solid.mesh, true_solid(made.mesh, 20_000)).iou > 0.94
 
 
 @pytest.mark.parametrize(("turned", "said"), [(0, set()), (1200, {"normals-flipped"}), (500, {"normals-flipped"})])

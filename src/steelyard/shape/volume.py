@@ -44,6 +44,7 @@ _CLEARER = 0.5  # of that doubt: no more is left without such normals
 # tenth of the points turned: 0.005 and more; right ones 0.003 in most clouds, 0.1 on thin walls), and the share of them
 # that is left where points alone tell better.
 _TORN, _MENDED = 0.004, 0.8
+_PATCHES = 0.05  # of the points: fewer that change sides are walls and gaps too narrow for neighbours, no patches
 # Standard deviation of the volume: of any solid; per share between points of round surfaces and their chords; per share
 # of cells unsure; per share that a skin as thick as the noise has; where walls blur; per share left open.
 _STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
@@ -193,8 +194,16 @@ def _anew(used: WorkingCloud, surface: Oriented, found: Filled) -> tuple[Solid, 
         return None
     if found.doubt > _BY_CHANCE and anew[2] < _CLEARER * found.doubt:
         return anew
-    left = torn(surface.xyz, np.asarray(anew[0].cloud.normals), surface.near.index, SLOPE)
-    return anew if split > _TORN and left < _MENDED * split and anew[2] <= found.doubt else None
+    normals = np.asarray(anew[0].cloud.normals)
+    left, share = torn(surface.xyz, normals, surface.near.index, SLOPE), _apart(normals, surface.normals)
+    patches = share > _PATCHES or found.doubt > _BLURRED
+    return anew if split > _TORN and left < _MENDED * split and patches and anew[2] <= found.doubt else None
+
+
+def _apart(some: Array, others: Array) -> float:
+    """Return the share of normals (N, 3) that face another way, once most of both face the same way."""
+    turned = float(((some * others).sum(1) < 0).mean())
+    return min(turned, 1 - turned)
 
 
 def _without_normals(used: WorkingCloud, why: str) -> tuple[Solid, TetMesh, float]:
