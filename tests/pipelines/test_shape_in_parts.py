@@ -13,6 +13,8 @@ import steelyard as sy
 from steelyard.api import saved_parts
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
+from steelyard.inertia import InertialParameters
+from steelyard.inertia.solids import box
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.options import Options
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
@@ -20,6 +22,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.placement import Placement
 from steelyard.shape.scan import fuse
 from steelyard.simulate import hammer
+from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.sampling import surface_cloud
 
@@ -166,6 +169,32 @@ def two_blocks() -> Cloud:
     return Cloud(xyz * sides, red.astype(np.uint8))
 
 
+def halves(side: float, low: float, seed: int) -> tuple[Cloud, InertialParameters]:
+    """A cube, steel above a height and plastic below: points of its faces in two colours, and its parameters."""
+    rng = np.random.default_rng(seed)
+    xyz = rng.uniform(-side / 2, side / 2, (2000, 3))
+    xyz[np.arange(2000), rng.choice(3, 2000)] = rng.choice([-side / 2, side / 2], 2000)
+    rgb = np.where(xyz[:, 2:] > low, [[178, 176, 172]], [[186, 52, 38]]).astype(np.uint8)
+    steel, plastic = side / 2 - low, side / 2 + low
+    below = Pose(Rotation.identity(), np.array([0, 0, (low - side / 2) / 2]))
+    above = Pose(Rotation.identity(), np.array([0, 0, (low + side / 2) / 2]))
+    body = box(side, side, steel, 7850).in_frame(above) + box(side, side, plastic, 1150).in_frame(below)
+    return Cloud(xyz, rgb), body
+
+
+@pytest.mark.parametrize("seed", [0, 1, 2])
+def test_bars_hold_borders_that_nobody_sees_inside_a_thick_body(seed: int) -> None:
+    cloud, body = halves(0.06, 0.0075, seed)
+    shape = shape_of(cloud)
+    assert shape.segmentation.border_share > 0.05
+    assert shape_of(two_blocks()).segmentation.border_share < 0.05
+    X_SO = Pose(Rotation.exp([0.3, -0.5, 0.4]), np.array([0.01, -0.02, 0.1]))
+    true = body.in_frame(X_SO)
+    found = sy.identify(handling_log(true, noise="low", seed=seed), scan=shape, pose_in_sensor=X_SO)
+    off = np.abs(np.asarray(found.parameters.people).ravel() - np.asarray(true.people).ravel()) / found.std
+    assert off.max() < 3.0
+
+
 def test_parts_that_were_asked_for_or_joined_by_hand_are_all_that_a_log_is_offered() -> None:
     free = shape_of(two_blocks())
     assert len(free.segmentation) == 2
@@ -173,8 +202,8 @@ def test_parts_that_were_asked_for_or_joined_by_hand_are_all_that_a_log_is_offer
     assert shape_of(two_blocks(), parts=1).cuts().numbers == (1,)
     joined = replace(free, segmentation=free.segmentation.merged([[0, 1]]))
     assert joined.cuts().numbers == (1,)
-    # What the solid does not know of itself goes with its parts.
-    assert joined.parts.stretch == free.error.stretch > 0
+    # What the solid does not know of itself goes with its parts; no border between them is left.
+    assert 0 < joined.parts.stretch == joined.error.stretch < free.error.stretch
     assert joined.parts.com_std == free.error.com_m
     with pytest.raises(BadValue, match="none empty"):
         free.segmentation.merged([[0], []])

@@ -21,7 +21,7 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import Sheet, channel, sheet_of, sheets
-from steelyard.workshop.solids import block, ring, rod
+from steelyard.workshop.solids import block, knurled, ring, rod, threaded
 
 Drawn = tuple[np.ndarray, np.ndarray]
 
@@ -80,6 +80,21 @@ def test_sheet_metal_of_which_both_faces_are_seen_stays_thin(body: object, least
     solid = enclose(Cloud(pose.apply(made.cloud.xyz)))
     assert least < solid.mesh.volume / made.volume < 1.1
     assert "thin-thickened" not in codes(solid)
+
+
+@pytest.mark.parametrize("points", [2000, 4000])
+@pytest.mark.parametrize(
+    ("radius", "length", "pitch", "depth"), [(20.0, 120.0, 6.0, 3.0), (16.0, 114.0, 4.3, 2.9), (12.0, 100.0, 4.0, 2.0)]
+)
+def test_threads_as_deep_as_points_are_far_apart_do_not_turn_a_bolt_inside_out(
+    radius: float, length: float, pitch: float, depth: float, points: int
+) -> None:
+    # 0.63 to 0.83 of the volume, without a word, by what was taken for sheets in the thread.
+    head = rod(1.8 * radius, length - 1, length + 25)
+    made = sheet(threaded(radius, 0, length, pitch, depth) + head, points)
+    solid = enclose(made.cloud)
+    assert solid.mesh.volume == pytest.approx(made.volume, rel=0.03)
+    assert codes(solid) == set()
 
 
 def test_small_free_groups_of_cells_go_unless_a_point_needs_them(brick: Sheet) -> None:
@@ -179,6 +194,21 @@ def test_patches_of_normals_that_are_turned_do_not_cost_the_volume(body: object,
     assert "normals-flipped" not in codes(right)
     assert "normals-flipped" in codes(wrong)
     assert wrong.mesh.volume == pytest.approx(made.volume, rel=0.1)
+
+
+@pytest.mark.parametrize(
+    "body",
+    [knurled(40, 0, 20, 36, 8), knurled(40, 0, 20, 32, 8), threaded(24, 0, 80, 7, 4)],
+    ids=["gear", "cog", "worm"],
+)
+def test_right_normals_in_narrow_grooves_are_kept(body: object) -> None:
+    # Facing flanks nearer than their neighbours looked like patches of turned normals.
+    made = sheet(body)
+    xyz, normals, *_ = spread_evenly(made.mesh, np.random.default_rng(1), 2000)
+    solid = enclose(Cloud(xyz, normals=normals))
+    assert codes(solid) == set()
+    assert solid.cloud.normals == pytest.approx(normals, abs=1e-9)
+    assert score(solid.mesh, true_solid(made.mesh, 20_000)).iou > 0.94
 
 
 @pytest.mark.parametrize(("turned", "said"), [(0, set()), (1200, {"normals-flipped"}), (500, {"normals-flipped"})])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from steelyard.evaluate.solids import score, true_solid
-from steelyard.shape import volume
+from steelyard.shape import filling
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.complex import Complex
 from steelyard.shape.orient import SLOPE, Oriented, oriented, walled
@@ -84,7 +84,7 @@ def test_what_is_clear_is_not_looked_at_again(monkeypatch: pytest.MonkeyPatch) -
     def never(surface: Oriented) -> Oriented:
         raise AssertionError
 
-    monkeypatch.setattr(volume, "walled", never)
+    monkeypatch.setattr(filling, "walled", never)
     made = sheet_of("a channel", channel(100, 12, 15, 2), np.random.default_rng(0), 1500)
     enclose(made.cloud)
 
@@ -92,9 +92,9 @@ def test_what_is_clear_is_not_looked_at_again(monkeypatch: pytest.MonkeyPatch) -
 def test_a_thickness_that_empties_the_tool_is_not_believed(grip: Tool, monkeypatch: pytest.MonkeyPatch) -> None:
     cloud = Cloud(surface_cloud(grip).xyz)
     thin = enclose(cloud)
-    monkeypatch.setattr(volume, "_LEFT", 0.99)
+    monkeypatch.setattr(filling, "_LEFT", 0.99)
     kept = enclose(cloud)
-    monkeypatch.setattr(volume, "walled", lambda surface: None)
+    monkeypatch.setattr(filling, "walled", lambda surface: None)
     without = enclose(cloud)
     assert thin.mesh.volume < 0.9 * kept.mesh.volume
     assert (kept.mesh.volume, kept.volume_std) == (without.mesh.volume, without.volume_std)

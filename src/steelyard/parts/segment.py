@@ -73,6 +73,24 @@ class Segmentation:
         return Parts(np.arange(len(self)), self.mesh.moments(self.labels, len(self)), self.rgb)
 
     @property
+    def border_share(self) -> float:
+        """Share of the volume that corners of another part say, of cells that reach from one part to another.
+
+        Inside a thick body nothing shows where the border lies, and cells reach through it.
+        """
+        foreign = (self._vertex_part[self.mesh.tets] != self.labels[:, None]).mean(1)
+        return float((self.mesh.volumes * foreign).sum() / self.mesh.volume)
+
+    @property
+    def _vertex_part(self) -> Integers:
+        """The part (V,) of every vertex: that of the nearest point."""
+        from scipy.spatial import cKDTree
+
+        if _same(self.cloud, self.mesh):
+            return self.point_part
+        return np.asarray(self.point_part[cKDTree(self.cloud.xyz).query(self.mesh.vertices)[1]])
+
+    @property
     def sureness(self) -> Array:
         """Share (K,) of every number of parts 1..K; see `Cuts.sureness`."""
         if self.cuts is None:

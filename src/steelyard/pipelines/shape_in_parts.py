@@ -29,6 +29,8 @@ LEAST_SURE = 0.03
 # Relative error of second moments over that of the volume: 1.2 where lengths err along all three axes, 2 where along
 # one only. With this, 95 % of the intervals of diagonal entries from scans of made tools hold the truth.
 STRETCH = 1.5
+# The same over the share of the volume that cells carry across borders between parts.
+BORDER = 0.6
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,7 +65,8 @@ class Shape:
     @property
     def error(self) -> ShapeError:
         """How wrong the shape may be: no less than a measured mesh, more as far as solid and cameras are unsure."""
-        error = MEASURED.at_least(self.solid.surface_m, STRETCH * self.solid.volume_std)
+        stretch = float(np.hypot(STRETCH * self.solid.volume_std, BORDER * self.segmentation.border_share))
+        error = MEASURED.at_least(self.solid.surface_m, stretch)
         placed = None if self.scan is None else self.scan.placement
         return error.laid(placed.std_m, placed.std_rad) if placed else error
 

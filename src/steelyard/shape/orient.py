@@ -11,6 +11,7 @@ from steelyard.check import Array
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.complex import Complex
 from steelyard.shape.discs import Discs
+from steelyard.shape.layers import Layers
 from steelyard.shape.sheets import sheet_planes
 from steelyard.shape.spacing import Neighbours, areas
 from steelyard.shape.ties import Ties
@@ -46,6 +47,8 @@ class Oriented:
     tree     of the points
     delaunay  their Delaunay complex
     spacing  median of the points
+    alone    (N, 3) the normals before any sheet was looked at; None where the cloud brought its own
+    layers   of its walls, where these are thinner than the spacing
     """
 
     xyz: Array
@@ -55,6 +58,15 @@ class Oriented:
     tree: Tree
     delaunay: Complex
     spacing: float
+    alone: Array | None = None
+    layers: Layers | None = None
+
+    @property
+    def without_sheets(self) -> Oriented | None:
+        """The same surface with its normals from dipoles alone; None where the cloud brought its own."""
+        if self.alone is None:
+            return None
+        return replace(self, normals=self.alone, area=areas(self.near, self.alone), alone=None)
 
 
 def oriented(cloud: Cloud) -> Oriented:
@@ -62,21 +74,23 @@ def oriented(cloud: Cloud) -> Oriented:
     xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
     near, tree = cloud.near.scaled(1 / cloud.diagonal), Tree.of(xyz)
     delaunay, spacing = Complex.of(xyz, tree.order), float(np.median(near.spacing))
-    normals = cloud.normals
+    normals, alone, layers = cloud.normals, None, None
     if normals is None:
         sight = Sight.of(tree, tree)
-        normals = on_sheets(xyz, consistent(sight, spacing), near, delaunay, sight, spacing, None)
-    return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing)
+        alone = consistent(sight, spacing)
+        layers = Layers.of(xyz, near.index)
+        normals = on_sheets(xyz, alone, near, delaunay, sight, spacing, None, layers)
+    return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing, alone, layers)
 
 
 def walled(surface: Oriented) -> Oriented | None:
     """Return a surface whose sides were found anew from the thickness of its walls; None where they have no one."""
     xyz, near, delaunay, spacing = surface.xyz, surface.near, surface.delaunay, surface.spacing
-    wall = Wall.of(xyz, surface.normals, *sheet_planes(xyz, near.index, SLOPE), delaunay, spacing)
+    wall = Wall.of(xyz, surface.normals, *sheet_planes(xyz, near.index, SLOPE, surface.layers), delaunay, spacing)
     if wall is None:
         return None
     sight = Sight.of(surface.tree, surface.tree)
-    normals = on_sheets(xyz, surface.normals, near, delaunay, sight, spacing, wall)
+    normals = on_sheets(xyz, surface.normals, near, delaunay, sight, spacing, wall, surface.layers)
     return replace(surface, normals=normals, area=areas(near, normals))
 
 
@@ -99,17 +113,18 @@ def consistent(sight: Sight, spacing: float) -> Array:
 
 
 def on_sheets(
-    xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sight: Sight, spacing: float, wall: Wall | None
-) -> Array:
+    xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sight: Sight, spacing: float, wall: Wall | None,
+    layers: Layers | None = None,
+) -> Array:  # fmt: skip
     """Return unit normals (N, 3), those of points on flat pieces of surface decided piece by piece.
 
     In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
     toward a winding number of 1/2 at every point and spread along each sheet and across to those that face it, in
     turn. Points off them, as on edges, are then found anew, with the sheets as they are. Where all walls are of one
-    thickness, what lies between sheets so far apart is in the solid.
+    thickness, what lies between sheets so far apart is in the solid; where they are two layers, these face apart.
     """
     tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
-    plane, link = sheet_planes(xyz, near.index, SLOPE)
+    plane, link = sheet_planes(xyz, near.index, SLOPE, layers)
     ties = Ties.of(xyz, plane, near.index, link, delaunay, spacing)
     if wall:
         ties = ties.told(wall.outward(plane))

@@ -8,16 +8,19 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.layers import Layers
 from steelyard.shape.mesh import Integers
+from steelyard.shape.plane_axis import least_axis
 
 _PARALLEL = 0.7  # cosine between the planes of neighbours on one sheet, at least
 
 
-def sheet_planes(xyz: Array, index: Integers, slope: float) -> tuple[Array, Array]:
+def sheet_planes(xyz: Array, index: Integers, slope: float, layers: Layers | None = None) -> tuple[Array, Array]:
     """Return planes (N, 3) through points (N, 3), of either sign, and how much each neighbour is on the same one.
 
     index   (N, K) neighbours, nearest first
     slope   of the line to a neighbour against both planes, at which the link has fallen to 1/e
+    layers  of walls thinner than the spacing, where there are any: neighbours across them look the other way
 
     The second (N, K) is negative where a linked plane has the other sign. Where two sheets of a wall lie close, the
     first plane is that of both; then only neighbours on the point's own sheet shape it.
@@ -25,7 +28,8 @@ def sheet_planes(xyz: Array, index: Integers, slope: float) -> tuple[Array, Arra
     normal = _first_planes(xyz, index, min(_FIRST, index.shape[1]))
     for widened in (2.0, 1.4):
         normal = _own_planes(xyz, normal, index, _links(xyz, normal, index, widened * slope))
-    return normal, np.asarray(_links(xyz, normal, index, slope))
+    link = np.asarray(_links(xyz, normal, index, slope))
+    return (normal, link) if layers is None else layers.told(normal, link, index)
 
 
 def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
@@ -65,36 +69,6 @@ _LEAST = 4.0  # links that a plane needs to be drawn anew
 
 
 @numba.njit(cache=True, nogil=True)
-def _least_axis(xx: float, xy: float, xz: float, yy: float, yz: float, zz: float) -> tuple[float, float, float]:
-    """Return the unit axis of the least spread of a covariance.
-
-    Source: Smith 1961, eigenvalues of a symmetric 3 x 3 matrix.
-    """
-    mean = (xx + yy + zz) / 3
-    size = (xx - mean) ** 2 + (yy - mean) ** 2 + (zz - mean) ** 2 + 2 * (xy * xy + xz * xz + yz * yz)
-    size = math.sqrt(size / 6)
-    if size == 0:
-        return 0.0, 0.0, 1.0
-    xx, yy, zz, xy, xz, yz = (xx - mean) / size, (yy - mean) / size, (zz - mean) / size, xy / size, xz / size, yz / size
-    half = (xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz)) / 2
-    least = 2 * math.cos(math.acos(min(1.0, max(-1.0, half))) / 3 + 2 * math.pi / 3)
-    xx, yy, zz = xx - least, yy - least, zz - least
-    bx, by, bz, most = 0.0, 0.0, 1.0, 1e-24
-    for k in range(3):  # the axis is across any two rows; the longest product is the surest
-        if k == 0:
-            ux, uy, uz = xy * yz - xz * yy, xz * xy - xx * yz, xx * yy - xy * xy
-        elif k == 1:
-            ux, uy, uz = xy * zz - xz * yz, xz * xz - xx * zz, xx * yz - xy * xz
-        else:
-            ux, uy, uz = yy * zz - yz * yz, yz * xz - xy * zz, xy * yz - yy * xz
-        found = ux * ux + uy * uy + uz * uz
-        if found > most:
-            bx, by, bz, most = ux, uy, uz, found
-    length = math.sqrt(bx * bx + by * by + bz * bz)
-    return bx / length, by / length, bz / length
-
-
-@numba.njit(cache=True, nogil=True)
 def _plane(xyz: Array, i: int, neighbours: Integers, weight: Array, out: Array) -> None:
     """Write the plane through point i and weighted neighbours into out (3,)."""
     x, y, z = xyz[i]
@@ -107,7 +81,7 @@ def _plane(xyz: Array, i: int, neighbours: Integers, weight: Array, out: Array) 
         sx, sy, sz = sx + w * dx, sy + w * dy, sz + w * dz
         xx, xy, xz = xx + w * dx * dx, xy + w * dx * dy, xz + w * dx * dz
         yy, yz, zz = yy + w * dy * dy, yz + w * dy * dz, zz + w * dz * dz
-    out[0], out[1], out[2] = _least_axis(
+    out[0], out[1], out[2] = least_axis(
         xx - sx * sx / total,
         xy - sx * sy / total,
         xz - sx * sz / total,

@@ -23,6 +23,12 @@ def blurred_walls(cloud: Cloud, apart: float, doubt: float) -> Finding:
     return Finding.of("thin-thickened", text)
 
 
+def thinner_than_seen(thickness: float, apart: float) -> Finding:
+    """Return that walls `thickness` [mm] thick are lost in part between points `apart` [mm]."""
+    text = f"Walls are about {thickness:.2g} mm thick, and points {apart:.2g} mm apart: some of what they hold is lost."
+    return Finding.of("thin-thickened", text)
+
+
 def within_noise(share: float, noise: float) -> Finding:
     """Return that walls or gaps at a share of the points are thinner than their noise [m] lets see."""
     text = f"Walls or gaps at {100 * share:.0f} % of the points are thinner than {_WITHIN:.0f} times their "

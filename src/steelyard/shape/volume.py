@@ -7,42 +7,34 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.canonical import canonical
-from steelyard.shape.cells import cells
 from steelyard.shape.chords import lacking
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.discs import Discs
-from steelyard.shape.islands import without_islands
+from steelyard.shape.filling import CLEAR, Filled, by_walls, clearer_alone, filled, outward
 from steelyard.shape.mesh import Integers
-from steelyard.shape.orient import DEPTH, SLOPE, Oriented, oriented, signed_links, walled
-from steelyard.shape.sheets import sheet_planes, stacked, torn
+from steelyard.shape.orient import SLOPE, Oriented, oriented
+from steelyard.shape.sheets import torn
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.thin_walls import blurred_walls, share_within_noise, within_noise
-from steelyard.shape.ties import Ties
-from steelyard.shape.tree import Tree
-from steelyard.shape.winding import Sight
+from steelyard.shape.thin_walls import blurred_walls, share_within_noise, thinner_than_seen, within_noise
 
 if TYPE_CHECKING:
     from steelyard.shape.working_cloud import WorkingCloud
 
 POINTS = 4000
-_JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
-# Doubt (see `_doubt` and `_contradictions`) above which walls could not be told from gaps. Found on made sheets: nearly
+# Doubt (see `filling`) above which walls could not be told from gaps. Found on made sheets: nearly
 # all whose volume comes out wrong lie above it, and few of the others.
 _BLURRED = 0.41
 _UNCLEAR = 0.38  # doubt above which one thickness of the walls is looked for
-_LEFT = 0.5  # of the volume, at least, or it was not the walls' thickness that was found
-_SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
-_CLEAR = 0.2  # doubt below which no sheets need be looked at
 _FEWER, _LEAST_OF_FEWER = (2, 4), 1000  # one point in so many is tried where noise leaves doubt; not fewer points
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
 # Length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface. Above this a side is
 # missing (0.12 and more without an underside). Patterns of points that are unlike on two sides leave up to 0.10, or
 # 0.135 where one is five times as dense.
 _OPEN = 0.11
+_LOST = 0.4  # of the spacing: thinner walls, told by their layers, lose 8 to 45 % of their volume
 _NOISY = 0.3  # of the points: so many that are nearer to the other side make the solid doubtful
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Doubt above which normals that come with a cloud may be wrong: thin walls reach 0.44, a tenth of them turned 0.67.
@@ -52,6 +44,7 @@ _CLEARER = 0.5  # of that doubt: no more is left without such normals
 # tenth of the points turned: 0.005 and more; right ones 0.003 in most clouds, 0.1 on thin walls), and the share of them
 # that is left where points alone tell better.
 _TORN, _MENDED = 0.004, 0.8
+_PATCHES = 0.05  # of the points: fewer that change sides are walls and gaps too narrow for neighbours, no patches
 # Standard deviation of the volume: of any solid; per share between points of round surfaces and their chords; per share
 # of cells unsure; per share that a skin as thick as the noise has; where walls blur; per share left open.
 _STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
@@ -81,24 +74,6 @@ class Solid:
     inside: Integers | None = None
 
 
-@dataclass(frozen=True, eq=False)
-class _Filled:
-    """Which cells of a complex lie inside.
-
-    mesh    all T cells
-    score   (T,) above zero where the surface says inside
-    inside  (T,) whether each is, without free groups
-    solid   those that are
-    doubt   how little they look like a solid (see `_doubt` and `_contradictions`)
-    """
-
-    mesh: TetMesh
-    score: Array
-    inside: Mask
-    solid: TetMesh
-    doubt: float
-
-
 def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
     """Return the closed volume behind the points of a surface, with or without normals; nothing is thickened.
 
@@ -124,10 +99,10 @@ def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
     for most in (points // share for share in _FEWER if points >= share * _LEAST_OF_FEWER):
         used = working_cloud(cloud, most)
         try:
-            coarse, doubt = _made(used)
+            coarse, doubt = _made(used) if used.noise else (made, np.inf)
         except BadValue:  # they enclose nothing
             continue
-        if used.noise and doubt < _CLEAR and not _has(coarse, "thin-thickened", "surface-open"):
+        if doubt < CLEAR and not _has(coarse, "thin-thickened", "surface-open"):
             return coarse
     return made
 
@@ -138,7 +113,7 @@ def _enclosed_by(cloud: Cloud, points: int) -> Solid:
 
     used = working_cloud(cloud, points)
     made, doubt = _made(used)
-    if used.along or (doubt < (_CLEAR if used.noise else _BLURRED) and not (used.noise and _has(made, "surface-open"))):
+    if used.along or (doubt < (CLEAR if used.noise else _BLURRED) and not (used.noise and _has(made, "surface-open"))):
         return made
     # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
     other = working_cloud(cloud, points, settle=not used.noise)
@@ -187,20 +162,21 @@ def _enclosed(used: WorkingCloud) -> tuple[Solid, TetMesh, float]:
     """
     cloud = used.cloud
     surface, turned = _oriented(cloud)
-    found = _filled(cloud, surface)
+    found = filled(cloud, surface)
     anew = None if cloud.normals is None else _anew(used, surface, found)
     if anew is not None:
         return anew
+    surface, found = clearer_alone(cloud, surface, found)
     doubt = found.doubt
     if cloud.normals is None and doubt > _UNCLEAR:
         as_found = surface
-        surface, found = _by_walls(cloud, surface, found)
+        surface, found = by_walls(cloud, surface, found)
         doubt = doubt if surface is as_found else 0.0
     made = _solid(used, surface, found, turned)
     return replace(made, inside=np.flatnonzero(found.inside)), found.mesh, doubt
 
 
-def _anew(used: WorkingCloud, surface: Oriented, found: _Filled) -> tuple[Solid, TetMesh, float] | None:
+def _anew(used: WorkingCloud, surface: Oriented, found: Filled) -> tuple[Solid, TetMesh, float] | None:
     """Return the closed volume of points whose normals are not to be trusted, found without them; None where they are.
 
     Most that turn normals outward turn whole patches inward here and there: neighbours on one sheet then face
@@ -218,8 +194,16 @@ def _anew(used: WorkingCloud, surface: Oriented, found: _Filled) -> tuple[Solid,
         return None
     if found.doubt > _BY_CHANCE and anew[2] < _CLEARER * found.doubt:
         return anew
-    left = torn(surface.xyz, np.asarray(anew[0].cloud.normals), surface.near.index, SLOPE)
-    return anew if split > _TORN and left < _MENDED * split and anew[2] <= found.doubt else None
+    normals = np.asarray(anew[0].cloud.normals)
+    left, share = torn(surface.xyz, normals, surface.near.index, SLOPE), _apart(normals, surface.normals)
+    patches = share > _PATCHES or found.doubt > _BLURRED
+    return anew if split > _TORN and left < _MENDED * split and patches and anew[2] <= found.doubt else None
+
+
+def _apart(some: Array, others: Array) -> float:
+    """Return the share of normals (N, 3) that face another way, once most of both face the same way."""
+    turned = float(((some * others).sum(1) < 0).mean())
+    return min(turned, 1 - turned)
 
 
 def _without_normals(used: WorkingCloud, why: str) -> tuple[Solid, TetMesh, float]:
@@ -228,89 +212,14 @@ def _without_normals(used: WorkingCloud, why: str) -> tuple[Solid, TetMesh, floa
     return _enclosed(used._replace(cloud=replace(used.cloud, normals=None), findings=findings))
 
 
-def _filled(used: Cloud, surface: Oriented) -> _Filled:
-    """Return the cells that lie behind a surface. Raises BadValue where there are none."""
-    mesh, centres, votes = cells_of(used.xyz, surface)
-    found = _winding_number(surface, centres)
-    score = found - 0.5 + votes
-    if not (score > 0).any():
-        raise BadValue(
-            "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
-        )
-    inside = without_islands(mesh, score > 0, _SPAN * surface.spacing * used.diagonal)
-    doubt = _doubt(mesh.volumes, found, votes)
-    if doubt > _CLEAR:
-        doubt += _contradictions(surface)
-    return _Filled(mesh, score, inside, mesh.chosen(inside), doubt)
-
-
-def _by_walls(used: Cloud, surface: Oriented, found: _Filled) -> tuple[Oriented, _Filled]:
-    """Return the surface and its cells found anew from the one thickness of its walls, or as they are if it has none.
-
-    Doubt stays: what a thickness tells is likely, not seen.
-    """
-    again = walled(surface)
-    if again is None:
-        return surface, found
-    again = _outward(again)
-    emptied = _filled(used, again)
-    if emptied.solid.volume < _LEFT * found.solid.volume:
-        return surface, found
-    return again, replace(emptied, doubt=max(found.doubt, emptied.doubt))
-
-
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
     """Return the cloud's surface elements; normals that came with it and all point inward are turned."""
     surface = oriented(cloud)
-    turned = _outward(surface)
+    turned = outward(surface)
     if turned is surface or cloud.normals is None:
         return turned, ()
     text = "All normals that came with the cloud point into the solid; they were turned."
     return turned, (Finding.of("normals-flipped", text),)
-
-
-def _outward(surface: Oriented) -> Oriented:
-    """Return the surface, all of it turned if it is inside out."""
-    # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
-    inside_out = surface.delaunay.flux(surface.xyz, surface.normals, surface.spacing) < 0
-    return replace(surface, normals=-surface.normals) if inside_out else surface
-
-
-def cells_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
-    """Return the Delaunay cells of points (N, 3) [m], their centroids (T, 3) in units of the surface, and votes (T,).
-
-    A vote is how much the normals (-1..1) of its corners say that a cell lies inside.
-    """
-    made = surface.delaunay
-    tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.beside)
-    unit = (np.ptp(xyz, axis=0) ** 2).sum() ** 1.5
-    return TetMesh.known(xyz, tets, volumes * unit, neighbours), centres, votes
-
-
-def _winding_number(surface: Oriented, centres: Array) -> Array:
-    """Return the winding number (T,) of the surface at centroids of cells."""
-    targets = Tree.of(centres)
-    discs = Discs.on(surface.tree, surface.normals, surface.area, DEPTH, _JUMP * surface.spacing)
-    found = targets.back(discs.winding(Sight.of(targets, surface.tree)))
-    return np.asarray(np.clip(found, 0, 2), float)
-
-
-def _doubt(volumes: Array, found: Array, votes: Array) -> float:
-    """Return how little the cells inside look like it: 0 for a clean solid, 1/2 where walls and gaps are one blur.
-
-    What their mean winding number lacks to 1, and twice the share of them that the normals call outside.
-    """
-    inside = volumes * (found - 0.5 + votes > 0)
-    return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
-
-
-def _contradictions(surface: Oriented) -> float:
-    """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
-    xyz, normals, index = surface.xyz, surface.normals, surface.near.index
-    plane, link = sheet_planes(xyz, index, SLOPE)
-    link = signed_links(link, plane, normals, index)
-    ties = Ties.of(xyz, normals, index, link, surface.delaunay, surface.spacing)
-    return stacked(xyz, normals, index, link) + ties.torn
 
 
 def _against(surface: Oriented, solid: TetMesh) -> float:
@@ -322,27 +231,39 @@ def _against(surface: Oriented, solid: TetMesh) -> float:
     return float(((out * surface.normals).sum(1) < _AGAINST * np.linalg.norm(out, axis=1)).mean())
 
 
-def _solid(used: WorkingCloud, surface: Oriented, found: _Filled, turned: tuple[Finding, ...]) -> Solid:
+def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[Finding, ...]) -> Solid:
     solid, diagonal, doubt = found.solid, used.cloud.diagonal, found.doubt
     sure = np.minimum(2 * found.score[found.inside], 1.0)
     total = float(surface.area.sum())
     gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
     noisy = share_within_noise(surface, used.noise / diagonal)
-    blurred, hole = doubt > _BLURRED, gap > _OPEN
-    thin = blurred or noisy > _NOISY
+    hole = gap > _OPEN
     findings = used.findings + turned
-    if thin:
-        apart = surface.spacing * diagonal * 1e3
-        findings += (blurred_walls(used.cloud, apart, doubt) if blurred else within_noise(noisy, used.noise),)
+    thin = _thin_walls(used, surface, doubt, noisy)
+    if thin is not None:
+        findings += (thin,)
     if hole:
         text = (
             f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
         )
         findings += (Finding.of("surface-open", text),)
     unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
-    wrong = thin or any(finding.code == "table-in-cloud" for finding in findings)
+    wrong = thin is not None or any(finding.code == "table-in-cloud" for finding in findings)
     few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
     skin = used.noise * total * diagonal**2 / solid.volume
     std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
     kept = replace(used.cloud, normals=surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
+
+
+def _thin_walls(used: WorkingCloud, surface: Oriented, doubt: float, noisy: float) -> Finding | None:
+    """Return what is said of walls too thin for the points, or for a share `noisy` of them in their noise."""
+    mm = used.cloud.diagonal * 1e3
+    apart = surface.spacing * mm
+    if doubt > _BLURRED:
+        return blurred_walls(used.cloud, apart, doubt)
+    if noisy > _NOISY:
+        return within_noise(noisy, used.noise)
+    if surface.layers is not None and surface.layers.thickness < _LOST * surface.spacing:
+        return thinner_than_seen(surface.layers.thickness * mm, apart)
+    return None

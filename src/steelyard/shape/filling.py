@@ -1,0 +1,141 @@
+"""The cells of a Delaunay complex that lie behind a surface, and how far they look like a solid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array, Mask
+from steelyard.errors import BadValue
+from steelyard.shape.cells import cells
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.discs import Discs
+from steelyard.shape.islands import without_islands
+from steelyard.shape.orient import DEPTH, SLOPE, Oriented, signed_links, walled
+from steelyard.shape.sheets import sheet_planes, stacked
+from steelyard.shape.tets import TetMesh
+from steelyard.shape.ties import Ties
+from steelyard.shape.tree import Tree
+from steelyard.shape.winding import Sight
+
+CLEAR = 0.2  # doubt below which no sheets need be looked at
+_JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
+_LEFT = 0.5  # of the volume, at least, or it was not the walls' thickness that was found
+_SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
+# Share of the points that sheets turned above which the solid without them is looked at, and the share of its blur that
+# it leaves, at most, where sheets were seen that are none.
+_UPSET, _NO_SHEETS = 0.02, 0.8
+
+
+@dataclass(frozen=True, eq=False)
+class Filled:
+    """Which cells of a complex lie inside.
+
+    mesh    all T cells
+    score   (T,) above zero where the surface says inside
+    inside  (T,) whether each is, without free groups
+    solid   those that are
+    blur    how little their winding numbers look like a solid (see `_blur`)
+    doubt   the same, with what contradicts them (see `_contradictions`) where it is not clear
+    """
+
+    mesh: TetMesh
+    score: Array
+    inside: Mask
+    solid: TetMesh
+    blur: float
+    doubt: float
+
+
+def filled(used: Cloud, surface: Oriented) -> Filled:
+    """Return the cells that lie behind a surface. Raises BadValue where there are none."""
+    mesh, centres, votes = _cells_of(used.xyz, surface)
+    found = _winding_number(surface, centres)
+    score = found - 0.5 + votes
+    if not (score > 0).any():
+        raise BadValue(
+            "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
+        )
+    inside = without_islands(mesh, score > 0, _SPAN * surface.spacing * used.diagonal)
+    blur = _blur(mesh.volumes, found, votes)
+    doubt = blur + _contradictions(surface) if blur > CLEAR else blur
+    return Filled(mesh, score, inside, mesh.chosen(inside), blur, doubt)
+
+
+def clearer_alone(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
+    """Return the surface and its cells without what sheets said, where these are clear and clearer.
+
+    Relief as deep as the points are far apart, as of threads and ribs, looks like sheets that face each other: what
+    they say of their sides then turns whole rods inside out, where dipoles alone are right. Walls that are two layers
+    are sheets.
+    """
+    alone = surface.without_sheets if surface.layers is None else None
+    if alone is None or float(((alone.normals * surface.normals).sum(1) < 0).mean()) < _UPSET:
+        return surface, found
+    alone = outward(alone)
+    try:
+        again = filled(used, alone)
+    except BadValue:  # they enclose nothing
+        return surface, found
+    clear = again.blur < min(CLEAR, _NO_SHEETS * found.blur)
+    return (alone, again) if clear else (surface, found)
+
+
+def by_walls(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
+    """Return the surface and its cells found anew from the one thickness of its walls, or as they are if it has none.
+
+    Doubt stays: what a thickness tells is likely, not seen.
+    """
+    again = walled(surface)
+    if again is None:
+        return surface, found
+    again = outward(again)
+    emptied = filled(used, again)
+    if emptied.solid.volume < _LEFT * found.solid.volume:
+        return surface, found
+    return again, replace(emptied, doubt=max(found.doubt, emptied.doubt))
+
+
+def outward(surface: Oriented) -> Oriented:
+    """Return the surface, all of it turned if it is inside out."""
+    # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
+    inside_out = surface.delaunay.flux(surface.xyz, surface.normals, surface.spacing) < 0
+    return replace(surface, normals=-surface.normals) if inside_out else surface
+
+
+def _cells_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
+    """Return the Delaunay cells of points (N, 3) [m], their centroids (T, 3) in units of the surface, and votes (T,).
+
+    A vote is how much the normals (-1..1) of its corners say that a cell lies inside.
+    """
+    made = surface.delaunay
+    tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.beside)
+    unit = (np.ptp(xyz, axis=0) ** 2).sum() ** 1.5
+    return TetMesh.known(xyz, tets, volumes * unit, neighbours), centres, votes
+
+
+def _winding_number(surface: Oriented, centres: Array) -> Array:
+    """Return the winding number (T,) of the surface at centroids of cells."""
+    targets = Tree.of(centres)
+    discs = Discs.on(surface.tree, surface.normals, surface.area, DEPTH, _JUMP * surface.spacing)
+    found = targets.back(discs.winding(Sight.of(targets, surface.tree)))
+    return np.asarray(np.clip(found, 0, 2), float)
+
+
+def _blur(volumes: Array, found: Array, votes: Array) -> float:
+    """Return how little the cells inside look like it: 0 for a clean solid, 1/2 where walls and gaps are one blur.
+
+    What their mean winding number lacks to 1, and twice the share of them that the normals call outside.
+    """
+    inside = volumes * (found - 0.5 + votes > 0)
+    return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
+
+
+def _contradictions(surface: Oriented) -> float:
+    """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
+    xyz, normals, index = surface.xyz, surface.normals, surface.near.index
+    plane, link = sheet_planes(xyz, index, SLOPE, surface.layers)
+    link = signed_links(link, plane, normals, index)
+    ties = Ties.of(xyz, normals, index, link, surface.delaunay, surface.spacing)
+    return stacked(xyz, normals, index, link) + ties.torn

@@ -1,0 +1,70 @@
+"""Walls thinner than their points are apart: told by their two layers, and not filled."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from steelyard.shape.cloud import Cloud
+from steelyard.shape.layers import Layers
+from steelyard.shape.volume import enclose
+from steelyard.workshop.sheets import Sheet, sheet_of
+from steelyard.workshop.solids import ball, block, ring, rod, threaded
+
+
+def cup(across: float, height: float, wall: float) -> object:
+    return ring(across / 2, across / 2 - wall, 0, height) + rod(across / 2, 0, wall)
+
+
+def sheet(body: object, points: int = 2000) -> Sheet:
+    return sheet_of("a body", body, np.random.default_rng(0), points)
+
+
+def layers(xyz: np.ndarray) -> Layers | None:
+    return Layers.of(xyz, Cloud(xyz).near.index)
+
+
+@pytest.mark.parametrize("noise_mm", [0.0, 0.1])
+@pytest.mark.parametrize(
+    "body",
+    [ring(21, 20, 0, 169), ring(40, 38.6, 0, 200), ring(10.5, 9.6, 0, 200), cup(84, 120, 1.3), cup(70, 80, 0.9)],
+    ids=["tube", "wide tube", "narrow tube", "cup", "thin cup"],
+)
+def test_thin_cups_and_tubes_are_not_filled(body: object, noise_mm: float) -> None:
+    # 3.6 to 16 times the volume where both faces of a wall were told alike, half of them without a word.
+    made = sheet(body)
+    noise = 1e-3 * noise_mm * np.random.default_rng(1).standard_normal(made.cloud.xyz.shape)
+    solid = enclose(Cloud(made.cloud.xyz + noise))
+    ratio = solid.mesh.volume / made.volume
+    assert 0.65 < ratio < 1.1
+    assert abs(ratio - 1) < 0.15 or "thin-thickened" in {finding.code for finding in solid.findings}
+    assert abs(1 - 1 / ratio) < 2.5 * solid.volume_std
+
+
+def test_layers_are_those_of_the_wall() -> None:
+    wall = 0.9
+    made = sheet(block((0, 120), (0, 80), (0, wall)))
+    xyz = made.cloud.xyz
+    found = layers(xyz)
+    assert found is not None
+    assert found.thickness == pytest.approx(1e-3 * wall, rel=0.1)
+    upper = xyz[:, 2] > 0.5e-3 * wall
+    near = Cloud(xyz).near.index[:, : found.same.shape[1]]
+    truly = upper[near] == upper[:, None]
+    assert (found.same == truly)[found.two].mean() > 0.95
+    assert (np.abs(found.plane[found.two, 2]) > 0.99).mean() > 0.95
+
+
+@pytest.mark.parametrize("noise_mm", [0.0, 0.3])
+@pytest.mark.parametrize(
+    "body",
+    [ball((0, 0, 0), 40), block((0, 60), (0, 40), (0, 30)), threaded(16, 0, 114, 4.3, 2.9), ring(20, 12, 0, 60)],
+    ids=["ball", "brick", "thread", "thick tube"],
+)
+def test_thick_bodies_have_no_layers(body: object, noise_mm: float) -> None:
+    xyz = sheet(body).cloud.xyz
+    assert layers(xyz + 1e-3 * noise_mm * np.random.default_rng(1).standard_normal(xyz.shape)) is None
+
+
+def test_few_points_have_no_layers() -> None:
+    assert layers(np.random.default_rng(0).standard_normal((15, 3))) is None
