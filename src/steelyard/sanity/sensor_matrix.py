@@ -27,8 +27,8 @@ from steelyard.spatial import Rotation, cross_matrix
 TURN, UNLIKE, SURE = np.radians(1.0), 0.015, 8.0
 TURN_LEFT, UNLIKE_LEFT = 0.95, 0.99
 ELSEWHERE = {"base-tilted", "weight-compensated", "wrench-unexplained"}
-# Turns and stretches that a body and a bias mimic but for this share of their squares are not told (a sweep of one joint
-# keeps gravity within some 3 degrees of a plane of S): noise of the acceleration alone would decide them.
+# Turns and stretches that a body and a bias mimic but for this share of their squares are not told: noise of the
+# acceleration alone would decide them. A sweep of one joint keeps gravity within some 3 degrees of a plane of S.
 TOLD = 3e-3
 # The turn is linearised anew until it changes by less [rad].
 ROUNDS, SETTLED = 5, 1e-5

@@ -76,11 +76,11 @@ def two_masses(log: MotionLog) -> TwoMasses | None:
 
 
 def noise_share(log: MotionLog) -> float:
-    """Return the share of noise in the squared acceleration of moving rows, linear or angular, the larger one."""
+    """Return the share of its uncertainty in the squared acceleration of moving rows, linear or angular, the larger."""
     moving = ~log.still
     if log.noise is None or not moving.any():
         return 0.0
-    variance = np.stack([n.acceleration for n in log.noise])[log.noise_class][moving]
+    variance = np.stack([n.acceleration + n.taken for n in log.noise])[log.noise_class][moving]
     sizes = np.concatenate([log.angular_acceleration, log.acceleration], 1)[moving] ** 2
     shares = [variance[:, part].sum() / max(float(sizes[:, part].sum()), 1e-300) for part in (slice(0, 3), slice(3, 6))]
     return float(max(shares))
