@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.alignment_findings import planar_finding
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.both_masses import TAKEN_AWAY, clock_words
 from steelyard.sanity.full_fit import Rows
@@ -106,7 +107,9 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         f"The force follows the acceleration as that of {found.mass:.3g} ± {spread:.2g} kg, but the direction of "
         f"gravity as that of {found.weighed:.3g} kg: "
     )
-    if short > max(TAKEN * spread, SHARE * abs(found.mass)):
+    # About one axis a lever passes for a mass, and noise of either draws both.
+    share = SHARE + (NOISE * found.noise if planar_finding(log.gravity) else 0.0)
+    if short > max(TAKEN * spread, share * abs(found.mass)):
         other = clock_words(found.mass, found.weighed)
         return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
