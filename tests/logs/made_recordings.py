@@ -26,6 +26,7 @@ class Swing:
     angle: float = 0.9
     travel: float = 0.15
     axes: tuple[float, float, float] = (1.0, 1.0, 1.0)
+    shake: tuple[float, float] = (0.0, 1.0)  # [rad] and [Hz] of what joints ripple by
     fine: np.ndarray = field(init=False)
 
     def __post_init__(self) -> None:
@@ -37,6 +38,7 @@ class Swing:
             turn += np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 6, 3)) / (1 + 2 * f)
             move += np.sin(2 * np.pi * f * t[:, None] + rng.uniform(0, 6, 3)) / (1 + 4 * f)
         turn *= self.angle * np.array(self.axes)
+        turn += self.shake[0] * np.sin(2 * np.pi * self.shake[1] * t[:, None] + np.arange(3))
         object.__setattr__(self, "fine", t)
         object.__setattr__(self, "_matrix", CubicSpline(t, Rotation.exp(turn).matrix.reshape(-1, 9)))
         object.__setattr__(self, "_position", CubicSpline(t, self.travel * move))

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.logs.smoothing import smooth, smooth_rotations
+from steelyard.logs.smoothing import passed, smooth, smooth_rotations
 from steelyard.spatial import Rotation
 
 
@@ -41,6 +41,30 @@ def test_variances_are_calibrated_on_signals_of_its_own_kind():
         error = s.states[100:-100, 2, 0] - a[101:-99]  # the second difference of x is one step ahead
         scores.append(np.mean(error**2 / s.variance[100:-100, 2]))
     assert np.mean(scores) == pytest.approx(1.0, abs=0.2)
+
+
+def test_noise_comes_through_where_nothing_is_taken_off_the_signal():
+    rng = np.random.default_rng(1)
+    t = np.arange(0, 40, 0.01)
+    s = smooth(t, wave(t) + 1e-3 * rng.normal(size=(len(t), 3)))
+    inner = slice(200, -200)
+    error = s.states[inner, 2] - wave(t[inner], 2)
+    assert np.mean(error**2) == pytest.approx(np.mean(s.variance[inner, 2]) * s.passed[2], rel=0.35)
+    for order in (3, 4, 5):
+        expected = 1 - (2 * np.arange(order) + 1) / (2 * order)
+        np.testing.assert_allclose(passed(order, 7.0), expected, rtol=1e-3)
+        assert (passed(order, 7.0, 7.0) < expected).all()
+
+
+def test_a_low_pass_leaves_values_and_derivatives_of_what_is_slow():
+    t = np.arange(0, 12, 0.01)
+    slow, quick = (np.sin(2 * np.pi * f * t)[:, None] for f in (1.0, 20.0))
+    s = smooth(t, slow + 1e-3 * quick, cutoff_hz=5.0)
+    assert t[0] + 0.2 <= s.time[0] < s.time[-1] <= t[-1] - 0.2
+    at = np.arange(1.0, 11.0, 0.037)
+    states, _ = s.at(at)
+    for k, value in enumerate((np.sin(2 * np.pi * at), np.cos(2 * np.pi * at), -np.sin(2 * np.pi * at))):
+        np.testing.assert_allclose(states[:, k, 0], (2 * np.pi) ** k * value, atol=2e-3 * (2 * np.pi) ** k)
 
 
 def test_rotation_smoothing_does_not_care_about_frames():

@@ -44,3 +44,15 @@ def test_a_hand_is_found_beside_positions_of_another_point() -> None:
     assert times is not None
     assert 5 < float(times[1]) < 6.2
     assert 7.8 < float(times[2]) < 9
+
+
+def test_times_are_told_since_the_first_row_of_the_wrench() -> None:
+    touched = pushed(recorded("paper", 0), 6.0, 8.0)
+    (stream,) = touched.streams
+    assert stream.time is not None
+    later = replace(touched, streams=(replace(stream, time=stream.time + 1000.0),))
+    said, said_later = (
+        [f.message for f in identify(each).findings if f.code == "contact"] for each in (touched, later)
+    )
+    assert len(said) == 1
+    assert said_later == said

@@ -230,3 +230,19 @@ def test_a_flipped_wrench_is_no_turned_sensor_where_turns_are_about_one_axis(til
     assert {f.code for f in examine(about_one_axis(tilt, -1))[1]} == {"wrench-sign-flipped", *tilted}
     if tilted:
         assert identify(about_one_axis(tilt, -1)).mass == pytest.approx(2.0, abs=0.003)
+
+
+def test_a_sweep_of_one_joint_tells_no_gain_across_its_plane() -> None:
+    """Only noise of the acceleration is there beside mass and bias, and mass would take what that seems to lack."""
+    rng, time = np.random.default_rng(0), np.arange(0, 30, 0.01)
+    angle, rate = np.sin(0.5 * time), 0.5 * np.cos(0.5 * time)
+    down = -9.81 * np.stack([np.full_like(time, 0.02), np.sin(angle), np.cos(angle)], 1)
+    turning = np.stack([rate, 0 * rate, 0 * rate], 1)
+    rest = MotionLog(np.zeros((len(time), 6)), down, 0 * down, turning, 0 * down, time=time)
+    wrench = rest.predicted(BODY.vector) + rng.normal(size=(len(time), 6)) * np.repeat([1e-3, 0.02], 3)
+    log = replace(rest, wrench=wrench, acceleration=0.05 * rng.normal(size=down.shape))
+    found = sensor_matrix(log)
+    assert found is not None
+    assert not found.unlike
+    assert not found.turned
+    assert np.abs(found.stretch).max() < 0.01

@@ -9,7 +9,8 @@ import pytest
 
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.two_masses import examine_masses, two_masses
+from steelyard.sanity import two_masses as two_masses_module
+from steelyard.sanity.two_masses import TwoMasses, examine_masses, two_masses
 from steelyard.simulate.logs import simulate_log
 
 MOTIONS = ("stop_go", "dyn_slow", "dyn_fast")
@@ -74,3 +75,15 @@ def test_it_is_said_once() -> None:
 def test_rows_at_rest_say_nothing() -> None:
     log = made("stop_go")
     assert two_masses(log.rows(log.still)) is None
+
+
+def test_about_one_axis_noise_of_the_motion_is_allowed_for(monkeypatch: pytest.MonkeyPatch) -> None:
+    """A lever passes for a mass there, and noise of either draws both (a sound sweep of one joint came out so)."""
+    log = made("dyn_slow")
+    found = TwoMasses(1.92, np.array([0.0, 0, 0.1]), np.array([0.42, 0, 0, -0.1]), np.full(4, 0.026), 0.89, 0.146)
+    monkeypatch.setattr(two_masses_module, "two_masses", lambda log: found)
+    assert codes(log) == ["weight-compensated"]
+    one_axis = replace(log, gravity=log.gravity * [0.001, 1, 1])
+    assert codes(one_axis) == []
+    monkeypatch.setattr(two_masses_module, "two_masses", lambda log: replace(found, noise=0.01))
+    assert codes(one_axis) == ["weight-compensated"]

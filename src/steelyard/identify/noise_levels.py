@@ -58,7 +58,7 @@ def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
 
 def _with_wrench(noise: tuple[Noise, ...], levels: Array) -> tuple[Noise, ...]:
     """Return the noise with wrench variances `levels` (C, 6)."""
-    return tuple(Noise(n.acceleration, w) for n, w in zip(noise, levels, strict=True))
+    return tuple(replace(n, wrench=w) for n, w in zip(noise, levels, strict=True))
 
 
 def _resting(log: MotionLog) -> tuple[MotionLog, list[int]]:
@@ -72,7 +72,7 @@ def _resting(log: MotionLog) -> tuple[MotionLog, list[int]]:
     ]
     rows = np.isin(log.noise_class, numbers)[:, None]
     noise = tuple(
-        Noise(np.minimum(n.acceleration, RIPPLE), n.wrench) if c in numbers else n
+        replace(n, acceleration=np.minimum(n.acceleration, RIPPLE)) if c in numbers else n
         for c, n in enumerate(log.noise or ())
     )
     quiet = replace(
@@ -94,7 +94,7 @@ def _no_more_than_rest_shows(log: MotionLog, number: int, noise: Noise) -> Noise
         return noise
     readings = np.concatenate([log.angular_acceleration[rows], log.acceleration[rows]], 1)
     seen = np.maximum((readings**2).mean(0), RIPPLE)
-    return Noise(np.minimum(noise.acceleration, seen), noise.wrench)
+    return replace(noise, acceleration=np.minimum(noise.acceleration, seen))
 
 
 def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
@@ -108,6 +108,7 @@ def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
         Noise(
             _declared(n.acceleration, declared, ("angular_acceleration", "acceleration")),
             _declared(np.zeros(6), declared, ("torque", "force")),
+            n.taken,
         )
         for n in log.noise or ()
     )
@@ -118,7 +119,7 @@ def without_dead(log: MotionLog) -> MotionLog:
     """Return the log with so much noise on its dead channels that they say nothing."""
     if log.noise is None or not log.dead.any():
         return log
-    return replace(log, noise=tuple(Noise(n.acceleration, np.where(log.dead, DEAF, n.wrench)) for n in log.noise))
+    return replace(log, noise=tuple(replace(n, wrench=np.where(log.dead, DEAF, n.wrench)) for n in log.noise))
 
 
 def _declared(variance: Array, declared: Mapping[str, float], names: tuple[str, str]) -> Array:

@@ -61,6 +61,11 @@ class Aligned:
     left_out: Array = field(default_factory=lambda: np.zeros((0, 2)))
     notes: tuple[str, ...] = ()
 
+    @property
+    def wrench_late_s(self) -> float:
+        """How late the wrench is beside the stream that it is latest beside [s]; zero where it is none."""
+        return max(0.0, -min(self.delays_s.values(), default=0.0))
+
 
 def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
     """Return the recording on one clock, in S, with delays and mounts found where they were not given.
@@ -217,13 +222,14 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
     motion = given.kinematics.at(time, clocks.delays_s)
     wrench = felt.in_sensor(motion.rotation)
     gravity, acceleration, variance = motion.gravity, motion.acceleration, motion.acceleration_variance
+    within = given.kinematics.within
     if given.imu is not None and clocks.mounting is not None:
         raw = given.imu.signal.at(time + clocks.delays_s.get(given.imu.name, 0.0))
         own = clocks.mounting.at_sensor(raw, motion.omega, motion.alpha)
         gravity = gravity if gravity is not None else -_slow(time, own)
         acceleration = own + gravity
         arm = float(clocks.mounting.position @ clocks.mounting.position)
-        variance = given.imu.noise_std**2 + arm * motion.alpha_variance
+        variance, within = given.imu.noise_std**2 + arm * motion.alpha_variance, (within[0], 1.0)
     if gravity is None:
         raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
     bare = MotionLog(wrench, gravity, acceleration, motion.omega, motion.alpha)
@@ -234,7 +240,7 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
     share = 1.0 if given.cutoff is None else min(1.0, 2 * given.cutoff / sampling_rate(given.clock))
     noise = levels(
         index, motion.alpha_variance, variance, residual - np.median(residual, 0), clocks.body,
-        noise_std(given.wrench(clocks.delays_s)) ** 2 * share, given.recording.noise,
+        noise_std(given.wrench(clocks.delays_s)) ** 2 * share, given.recording.noise, within,
     )  # fmt: skip
     log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
     log = replace(log, dead=np.array(felt.dead))

@@ -75,6 +75,11 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
     return np.asarray(sosfiltfilt(_butterworth(order, cutoff_hz / rate_hz), values, axis=0, padlen=pad))
 
 
+def lowpass_gain(frequency: Array, cutoff_hz: float, order: int = 4) -> Array:
+    """Return the share of an amplitude that `lowpass` leaves at frequencies [Hz]."""
+    return np.asarray(1 / (1 + (frequency / cutoff_hz) ** (2 * order)))
+
+
 @lru_cache(maxsize=64)
 def _butterworth(order: int, cutoff: float) -> Array:
     """Return the second-order sections of a low-pass at a cut-off given as a share of the rate."""

@@ -83,6 +83,15 @@ class Kinematics:
         """Whether an acceleration comes from poses or velocities by differentiation."""
         return self.source not in ("none", "linear_acceleration")
 
+    @property
+    def within(self) -> tuple[float, float]:
+        """Shares of the variances of alpha and of the acceleration that are noise within them.
+
+        The rest is what a smoother took off the signal.
+        """
+        alpha = _passed(self.channels, {"angular_acceleration": 0, "angular_velocity": 1, "rotation": 2})
+        return alpha, _passed(self.channels, {"linear_acceleration": 0, "linear_velocity": 1, "position": 2})
+
     def at(self, time: Array, delays: Delays) -> Motion:
         """Return the motion at `time` (M,) [s] of the common clock; delays [s] say how late each stream's
         stamps are."""
@@ -170,6 +179,16 @@ class Kinematics:
         return None, np.zeros(len(time))
 
 
+def _passed(channels: Mapping[str, Channel], order: Mapping[str, int]) -> float:
+    """Return the share of noise in what the first of some quantities tells by its derivative of that order."""
+    for quantity, derivative in order.items():
+        curve = channels[quantity].curve if quantity in channels else None
+        curve = curve.quaternion if isinstance(curve, SmoothRotation) else curve
+        if curve is not None and (derivative == 0 or isinstance(curve, Smooth)):
+            return float(curve.passed[derivative]) if isinstance(curve, Smooth) else 1.0
+    return 1.0
+
+
 def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: float | None) -> Kinematics:
     """Smooth the motion channels of timed streams; of each quantity the first stream that has it counts.
 
@@ -182,7 +201,7 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
         for quantity, values in stream.channels.items():
             found.setdefault(quantity, (stream, values))
     makers: dict[str, Callable[[Stream, Array], Channel]] = {
-        "rotation": _rotation_channel,
+        "rotation": lambda s, v: _rotation_channel(s, v, cutoff_hz),
         "angular_acceleration": lambda s, v: _plain_channel(s, v, "angular_acceleration", cutoff_hz),
         "linear_acceleration": lambda s, v: _plain_channel(s, v, "linear_acceleration", cutoff_hz),
         "gravity": lambda s, v: _plain_channel(s, v, "gravity", cutoff_hz),
@@ -196,7 +215,7 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
         makers[quantity] = (
             (lambda s, v, q=quantity: _plain_channel(s, v, q, cutoff_hz))  # type: ignore[misc]
             if known
-            else (lambda s, v, q=quantity: _smooth_channel(s, v, q))  # type: ignore[misc]
+            else (lambda s, v, q=quantity: _smooth_channel(s, v, q, cutoff_hz))  # type: ignore[misc]
         )
     channels = {q: makers[q](*found[q]) for q in makers if q in found}
     for quantity, channel in channels.items():
@@ -205,7 +224,19 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
                 f"{quantity} of '{channel.stream}' is given in W, but no stream gives the rotation of S in W."
             )
     spans = {s.name: (float(s.time[0]), float(s.time[-1])) for s in streams if s.time is not None}
+    for channel in channels.values():
+        start, end = spans[channel.stream]
+        first, last = _ends(channel.curve, start, end)
+        spans[channel.stream] = (max(start, first), min(end, last))
     return Kinematics(channels, gravity_world, spans)
+
+
+def _ends(curve: Signal | Smooth | SmoothRotation, start: float, end: float) -> tuple[float, float]:
+    """Return the first and last time [s] that a curve tells; of a plain one those of its stream."""
+    smoothed = curve.quaternion if isinstance(curve, SmoothRotation) else curve
+    if not isinstance(smoothed, Smooth):
+        return start, end
+    return float(smoothed.time[0]), float(smoothed.time[-1])
 
 
 def _clock(stream: Stream) -> Array:
@@ -214,8 +245,8 @@ def _clock(stream: Stream) -> Array:
     return stream.time
 
 
-def _rotation_channel(stream: Stream, values: Array) -> Channel:
-    return Channel(stream.name, smooth_rotations(_clock(stream), Rotation.nearest(values)), False)
+def _rotation_channel(stream: Stream, values: Array, cutoff_hz: float | None) -> Channel:
+    return Channel(stream.name, smooth_rotations(_clock(stream), Rotation.nearest(values), cutoff_hz), False)
 
 
 def _plain_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
@@ -225,8 +256,9 @@ def _plain_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: floa
     return Channel(stream.name, curve, _world(stream, quantity), variance)
 
 
-def _smooth_channel(stream: Stream, values: Array, quantity: str) -> Channel:
-    return Channel(stream.name, smooth(_clock(stream), values), _world(stream, quantity))
+def _smooth_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
+    curve = smooth(_clock(stream), values, cutoff_hz=cutoff_hz)
+    return Channel(stream.name, curve, _world(stream, quantity))
 
 
 def _world(stream: Stream, quantity: str) -> bool:

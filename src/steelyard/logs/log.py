@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -22,13 +22,16 @@ class Noise:
 
     acceleration  (6,) of [alpha (rad/s^2)^2, a (m/s^2)^2]
     wrench        (6,) of [tau (N m)^2, f N^2]
+    taken         (6,) of [alpha, a], of what a smoother took off: it scatters about the readings, and so makes no fit
+                  too small
     """
 
     acceleration: Array
     wrench: Array
+    taken: Array = field(default_factory=lambda: np.zeros(6))
 
     def __post_init__(self) -> None:
-        for name in ("acceleration", "wrench"):
+        for name in ("acceleration", "wrench", "taken"):
             value = check.vectors(f"{name} variance", getattr(self, name), 6)
             if (value < 0).any():
                 raise BadValue(f"{name} variances must not be negative; got {value}.")

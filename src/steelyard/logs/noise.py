@@ -60,18 +60,20 @@ def classes(still: Mask, alpha_variance: Array) -> Integers:
 
 def levels(
     index: Integers, alpha_variance: Array, acceleration_variance: Array, residual: Array, body: Array,
-    least: Array, declared: Mapping[str, float],
+    least: Array, declared: Mapping[str, float], within: tuple[float, float] = (1.0, 1.0),
 ) -> tuple[Noise, ...]:  # fmt: skip
     """Return one Noise per class from the variances of the motion (N,) and the wrench residual (N, 6) of a body (10,).
 
     The wrench carries what the residual shows beyond the noise of the motion, at least `least` (6,) [(N m)^2, N^2].
     Declared standard deviations (force, torque, acceleration, angular_acceleration) win.
+    within  shares of the two variances of the motion that are noise within it
     """
     mass_matrix = _mass_matrix(body)
     out = []
     for k in range(int(index.max()) + 1):
         rows = index == k
-        motion = np.repeat([alpha_variance[rows].mean(), acceleration_variance[rows].mean()], 3)
+        unsure = np.repeat([alpha_variance[rows].mean(), acceleration_variance[rows].mean()], 3)
+        motion = unsure * np.repeat(within, 3)
         for name, part in (("angular_acceleration", slice(0, 3)), ("acceleration", slice(3, 6))):
             if name in declared:
                 motion[part] = declared[name] ** 2
@@ -81,7 +83,7 @@ def levels(
         for name, part in (("torque", slice(0, 3)), ("force", slice(3, 6))):
             if name in declared:
                 wrench[part] = declared[name] ** 2
-        out.append(Noise(motion, wrench))
+        out.append(Noise(motion, wrench, np.maximum(unsure - motion, 0.0)))
     return tuple(out)
 
 

@@ -16,6 +16,7 @@ from steelyard.logs.imu import Imu, imu
 from steelyard.logs.kinematics import Kinematics, kinematics
 from steelyard.logs.outliers import inside, merged
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.smoothing import SMEARED
 
 
 @dataclass(frozen=True)
@@ -102,7 +103,10 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     sought = late if options.estimate_delays else []
     felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
     known = {n: d for n, d in known.items() if n not in sought}
-    unseen = {s.name: unknown_motion(s) for s in streams if s.name in (*moving.streams, *used)}
+    # A low-pass smears what a smoother makes of a hole over its surroundings.
+    smeared = 0.0 if cutoff is None else SMEARED / cutoff
+    wider = np.array([-smeared, smeared])
+    unseen = {s.name: unknown_motion(s) + wider for s in streams if s.name in (*moving.streams, *used)}
     return Prepared(
         recording, options, stamps_of(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought), unseen
     )  # fmt: skip

@@ -9,7 +9,7 @@ Source: Rauch, Tung, Striebel 1965; Wahba 1978 (spline as a posterior mean); bod
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import factorial
 from typing import Any
 
@@ -19,11 +19,16 @@ from numba import njit
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.logs.conditioning import lowpass, lowpass_gain
 from steelyard.spatial import Rotation
 
 _SEARCH_ROWS = 6000
 _NOISE_FLOOR = 1e-9
 _ORDERS = (3, 4, 5)
+_LONG = 20.0  # periods of a low-pass, from which on there is one
+SMEARED = 2.0  # periods of a low-pass over which an end is felt
+_FINE = 10.0  # times the cut-off
+_NOISY_END = 2.0  # times the median variance of a second derivative
 _WARM_UP = 6  # innovations left out of the likelihood: the start is not known
 
 
@@ -33,14 +38,16 @@ class Smooth:
 
     time       (N,) [s]
     states     (N, 3, D) value, first and second derivative
-    variance   (N, 3) of each of them, per channel
+    variance   (N, 3) of each of them, per channel, before a low-pass
     noise_std  of one measurement of one channel
+    passed     (3,) share of the variance that is noise which came through; the rest is what was taken off the signal
     """
 
     time: Array
     states: Array
     variance: Array
     noise_std: float
+    passed: Array
 
     def at(self, time: Array) -> tuple[Array, Array]:
         """Return states (M, 3, D) and variances (M, 3) at other times [s] (quintic Hermite; ends are
@@ -52,11 +59,12 @@ class Smooth:
         return states, variance
 
 
-def smooth(time: Array, values: Array, noise_dof: int | None = None) -> Smooth:
+def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: float | None = None) -> Smooth:
     """Smooth `values` (N, D), sampled at rising `time` (N,) [s], by an n-fold integral of white noise.
 
     The order n (3 = white jerk of a position, 4, 5) and the bandwidth are the most likely ones.
     noise_dof  how many of the D channels carry noise (3 for unit quaternions); None = all
+    cutoff_hz  low-pass [Hz] of what is smoothed, that of the wrench it is compared with; None = none
 
     Raises BadValue with fewer than 12 samples.
     """
@@ -73,9 +81,52 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None) -> Smooth:
     states, cov, quad, _, count = _smooth_kernel(clock * scale, centred, order, scale)
     noise = max(quad / max(count * y.shape[1] * share, 1.0), floor)
     back = (scale / step) ** np.arange(order)
+    bandwidth = scale / (2 * np.pi * step)
+    rate = 1 / step
+    if cutoff_hz is not None and not (cutoff_hz < 0.4 * rate and t[-1] - t[0] > _LONG / cutoff_hz):
+        cutoff_hz = None
     states, variance = states * back[:, None], np.einsum("nii->ni", cov) * back**2 * noise
     states[:, 0] += origin
-    return Smooth(t, check.frozen(states[:, :3]), check.frozen(np.maximum(variance[:, :3], 0)), float(np.sqrt(noise)))
+    whole = Smooth(
+        t, check.frozen(states[:, :3]), check.frozen(np.maximum(variance[:, :3], 0)), float(np.sqrt(noise)),
+        passed(order, bandwidth, cutoff_hz)[:3],
+    )  # fmt: skip
+    return whole if cutoff_hz is None else _below(whole, cutoff_hz)
+
+
+def passed(order: int, bandwidth: float, cutoff_hz: float | None = None) -> Array:
+    """Return the share (order,) of the variance of each derivative that is noise which comes through.
+
+    bandwidth  [Hz] of the smoother, which passes H = 1 / (1 + (f / bandwidth)^(2 order)) of a frequency f
+    cutoff_hz  [Hz] of a low-pass after it
+
+    The rest is what the smoother takes away of the signal: it scatters about the smoothed value. Only the noise within
+    that value makes a fit to it too small. Shares are the integrals of f^(2 d) H^2 over those of f^(2 d) H, without a
+    low-pass 1 - (2 d + 1) / (2 order).
+    """
+    f = np.geomspace(1e-3, 1e3, 4000) * bandwidth
+    H = 1 / (1 + (f / bandwidth) ** (2 * order))
+    low = 1.0 if cutoff_hz is None else lowpass_gain(f, cutoff_hz)
+    powers = f ** (2 * np.arange(order)[:, None] + 1)  # of f, times df / d log f
+    return np.asarray((powers * (H * low) ** 2).sum(1) / (powers * H).sum(1))
+
+
+def _below(whole: Smooth, cutoff_hz: float) -> Smooth:
+    """Return a smoothed signal through the low-pass of the wrench [Hz], on an even clock.
+
+    The ends are left out: derivatives have far more noise there, which the low-pass smears.
+    """
+    sound = whole.time[whole.variance[:, 2] <= _NOISY_END * np.median(whole.variance[:, 2])]
+    # A digital low-pass bends near half the rate: the wrench, mostly quicker, has none of that.
+    rate = max(1 / float(np.median(np.diff(whole.time))), _FINE * cutoff_hz)
+    even = np.linspace(sound[0], sound[-1], round(float(sound[-1] - sound[0]) * rate) + 1)
+    states, variance = whole.at(even)
+    states = lowpass(states.reshape(len(even), -1), cutoff_hz, rate).reshape(states.shape)
+    end = round(SMEARED * rate / cutoff_hz)
+    inner = slice(end, len(even) - end)
+    if len(even[inner]) < 2 * _WARM_UP:
+        return whole
+    return replace(whole, time=even[inner], states=check.frozen(states[inner]), variance=check.frozen(variance[inner]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,12 +150,12 @@ class SmoothRotation:
         return Rotation.from_quaternion_wxyz(q), omega, alpha, 4 * variance
 
 
-def smooth_rotations(time: Array, rotation: Rotation) -> SmoothRotation:
-    """Smooth rotations R_WS (batch (N,)) sampled at rising `time` (N,) [s]."""
+def smooth_rotations(time: Array, rotation: Rotation, cutoff_hz: float | None = None) -> SmoothRotation:
+    """Smooth rotations R_WS (batch (N,)) sampled at rising `time` (N,) [s], low-passed at `cutoff_hz` [Hz] if given."""
     q = rotation.quaternion_wxyz()
     flips = np.cumprod(np.where((q[1:] * q[:-1]).sum(1) < 0, -1.0, 1.0))
     q = q * np.concatenate([[1.0], flips])[:, None]
-    return SmoothRotation(smooth(time, q, noise_dof=3))
+    return SmoothRotation(smooth(time, q, 3, cutoff_hz))
 
 
 def _conjugate_times(q: Array, p: Array) -> Array:

@@ -15,6 +15,7 @@ from steelyard.pipelines.options import DRIFT_ALLOWED
 from steelyard.pipelines.rows import FitRows
 from steelyard.sanity import (
     after,
+    allow_filter,
     allow_softness,
     drift_of,
     examine_body,
@@ -65,6 +66,7 @@ def of_sensor_and_body(
         found = (*found, *examine_body(estimate, (*known, *found), size, noise))
         if rows.aligned.acceleration_from in ENCODERS:
             estimate = allow_softness(load.log, estimate)
+            estimate = allow_filter(load.log, estimate, rows.aligned.wrench_late_s)
     return _with_gain(estimate, rows.aligned), found
 
 

@@ -92,6 +92,11 @@ def remedied(estimate: Estimate, rows: FitRows) -> Estimate:
         estimate = estimate.without_inertia("What a controller leaves of a weight has no inertia of its own.")
     if estimate.codes() & (MISREAD if rows.place is None else MISREAD - {"motion-mismatch"}):
         return estimate.with_remedies(UNEXPLAINED)
+    if rows.unmeasured and not estimate.parts:
+        estimate = estimate.without_inertia(
+            "No stream measures the acceleration: what turns about another point than S is accelerated, which looks "
+            "like inertia."
+        )
     if rows.unmeasured or rows.log.still.all():
         return estimate.with_remedies(UNMEASURED if rows.unmeasured else AT_REST)
     return estimate

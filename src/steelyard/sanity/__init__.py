@@ -9,11 +9,13 @@ from steelyard.sanity.no_body import examine_body, examine_wrench_unit
 from steelyard.sanity.one_body import one_body
 from steelyard.sanity.rows import dead_channels
 from steelyard.sanity.sensor_matrix import examine_sensor
+from steelyard.sanity.slow_sensor import allow_filter
 from steelyard.sanity.soft_arm import allow_softness
 from steelyard.sanity.two_masses import examine_masses
 
 __all__ = [
     "after",
+    "allow_filter",
     "allow_softness",
     "dead_channels",
     "drift_of",

@@ -29,14 +29,19 @@ RANK = 1e-9  # of the largest eigenvalue: what is below is not told
 class FullFit:
     """Weighted solution of a log.
 
-    solution  (p,) phi (10), bias (6), then the extra columns
-    spread    (p,) standard deviations by leaving out stretches
-    left      weighted sum of squares, over the same weights for every fit of one `Rows`
+    solution    (p,) phi (10), bias (6), then the extra columns
+    covariance  (p, p) by leaving out stretches
+    left        weighted sum of squares, over the same weights for every fit of one `Rows`
     """
 
     solution: Array
-    spread: Array
+    covariance: Array
     left: float
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviations (p,) by leaving out stretches."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,11 +83,24 @@ class Rows:
         total, size = scatter.sum(0), X.shape[2]
         solution = _solution(total, size)
         left = float(total[size, size] - 2 * solution @ total[:size, size] + solution @ total[:size, :size] @ solution)
-        spread = np.zeros(size)
+        covariance = np.zeros((size, size))
         if jackknife and blocks > 2:
-            parts = np.stack([_solution(total - s, size) for s in scatter])
-            spread = np.sqrt((blocks - 1) / blocks * ((parts - solution) ** 2).sum(0))
-        return FullFit(solution, spread, max(left, 0.0))
+            moved = np.stack([_solution(total - s, size) for s in scatter]) - solution
+            covariance = (blocks - 1) / blocks * moved.T @ moved
+        return FullFit(solution, covariance, max(left, 0.0))
+
+    def told(self, extra: Array, least: float) -> Array:
+        """Return the combinations (k, j) of extra columns (N, 6, k) that no body with a bias mimics.
+
+        least  share of a combination's squares, its columns scaled alike, that the other columns must leave
+        """
+        both = np.concatenate([self.columns, extra], 2) * np.sqrt(self.weights)[:, :, None]
+        gram, size = _gram(both), self.columns.shape[2]
+        scale = np.sqrt(np.maximum(np.diag(gram)[size:], _SMALLEST**2))
+        across = gram[size:, :size]
+        rest = gram[size:, size:] - across @ inverse_scaled(gram[:size, :size].copy(), RANK) @ across.T
+        values, vectors = np.linalg.eigh(rest / np.outer(scale, scale))
+        return np.asarray(vectors[:, values > least] / scale[:, None])
 
     def slowly(self, fit: FullFit, extra: Array | None = None) -> float:
         """Return the weighted sum of squares of what a fit with extra columns (N, 6, k) leaves in means over a second.

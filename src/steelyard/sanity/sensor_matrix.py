@@ -27,6 +27,9 @@ from steelyard.spatial import Rotation, cross_matrix
 TURN, UNLIKE, SURE = np.radians(1.0), 0.015, 8.0
 TURN_LEFT, UNLIKE_LEFT = 0.95, 0.99
 ELSEWHERE = {"base-tilted", "weight-compensated", "wrench-unexplained"}
+# Turns and stretches that a body and a bias mimic but for this share of their squares are not told: noise of the
+# acceleration alone would decide them. A sweep of one joint keeps gravity within some 3 degrees of a plane of S.
+TOLD = 3e-3
 # The turn is linearised anew until it changes by less [rad].
 ROUNDS, SETTLED = 5, 1e-5
 # Leaving stretches out tells a spread from so many of them on.
@@ -92,21 +95,24 @@ def sensor_matrix(log: MotionLog, drift: bool = False, turn: Rotation | None = N
     if rows.block.max() + 1 < _FEWEST_BLOCKS:
         return None
     plain, turn = rows.solve(), turn or Rotation.identity()
-    turns, stretches = (slice(len(plain.solution) + k, len(plain.solution) + n) for k, n in ((0, 3), (3, 8)))
     values = rows.values
     phi = replace(rows, values=_rotated(turn.inverse(), values)).solve().solution[:10]
     for _ in range(ROUNDS):
         felt = rows.columns[:, :, :10] @ phi
         right = replace(rows, values=_rotated(turn.inverse(), values))
-        fit = right.solve(np.concatenate([_turned(felt), _stretched(felt)], 2), jackknife=True)
-        turn, phi = turn @ Rotation.exp(fit.solution[turns]), fit.solution[:10]
-        if np.linalg.norm(fit.solution[turns]) < SETTLED:
+        extra = np.concatenate([_turned(felt), _stretched(felt)], 2)
+        told = rows.told(extra, TOLD)
+        fit = right.solve(extra @ told, jackknife=True)
+        own = slice(len(plain.solution), None)
+        value, covariance = told @ fit.solution[own], told @ fit.covariance[own, own] @ told.T
+        turn, phi = turn @ Rotation.exp(value[:3]), fit.solution[:10]
+        if np.linalg.norm(value[:3]) < SETTLED:
             break
-    stretch = np.tensordot(fit.solution[stretches], _STRETCHES, 1)
-    spread = np.sqrt(np.tensordot(fit.spread[stretches] ** 2, _STRETCHES**2, 1))
+    stretch = np.tensordot(value[3:], _STRETCHES, 1)
+    spread = np.sqrt(np.einsum("kij,kl,lij->ij", _STRETCHES, covariance[3:, 3:], _STRETCHES))
     left = fit.left / plain.left if plain.left else 1.0
     moved = plain.solution[:4] - fit.solution[:4]
-    return SensorMatrix(turn.log(), fit.spread[turns], stretch, spread, left, moved)
+    return SensorMatrix(turn.log(), np.sqrt(np.diag(covariance)[:3]), stretch, spread, left, moved)
 
 
 def _rotated(turn: Rotation, wrench: Array) -> Array:

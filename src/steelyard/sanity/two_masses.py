@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.alignment_findings import planar_finding
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.both_masses import TAKEN_AWAY, clock_words
 from steelyard.sanity.full_fit import Rows
@@ -76,11 +77,11 @@ def two_masses(log: MotionLog) -> TwoMasses | None:
 
 
 def noise_share(log: MotionLog) -> float:
-    """Return the share of noise in the squared acceleration of moving rows, linear or angular, the larger one."""
+    """Return the share of its uncertainty in the squared acceleration of moving rows, linear or angular, the larger."""
     moving = ~log.still
     if log.noise is None or not moving.any():
         return 0.0
-    variance = np.stack([n.acceleration for n in log.noise])[log.noise_class][moving]
+    variance = np.stack([n.acceleration + n.taken for n in log.noise])[log.noise_class][moving]
     sizes = np.concatenate([log.angular_acceleration, log.acceleration], 1)[moving] ** 2
     shares = [variance[:, part].sum() / max(float(sizes[:, part].sum()), 1e-300) for part in (slice(0, 3), slice(3, 6))]
     return float(max(shares))
@@ -106,7 +107,9 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         f"The force follows the acceleration as that of {found.mass:.3g} ± {spread:.2g} kg, but the direction of "
         f"gravity as that of {found.weighed:.3g} kg: "
     )
-    if short > max(TAKEN * spread, SHARE * abs(found.mass)):
+    # About one axis a lever passes for a mass, and noise of either draws both.
+    share = SHARE + (NOISE * found.noise if planar_finding(log.gravity) else 0.0)
+    if short > max(TAKEN * spread, share * abs(found.mass)):
         other = clock_words(found.mass, found.weighed)
         return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
