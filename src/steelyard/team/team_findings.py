@@ -27,6 +27,8 @@ TILTED = 0.03
 USUAL_GAIN = 0.01
 # A direction is called by an axis where it is within this cosine of it.
 ALONG = 0.9
+# A bias that stands still in the room is worth a word from this size [N].
+HOME_BIAS = 0.03
 # Steps [standard deviations] that a fit may leave untaken without a word.
 UNSETTLED = 0.1
 AXES = ("x", "y", "z")
@@ -184,6 +186,16 @@ def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:
     return (
         f"Error bars hold no gain error that lasts: 1 % on every force axis would move the mass by {moved:.2g} kg, "
         "and the centre of mass with it.",
+    )
+
+
+def biased_at_home(size: float) -> tuple[str, ...]:
+    """Return a note where forces measured below gimbals err by a bias of `size` [N] that stands still in the room."""
+    if size < HOME_BIAS:
+        return ()
+    return (
+        f"Forces of robots with passive gimbals err by about {size:.1g} N in the axes of their homes, as springs of a "
+        "Delta do: such a bias looks like weight. It is fitted, and bars allow for it.",
     )
 
 

@@ -27,12 +27,14 @@ from steelyard.team.payload.balance import require_balance
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, fit_payload
+from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.model import Group, unit_bias
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.team_findings import (
     bad_robots,
+    biased_at_home,
     gains,
     late_clocks,
     lost_directions,
@@ -100,6 +102,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     C = unit_bias(D, six_axis, size)
     payload = fit_payload(groups, D, C, size, with_gain)
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
+    payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
@@ -119,7 +122,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *(gains(payload.gain, payload.gainless) if known else ()),
         *open_parameters(team.identified, team.evidence.rank),
     )
-    said = (*unsettled(seen.left), *unseen_gains(team, weight_by_gains(groups, D)))
+    said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
     said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
     return replace(team, findings=found, notes=(*team.notes, *said))
 
