@@ -28,10 +28,14 @@ from steelyard.team.payload.spectra import Spectra
 
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
 SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
-NONE = 30.0
+NONE = 3.0
 # Those that are asked first, and the share from which such a bias counts.
 ASKED = SIZES[:4:2]
 COUNTS = 0.01
+# From this share of none at all on it is not said that there is one.
+DOUBTED = 0.1
+# Gains with less than this share are not tried beside such a bias.
+UNLIKELY = 1e-5
 # A direction that the grasps span to less than this share of the longest is rounding.
 SPANNED = 1e-6
 
@@ -52,8 +56,8 @@ class _Tried:
 
     @property
     def size(self) -> float:
-        """Rms size [N] of the bias, by evidence."""
-        return float(np.sqrt(self.share[1:] @ self.sizes**2))
+        """Rms size [N] of the bias, by evidence; zero where that leaves a share for none."""
+        return float(np.sqrt(self.share[1:] @ self.sizes**2)) if self.share[0] < DOUBTED else 0.0
 
     def averaged(self, fit: PayloadFit, levers: Array) -> PayloadFit:
         """Return the fit averaged over sizes by their share; what follows from the rows is that of the likeliest."""
@@ -84,7 +88,8 @@ class _Tried:
 def with_home_bias(
     fit: PayloadFit, D: Array, C: Array, places: Array, with_gain: bool = True
 ) -> tuple[PayloadFit, float]:
-    """Return the fit with biases that keep their direction in the room allowed for, and their size [N] by evidence.
+    """Return the fit with biases that keep their direction in the room allowed for, and their size [N]: zero where there
+    may be none.
 
     places  (G, 3) [m] in B of the grasps on gimbals; without any the fit stays as it is. D, C as in `fit_payload`
 
@@ -95,7 +100,7 @@ def with_home_bias(
     homes = _Homes.of(fit, D, C, places)
     # Without gains first, at a tenth of the cost: where no such bias shows, none does with them.
     if not with_gain or homes.tried(ladder_of(len(homes.plain), False), ASKED).counts:
-        found = homes.tried(ladder_of(len(homes.plain), with_gain), SIZES)
+        found = homes.tried(homes.likely(ladder_of(len(homes.plain), with_gain)), SIZES)
         if found.counts:
             return found.averaged(fit, homes.levers), found.size
     return fit, 0.0
@@ -121,6 +126,11 @@ class _Homes:
                 plain.append(normal(part, D, weights, group.motion_noise))
                 wide.append(beside_home(plain[-1], part, D, weights, levers))
         return cls(plain, wide, levers, C, fit.scale)
+
+    def likely(self, ladder: Array) -> Array:
+        """Return the sizes of a ladder (L, 4) without gains, and those with gains that count for something."""
+        share = Models.of(self.plain, self.C, ladder, self.scale).share
+        return ladder[(share > UNLIKELY) | ~ladder[:, 2:].any(1)]
 
     def tried(self, ladder: Array, sizes: Array) -> _Tried:
         """Return the answers without such a bias and at `sizes` [N] of it, each averaged over a ladder."""
