@@ -88,8 +88,9 @@ class _Tried:
 def with_home_bias(
     fit: PayloadFit, D: Array, C: Array, places: Array, with_gain: bool = True
 ) -> tuple[PayloadFit, float]:
-    """Return the fit with biases that keep their direction in the room allowed for, and their size [N]: zero where there
-    may be none.
+    """Return the fit with biases that keep their direction in the room allowed for, and how large they are [N].
+
+    That is zero where there may be none.
 
     places  (G, 3) [m] in B of the grasps on gimbals; without any the fit stays as it is. D, C as in `fit_payload`
 
