@@ -73,9 +73,12 @@ def without_changes(
     other   which slips of two robots, the clearest first, are taken for those of the robot that does not show them best
     """
     bare, light = idle(raw, SHARE), idle(raw, LIGHT)
-    asked = _asked(bare, light, fitted)
+    given = None if any(rows.any() for rows in bare) else fitted(_unchanged)
+    # One who goes ways of its own makes a rough fit; else who pushes with little merely does.
+    asked = None if given is not None and not given.rough else _asked(bare, light, fitted)
     if asked is None:
-        return _without_slips(log, clocks, fitted(_unchanged), fitted, _unchanged, other)
+        given = fitted(_unchanged) if given is None else given
+        return _without_slips(log, clocks, given, fitted, _unchanged, other)
     resting, team = asked
     off = team.off(log)
     edit = partial(_gone, bare=bare, light=resting, off=off, strays=strayers(raw, resting, off))

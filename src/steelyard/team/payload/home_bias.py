@@ -28,12 +28,12 @@ from steelyard.team.payload.spectra import Spectra
 
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
 SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
-NONE = 3.0
+NONE = 30.0
 # Those that are asked first, and the share from which such a bias counts.
 ASKED = SIZES[:4:2]
 COUNTS = 0.01
 # From this share of none at all on it is not said that there is one.
-DOUBTED = 0.1
+DOUBTED = 0.5
 # Gains with less than this share are not tried beside such a bias.
 UNLIKELY = 1e-5
 # A direction that the grasps span to less than this share of the longest is rounding.
