@@ -34,14 +34,28 @@ UNSETTLED = 0.1
 AXES = ("x", "y", "z")
 
 
-def lost_directions(grasps: Mapping[str, GraspEstimate], down: Array | None) -> Iterator[Finding]:
-    """Yield grasp-direction-lost for every grasp and direction in words; `down` (3,) is gravity in R, where known."""
+def lost_directions(
+    grasps: Mapping[str, GraspEstimate], down: Array | None, apart: Array | None = None
+) -> Iterator[Finding]:
+    """Yield grasp-direction-lost for every grasp and direction in words.
+
+    down  (3,) gravity in R, where known     apart  (2,) as in `Seen`
+    """
     for name, grasp in grasps.items():
         if not len(grasp.lost):
             continue
         words = [_in_words(direction, down, name) for direction in _sparse(grasp.lost)]
         turned = np.linalg.matrix_rank(grasp.lost[:, :3], tol=1e-2)
         kinds = len(words)
+        if apart is not None:
+            size = f"{np.rad2deg(apart[0]):.2g} deg and {1e3 * apart[1]:.2g} mm"
+            yield Finding(
+                "grasp-direction-lost",
+                f"{_listed(words)}: robots disagree by {size}, which hides how the payload turned. Loud encoders do "
+                "that, and so does a base that moves or drifts though it is said to stand.",
+                'Where a base moves, say base = "moving" and log its twists; else measure better or turn farther.',
+            )
+            continue
         if turned == 0 and kinds == 1:
             why = "all rotation so far was about one axis. Tilt the payload about another axis"
         elif turned == 0:

@@ -72,6 +72,7 @@ class Seen:
     rows          of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
     order         how often the motion that they come from is differentiated: twice for poses, once for twists
     down          (3,) gravity in R, None where nobody tells it
+    apart         (2,) [rad, m] by how much robots disagree, where that may hide what the payload turned
     """
 
     log: TeamLog
@@ -86,6 +87,7 @@ class Seen:
     path: Array
     order: int
     down: Array | None
+    apart: Array | None = None
 
 
 def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz: float) -> TeamEstimate:
@@ -124,7 +126,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *(one.finding() for one in touched),
         *odd,
         *(() if told else unexplained(payload, D, log.names)),
-        *lost_directions(team.grasps, seen.down),
+        *lost_directions(team.grasps, seen.down, seen.apart),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *seen.begun.findings(log),
         *bad_robots(log.names, seen.noise),
