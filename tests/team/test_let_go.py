@@ -11,8 +11,10 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import GRAVITY, Presence, Slip, TeamNoise, TeamScene
+from steelyard.team.changes.presence import strayers
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
+from steelyard.team.stacked import stretches
 
 NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.3, torque_white_Nm=0.03)
 GRIPPER, LEAVES, WHO = 0.8, 8.0, 2
@@ -81,3 +83,14 @@ def test_two_slips_of_one_grasp_are_two() -> None:
     start = float(was.tracks[name].time[0])
     assert len(set(times)) == len(times) >= 2
     assert times[0] - start == pytest.approx(8.05, abs=0.3)
+
+
+def test_a_step_while_a_robot_bears_little_is_no_way_of_its_own() -> None:
+    log = simulate_team(TeamScene(NOISE, 3, sensing="poses", kinds=("motion",), motion_samples=2000), 0).log
+    parts = stretches(log, {})
+    light = [np.tile([False, True, True], (len(part), 1)) for part in parts]
+    time = parts[0].time - parts[0].time[0]
+    slipped = np.where(time < 9.0, 0.0, 30.0)
+    rests = np.where(time % 3.0 < 1.5, 30.0 * np.sin(6.0 * time) + 40.0, 40.0)
+    off = [np.stack([rests, slipped, rests], axis=1)]
+    assert strayers(parts, light, off).tolist() == [False, False, True]

@@ -24,6 +24,8 @@ from steelyard.team.stacked import Stretch
 SHARE, IDLE_S, MEAN_S, EDGE_S = 0.1, 1.0, 0.2, 0.4
 # One who has let go may still bear a gripper that hangs beyond the sensor: below this share it is asked.
 LIGHT = 0.6
+# A fifth of the seconds show who goes ways of its own: it may rest between.
+OFTEN = 0.8
 # What pushes with next to nothing in so many of these rows bears no gripper.
 MOSTLY = 0.9
 # An idle grasp is off the payload where it is so many times its noise from where the others say it must be.
@@ -69,14 +71,16 @@ def as_long(values: Any, rows: int) -> Any:
 def strayers(parts: Sequence[Stretch], light: Sequence[Mask], off: Sequence[Array]) -> Mask:
     """Return which robots (N,) go ways of their own for a while in which they push with little (`light`).
 
-    off  (T, N) times their noise, of every recording: one that slipped is off by much the same throughout
+    off  (T, N) times their noise, of every recording: one that slipped is off by much the same but for that moment
     """
     out = np.zeros(parts[0].seen.shape[1], np.bool_)
     for part, rows, away in zip(parts, light, off, strict=True):
         away = as_long(away, len(part))
         for i in range(len(out)):
-            spread = [_of(away, part.seen, i, start, stop).std() for start, stop in runs(rows[:, i])]
-            out[i] |= max(spread, default=0.0) >= OFF
+            for start, stop in runs(rows[:, i]):
+                own = _of(away, part.seen, i, start, stop)
+                seconds = np.array_split(own, max(1, int(len(own) / part.rate)))
+                out[i] |= np.quantile([second.std() for second in seconds], OFTEN) >= OFF
     return out
 
 
