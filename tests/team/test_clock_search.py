@@ -104,6 +104,17 @@ def test_clocks_of_noisy_twists_are_found_to_within_their_bars(loud: float) -> N
     assert np.sqrt(np.mean(np.square(off))) < 1.7
 
 
+def test_bars_of_clocks_hold_twists_that_err_slowly() -> None:
+    noise = replace(NOISY, rate_rad_s=3e-3, velocity_m_s=2e-3, twist_spectrum="2hz")
+    off = []
+    for seed in range(100, 106):
+        scene = TeamScene(noise, sensing="twists", bases_move=True, kinds=("still", "motion"), motion_samples=3000)
+        found = JointTeam().identify(late(simulate_team(scene, seed).log, robot1=0.013, robot2=-0.02))
+        for name, seconds in (("robot1", 0.013), ("robot2", -0.02)):
+            off.append((found.clock_offsets_s[name] - seconds) / found.clock_offset_std_s[name])
+    assert np.sqrt(np.mean(np.square(off))) < 2.2
+
+
 def test_a_small_bar_has_its_digits() -> None:
     (said,) = late_clocks({"a": 0.0, "b": -0.01998765}, {"b": 3.97e-5})
     assert "The stamps of 'b' are 19.988 ± 0.040 ms early" in said.message

@@ -13,6 +13,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, STILL_TURNS, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
+from steelyard.spatial import Rotation
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
@@ -116,3 +117,22 @@ def test_noise_that_hides_the_mass_gives_no_mass(freedom: Freedom, kinds: tuple[
         JointTeam().identify(trial(100, freedom, loud, kinds=kinds).log)
     found = JointTeam().identify(trial(100, Freedom.general(), loud, kinds=("still", "motion")).log)
     assert abs(found.mass - 12.0) < 3 * np.sqrt(found.covariance[0, 0])
+
+
+def test_a_base_that_drifts_is_no_payload_that_did_not_turn() -> None:
+    noise = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.5)
+    log = simulate_team(TeamScene(noise, 3, sensing="poses", motion_samples=3000), 1).log
+    recordings = []
+    for recording in log.recordings:
+        track = recording.tracks["robot1"]
+        turn = Rotation.exp(np.outer(np.deg2rad(0.15) * track.time, [0.0, 0.0, 1.0])).matrix
+        channels = dict(track.channels)
+        channels["rotation"] = turn @ channels["rotation"]
+        channels["position"] = np.einsum("tij,tj->ti", turn, channels["position"])
+        recordings.append(replace(recording, tracks={**recording.tracks, "robot1": replace(track, channels=channels)}))
+    found = JointTeam().identify(log.with_recordings(*recordings))
+    said = [f for f in found.findings if f.code == "grasp-direction-lost"]
+    assert said
+    for finding in said:
+        assert "which hides how the payload turned" in finding.message
+        assert 'base = "moving"' in finding.remedy

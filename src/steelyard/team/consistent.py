@@ -26,9 +26,7 @@ def consistent(phi: Array, covariance: Array, scale: Array) -> Array:
     goal = phi / scale
     F = np.linalg.inv(covariance / np.outer(scale, scale) + 1e-18 * np.eye(10))
     F /= np.trace(F)
-    values, vectors = np.linalg.eigh(pseudo)
-    start = (vectors * np.maximum(values, 1e-3 * max(float(values[-1]), 1.0))) @ vectors.T
-    theta = forms.log_cholesky(start)
+    theta = forms.log_cholesky(_nearby(pseudo))
     damping, found = 1e-3, forms.from_log_cholesky(theta)
     cost = float((found - goal) @ F @ (found - goal))
     for _ in range(STEPS):
@@ -48,3 +46,19 @@ def consistent(phi: Array, covariance: Array, scale: Array) -> Array:
             if damping > 1e8:
                 break
     return np.asarray(found * scale)
+
+
+def _nearby(pseudo: Array) -> Array:
+    """Return the pseudo-inertia (4, 4) of a body to start from: of the same mass and centre of mass, where the mass is
+    above zero. These are mostly known far better than the rest, and a search from elsewhere creeps along what they
+    allow.
+    """
+    mass, first = float(pseudo[3, 3]), pseudo[:3, 3]
+    if mass <= 0:
+        values, vectors = np.linalg.eigh(pseudo)
+        return np.asarray((vectors * np.maximum(values, 1e-3 * max(float(values[-1]), 1.0))) @ vectors.T)
+    out = pseudo.copy()
+    point = np.outer(first, first) / mass
+    values, vectors = np.linalg.eigh(pseudo[:3, :3] - point)
+    out[:3, :3] = point + (vectors * np.maximum(values, 1e-3 * max(float(values[-1]), mass))) @ vectors.T
+    return out

@@ -27,19 +27,35 @@ TILTED = 0.03
 USUAL_GAIN = 0.01
 # A direction is called by an axis where it is within this cosine of it.
 ALONG = 0.9
+# A bias that stands still in the room is worth a word from this size [N].
+HOME_BIAS = 0.03
 # Steps [standard deviations] that a fit may leave untaken without a word.
 UNSETTLED = 0.1
 AXES = ("x", "y", "z")
 
 
-def lost_directions(grasps: Mapping[str, GraspEstimate], down: Array | None) -> Iterator[Finding]:
-    """Yield grasp-direction-lost for every grasp and direction in words; `down` (3,) is gravity in R, where known."""
+def lost_directions(
+    grasps: Mapping[str, GraspEstimate], down: Array | None, apart: Array | None = None
+) -> Iterator[Finding]:
+    """Yield grasp-direction-lost for every grasp and direction in words.
+
+    down  (3,) gravity in R, where known     apart  (2,) as in `Seen`
+    """
     for name, grasp in grasps.items():
         if not len(grasp.lost):
             continue
         words = [_in_words(direction, down, name) for direction in _sparse(grasp.lost)]
         turned = np.linalg.matrix_rank(grasp.lost[:, :3], tol=1e-2)
         kinds = len(words)
+        if apart is not None:
+            size = f"{np.rad2deg(apart[0]):.2g} deg and {1e3 * apart[1]:.2g} mm"
+            yield Finding(
+                "grasp-direction-lost",
+                f"{_listed(words)}: robots disagree by {size}, which hides how the payload turned. Loud encoders do "
+                "that, and so does a base that moves or drifts though it is said to stand.",
+                'Where a base moves, say base = "moving" and log its twists; else measure better or turn farther.',
+            )
+            continue
         if turned == 0 and kinds == 1:
             why = "all rotation so far was about one axis. Tilt the payload about another axis"
         elif turned == 0:
@@ -184,6 +200,16 @@ def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:
     return (
         f"Error bars hold no gain error that lasts: 1 % on every force axis would move the mass by {moved:.2g} kg, "
         "and the centre of mass with it.",
+    )
+
+
+def biased_at_home(size: float) -> tuple[str, ...]:
+    """Return a note where forces measured below gimbals err by a bias of `size` [N] that stands still in the room."""
+    if size < HOME_BIAS:
+        return ()
+    return (
+        f"Forces of robots with passive gimbals err by about {size:.1g} N in the axes of their homes, as springs of a "
+        "Delta do: such a bias looks like weight. It is fitted, and bars allow for it.",
     )
 
 

@@ -64,7 +64,10 @@ def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding
     if suspects:
         where, beside = f"the force sensor of {_listed(suspects)}", ""
     else:
-        where, beside = "each robot's force sensor", " Does gravity point where the bases say?"
+        where, beside = (
+            "each robot's force sensor",
+            " Does gravity point where the bases say? Did anything touch the payload?",
+        )
     remedy = f"Check {where}: does it live, and are unit, frame, order and signs of its columns right?{beside}"
     yield Finding("wrench-unexplained", text, remedy)
 

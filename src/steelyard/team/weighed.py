@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -15,6 +15,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.changes.odd_recording import without_odd
+from steelyard.team.changes.touched import Touched, together, without_touched
 from steelyard.team.clocks.errors import ClockErrors, Errors
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
@@ -27,12 +28,14 @@ from steelyard.team.payload.balance import require_balance
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, fit_payload
+from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.model import Group, unit_bias
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.team_findings import (
     bad_robots,
+    biased_at_home,
     gains,
     late_clocks,
     lost_directions,
@@ -52,6 +55,8 @@ COMPARABLE = 0.1
 UNWEIGHED = 0.5
 # A mass below zero by fewer standard deviations is open; by more, a sign is wrong.
 OPEN_SIGN = 3.0
+# Times that rows in which something touched the payload are looked for, each in what the last fit leaves.
+TOUCHES = 3
 # Findings that say already why forces do not fit.
 TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
 
@@ -67,6 +72,7 @@ class Seen:
     rows          of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
     order         how often the motion that they come from is differentiated: twice for poses, once for twists
     down          (3,) gravity in R, None where nobody tells it
+    apart         (2,) [rad, m] by how much robots disagree, where that may hide what the payload turned
     """
 
     log: TeamLog
@@ -81,6 +87,7 @@ class Seen:
     path: Array
     order: int
     down: Array | None
+    apart: Array | None = None
 
 
 def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz: float) -> TeamEstimate:
@@ -92,14 +99,20 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     require_metres(log.names, grasps)
     placed = balance_frame(grasps).inverse() @ grasps
     require_balance(log, [body for body, _ in seen.rows], placed)
-    groups = _groups(seen.rows, seen.path, highest_hz, seen.order)
     size = team_size(grasps, spread)
     known = spread.turn(size) < COMPARABLE
-    groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
     six_axis = np.array([not log.force_only(name) for name in log.names])
-    C = unit_bias(D, six_axis, size)
-    payload = fit_payload(groups, D, C, size, with_gain)
+
+    def fitted(rows: list[tuple[BodyRows, Array]]) -> _Fitted:
+        groups = _groups(rows, seen.path, highest_hz, seen.order)
+        groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
+        C = unit_bias(D, six_axis, size)
+        return _Fitted(groups, D, C, tuple(read), fit_payload(groups, D, C, size, with_gain))
+
+    first, touched = _untouched(seen.rows, fitted, size, highest_hz)
+    groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
+    payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
     _require_one_clock(payload.chi2)
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
@@ -110,18 +123,58 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     found = (
         *seen.findings,
         *read,
+        *(one.finding() for one in touched),
         *odd,
         *(() if told else unexplained(payload, D, log.names)),
-        *lost_directions(team.grasps, seen.down),
+        *lost_directions(team.grasps, seen.down, seen.apart),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *seen.begun.findings(log),
         *bad_robots(log.names, seen.noise),
         *(gains(payload.gain, payload.gainless) if known else ()),
         *open_parameters(team.identified, team.evidence.rank),
     )
-    said = (*unsettled(seen.left), *unseen_gains(team, weight_by_gains(groups, D)))
+    said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
     said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
     return replace(team, findings=found, notes=(*team.notes, *said))
+
+
+@dataclass(frozen=True, eq=False)
+class _Fitted:
+    """The payload of some rows, with the matrices that it was fitted with, and how forces were read."""
+
+    groups: tuple[Group, ...]
+    D: Array
+    C: Array
+    read: tuple[Finding, ...]
+    payload: PayloadFit
+
+
+def _untouched(
+    rows: list[tuple[BodyRows, Array]],
+    fitted: Callable[[list[tuple[BodyRows, Array]]], _Fitted],
+    size: float,
+    highest_hz: float,
+) -> tuple[_Fitted, tuple[Touched, ...]]:
+    """Return the fit without rows in which something touched the payload, and what was found of that.
+
+    Touches that bend the first fit are seen better by the next. Where forces are misread nothing is asked, and nothing
+    is left out that the parameters hang on.
+    """
+    fit, touched = fitted(rows), list[Touched]()
+    for _ in range(TOUCHES):
+        if fit.read:
+            break
+        rows, found = without_touched(rows, fit.payload.parameters, fit.D, size, highest_hz)
+        if not found:
+            break
+        try:
+            fewer = fitted(rows)
+        except CannotAnswer:
+            break
+        if fewer.payload.lost.shape[1] > fit.payload.lost.shape[1]:
+            break
+        fit, touched = fewer, [*touched, *found]
+    return fit, together(touched)
 
 
 def _with_forces_read(

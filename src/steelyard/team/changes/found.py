@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import Field, replace
+from functools import partial
 from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
@@ -17,7 +18,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.changes.presence import as_long, idle, let_go, presence_findings
+from steelyard.team.changes.presence import LIGHT, SHARE, as_long, idle, let_go, presence_findings, strayers
 from steelyard.team.changes.slips import SlipAt
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.stacked import Stretch
@@ -71,17 +72,52 @@ def without_changes(
     fitted  makes the fit of recordings after an edit
     other   which slips of two robots, the clearest first, are taken for those of the robot that does not show them best
     """
-    resting = idle(raw)
-    if not any(rows.any() for rows in resting):
-        return _without_slips(log, clocks, fitted(_unchanged), fitted, _unchanged, other)
-    off = fitted(lambda parts: _unseen(parts, resting)).off(log)
-
-    def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
-        return tuple(let_go(p, r, o) for p, r, o in zip(parts, resting, off, strict=True))
-
+    bare, light = idle(raw, SHARE), idle(raw, LIGHT)
+    given = None if any(rows.any() for rows in bare) else fitted(_unchanged)
+    # One who goes ways of its own makes a rough fit; else who pushes with little merely does.
+    asked = None if given is not None and not given.rough else _asked(bare, light, fitted)
+    if asked is None:
+        given = fitted(_unchanged) if given is None else given
+        return _without_slips(log, clocks, given, fitted, _unchanged, other)
+    resting, team = asked
+    off = team.off(log)
+    edit = partial(_gone, bare=bare, light=resting, off=off, strays=strayers(raw, resting, off))
     found = presence_findings(raw, edit(raw), log.names)
     team = _without_slips(log, clocks, fitted(edit), fitted, edit, other)
     return replace(team, findings=(*found, *team.findings))
+
+
+def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit], F]) -> tuple[Sequence[Mask], F] | None:
+    """Return rows (T, N) in which robots that push with little may have let go, and the fit without those poses.
+
+    All robots' rows; where too little is left without them, those of the robot without whom the others agree best, as
+    where one bears more since another let go. None where nobody pushes with little.
+    """
+    if not any(rows.any() for rows in light):
+        return None
+    nobody_bare = not any(rows.any() for rows in bare)
+    try:
+        return light, fitted(partial(_unseen, rows=light))
+    except (BadValue, CannotAnswer, *BREAKDOWNS):
+        if not nobody_bare:
+            return bare, fitted(partial(_unseen, rows=bare))
+    best: tuple[Sequence[Mask], F] | None = None
+    for robot in np.flatnonzero(np.any([rows.any(0) for rows in light], axis=0)):
+        own = [rows & (np.arange(rows.shape[1]) == robot) for rows in light]
+        try:
+            team = fitted(partial(_unseen, rows=own))
+        except (BadValue, CannotAnswer, *BREAKDOWNS):
+            continue
+        if best is None or np.log(team.fit.noise).sum() < np.log(best[1].fit.noise).sum():
+            best = own, team
+    return best
+
+
+def _gone(
+    parts: tuple[Stretch, ...], bare: Sequence[Mask], light: Sequence[Mask], off: Sequence[Array], strays: Mask
+) -> tuple[Stretch, ...]:
+    """Return recordings with robots let go that push with little and are `off`, as in `let_go`."""
+    return tuple(let_go(p, b, x, o, strays) for p, b, x, o in zip(parts, bare, light, off, strict=True))
 
 
 def _without_slips(
@@ -108,7 +144,7 @@ def _without_slips(
         # Recordings that differ for another reason than a slip still do.
         if before.rough and found.between and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER):
             break
-        measured = team.measured(log, found)
+        measured = team.measured(log, found.beside(slips))
         # What bends the first fit looks larger in it.
         if not measured.slip.large:
             break

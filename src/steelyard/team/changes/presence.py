@@ -22,12 +22,18 @@ from steelyard.team.stacked import Stretch
 # A push below this share of the robot's usual one is idle where it stays so for IDLE_S [s]; forces are averaged over
 # MEAN_S. What happens within EDGE_S of a change is used for nothing.
 SHARE, IDLE_S, MEAN_S, EDGE_S = 0.1, 1.0, 0.2, 0.4
+# One who has let go may still bear a gripper that hangs beyond the sensor: below this share it is asked.
+LIGHT = 0.6
+# A fifth of the seconds show who goes ways of its own: it may rest between.
+OFTEN = 0.8
+# What pushes with next to nothing in so many of these rows bears no gripper.
+MOSTLY = 0.9
 # An idle grasp is off the payload where it is so many times its noise from where the others say it must be.
 OFF = 5.0
 
 
-def idle(parts: Sequence[Stretch]) -> list[Mask]:
-    """Return the rows (T, N) of every recording in which a robot pushes with next to nothing."""
+def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
+    """Return the rows (T, N) of every recording in which a robot pushes with less than a share of its usual push."""
     sizes = [_smoothed(part) for part in parts]
     count = parts[0].seen.shape[1]
     usual = np.zeros(count)
@@ -36,7 +42,7 @@ def idle(parts: Sequence[Stretch]) -> list[Mask]:
         usual[i] = np.quantile(felt, 0.9) if len(felt) else 0.0
     out = []
     for size, part in zip(sizes, parts, strict=True):
-        small = (size < SHARE * usual) & part.felt & part.carries
+        small = (size < share * usual) & part.felt & part.carries
         out.append(np.stack([_long(small[:, i], IDLE_S * part.rate) for i in range(count)], axis=1))
     return out
 
@@ -62,20 +68,49 @@ def as_long(values: Any, rows: int) -> Any:
     return values[np.minimum(np.arange(rows), len(values) - 1)]
 
 
-def let_go(part: Stretch, idle_rows: Mask, off: Array) -> Stretch:
-    """Return the recording with robots that are idle and `off` (T, N) by more than OFF times their noise let go.
+def strayers(parts: Sequence[Stretch], light: Sequence[Mask], off: Sequence[Array]) -> Mask:
+    """Return which robots (N,) go ways of their own for a while in which they push with little (`light`).
 
-    Their rows tell neither motion nor wrench; around a change nobody's wrench is used, since the sum is in doubt.
+    off  (T, N) times their noise, of every recording: one that slipped is off by much the same but for that moment
     """
-    idle_rows, off = as_long(idle_rows, len(part)), as_long(off, len(part))
+    out = np.zeros(parts[0].seen.shape[1], np.bool_)
+    for part, rows, away in zip(parts, light, off, strict=True):
+        away = as_long(away, len(part))
+        for i in range(len(out)):
+            for start, stop in runs(rows[:, i]):
+                own = _of(away, part.seen, i, start, stop)
+                seconds = np.array_split(own, max(1, int(len(own) / part.rate)))
+                out[i] |= np.quantile([second.std() for second in seconds], OFTEN) >= OFF
+    return out
+
+
+def _of(off: Array, seen: Mask, robot: int, start: int, stop: int) -> Array:
+    """Return by how much a robot is off in the rows from start to stop in which it was seen; zero where in none."""
+    rows = off[start:stop, robot][seen[start:stop, robot]]
+    return rows if len(rows) else np.zeros(1)
+
+
+def let_go(part: Stretch, bare: Mask, light: Mask, off: Array, strays: Mask) -> Stretch:
+    """Return the recording with robots let go that push with little where they are `off` (T, N) times their noise.
+
+    bare   (T, N) rows in which they push with next to nothing: the others carry all
+    light  (T, N) rows in which it is a gripper's weight: nobody's wrench is used, since whoever holds the payload no
+           longer bears the gripper; of robots only who are known to go ways of their own, `strays` (N,)
+
+    Their rows tell no motion; around a change nobody's wrench is used, either, since the sum is in doubt.
+    """
+    bare, light, off = (as_long(rows, len(part)) for rows in (bare, light, off))
     carries, seen, felt = part.carries.copy(), part.seen.copy(), part.felt.copy()
-    for i in range(idle_rows.shape[1]):
-        for start, stop in runs(idle_rows[:, i]):
-            there = part.seen[start:stop, i]
-            # What stands still beside a payload at rest cannot be told from what holds it.
-            if not there.any() or np.sqrt((off[start:stop, i][there] ** 2).mean()) < OFF:
+    edge = int(np.ceil(EDGE_S * part.rate))
+    for i in range(bare.shape[1]):
+        empty = bare[:, i].copy()
+        for start, stop in runs(light[:, i] & strays[i]):
+            if empty[start:stop].mean() < MOSTLY and _away(_of(off, part.seen, i, start, stop)):
+                around = slice(max(0, start - edge), stop + edge)
+                seen[around, i] = felt[around, i] = empty[start:stop] = False
+        for start, stop in runs(empty):
+            if not _away(_of(off, part.seen, i, start, stop)):
                 continue
-            edge = int(np.ceil(EDGE_S * part.rate))
             carries[start:stop, i] = False
             seen[max(0, start - edge) : stop + edge, i] = False
             for k in (start, stop):
@@ -84,11 +119,23 @@ def let_go(part: Stretch, idle_rows: Mask, off: Array) -> Stretch:
     return replace(part, carries=carries, seen=seen, felt=felt)
 
 
+def _away(off: Array) -> bool:
+    """Tell whether a grasp is off the payload, by so much in rows (T,).
+
+    What stands still beside a payload at rest cannot be told from what holds it.
+    """
+    return float(np.sqrt((off**2).mean())) >= OFF
+
+
 def presence_findings(before: Sequence[Stretch], after: Sequence[Stretch], names: Sequence[str]) -> list[Finding]:
     """Return robot-left and robot-joined with times, for every change that was found."""
     out = []
     for was, now in zip(before, after, strict=True):
         for i, name in enumerate(names):
+            gone = was.seen[:, i] & ~now.seen[:, i] & now.carries[:, i] & ~now.felt[:, i]
+            for start, stop in runs(_long(gone, IDLE_S * was.rate)):
+                text = _with_gripper(name, was, was.wrench[:, i, 3:], start, stop)
+                out.append(Finding.of("robot-left", text))
             for start, stop in runs(was.carries[:, i] & ~now.carries[:, i]):
                 if start > 0:
                     text = f"'{name}' let go of the payload at {was.time[start]:.2f} s of '{was.name}'"
@@ -100,3 +147,14 @@ def presence_findings(before: Sequence[Stretch], after: Sequence[Stretch], names
                     text = f"'{name}' held nothing during all of '{was.name}'"
                     out.append(Finding.of("robot-left", f"{text}; the others carry it."))
     return out
+
+
+def _with_gripper(name: str, part: Stretch, push: Array, start: int, stop: int) -> str:
+    """Return what is said of a robot that let go from one row to another and went on to push (T, 3) [N]."""
+    size = float(np.linalg.norm(push[start:stop].mean(0)))
+    if start == 0 and stop == len(part):
+        what = f"'{name}' held nothing during all of '{part.name}'"
+    else:
+        until = "" if stop == len(part) else f" until {part.time[stop]:.2f} s"
+        what = f"'{name}' let go of the payload at {part.time[start]:.2f} s of '{part.name}'{until}"
+    return f"{what} and measured {size:.2g} N, as of its gripper's weight; nobody's wrench is used meanwhile."

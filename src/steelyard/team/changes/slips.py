@@ -7,6 +7,7 @@ along directions that err independently of each other: what turns the others' mo
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numba
@@ -57,7 +58,7 @@ class SlipAt:
     """A slip in one recording at `time` [s]; `step` (6,) rotation and position of the grasp after it, in its own axes.
 
     Without a step the rows after it are left out of everything. A time of -inf is before the recording, and after
-    recording `since`; that is the one before unless it is given.
+    recording `since`; that is the one before unless it is given. It is timed before `until` [s].
     """
 
     recording: int
@@ -65,6 +66,7 @@ class SlipAt:
     slip: Slip
     step: Array | None = None
     since: int | None = None
+    until: float = np.inf
 
     @property
     def between(self) -> bool:
@@ -73,6 +75,7 @@ class SlipAt:
 
     def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array, drifts: bool = False) -> SlipAt:
         """Return the slip from the residuals (T, 6) of its robot against the others' motion, as `find_slip`."""
+        seen = seen & (part.time < self.until)
         score, step = _steps(apart, seen, *_window(part.rate, drifts), noise)
         row = int(np.argmax(score))
         middle = part.time[row]
@@ -80,6 +83,11 @@ class SlipAt:
         full = step[row] if drifts else apart[after].mean(0) - apart[before].mean(0)
         slip = Slip.of(self.slip.robot, row, full, float(score[row]))
         return replace(self, time=float(middle), slip=slip, step=full)
+
+    def beside(self, slips: Sequence[SlipAt]) -> SlipAt:
+        """Return the slip, to be timed before others of its robot in its recording: they are clear, and known."""
+        own = (slip.time for slip in slips if (slip.recording, slip.slip.robot) == (self.recording, self.slip.robot))
+        return replace(self, until=min(own, default=np.inf))
 
     def applied(self, parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
         """Return the recordings without the slipped grasp's poses from then on, its wrench moved to where it was."""

@@ -210,11 +210,14 @@ def _turned(S: Array, robot: int, wrench: Array) -> Array:
 
 
 def _reread(group: Group, robot: int, wrench: Array) -> Group:
-    parts = tuple(
-        replace(part, scatter=_turned(part.scatter, robot, wrench), judged=_turned(part.judged, robot, wrench))
-        for part in group.parts
-    )
-    return replace(group, parts=parts)
+    own = slice(18 + 6 * robot - len(wrench), 18 + 6 * robot)
+    parts = []
+    for part in group.parts:
+        room = part.room.copy()
+        room[..., own] = room[..., own] @ wrench.T
+        read, judged = (_turned(S, robot, wrench) for S in (part.scatter, part.judged))
+        parts.append(replace(part, scatter=read, room=room, judged=judged))
+    return replace(group, parts=tuple(parts))
 
 
 def _unlike(groups: Sequence[Group], D: Array, robot: int, X: Array) -> bool:

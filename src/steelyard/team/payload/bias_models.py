@@ -44,16 +44,19 @@ def ladder_of(recordings: int, with_gain: bool) -> Array:
     return np.array([(common, bias, *gain) for common in COMMON for bias in OWN for gain in (*anew, *lasting)])
 
 
-def ladder_shares(evidence: Array, ladder: Array) -> Array:
-    """Return the share (L,) of every size on the ladder (L, 4) by evidence; none in the gain is the likeliest.
-
-    What would change nothing has none.
+def ladder_chances(evidence: Array, ladder: Array) -> Array:
+    """Return the logarithm (L,) of evidence times what every size of the ladder (L, 4) is worth beforehand; none in the
+    gain is the likeliest.
     """
     chance = evidence + np.where(ladder[:, 2:].any(1), 0.0, np.log(NO_GAIN_ERROR))
     chance -= np.where(ladder[:, 0] > COMMON[0], np.log(NO_COMMON), 0.0)
     # In one recording a gain that is drawn anew is one that lasts.
     lasting = ladder[:, 3] if ladder[:, 0].any() else ladder[:, 2]
-    chance -= np.where(lasting > 0, np.log(NO_LASTING), 0.0)
+    return np.asarray(chance - np.where(lasting > 0, np.log(NO_LASTING), 0.0))
+
+
+def shares(chance: Array) -> Array:
+    """Return the share (L,) of every size by the logarithms (L,) of its chance; what would change nothing has none."""
     weight = np.exp(chance - chance.max())
     weight[weight < NOTHING] = 0.0
     return np.asarray(weight / weight.sum())
@@ -91,6 +94,7 @@ class Models:
     ladder (L, 4)
     phi (L, P)     covariance, information (L, P, P)     chi2 (L,)
     share   (L,) of every size by evidence; phi and covariance are zero where it is
+    evidence  logarithm of that of all sizes together, by what each is worth beforehand
     H, g    of the recordings (R, P + B, P + B), (R, P + B)
     narrow  (L', R, B, B) inverse spread of the biases drawn anew, one per kind, `kind` (L,) says which
     common  (L, B, B) V of the common bias, where there is more than one recording
@@ -102,6 +106,7 @@ class Models:
     covariance: Array
     information: Array
     share: Array
+    evidence: float
     chi2: Array
     H: Array
     g: Array
@@ -143,15 +148,15 @@ class Models:
         ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(size)
         seen = (inverses(full + ridge)[0] @ (scale * right)[..., None])[..., 0]
         chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
-        evidence = -0.5 * (chi2 + logarithms(np.eye(size) + full) + told)
-        share = ladder_shares(evidence, ladder)
+        chance = ladder_chances(-0.5 * (chi2 + logarithms(np.eye(size) + full) + told), ladder)
+        share, evidence = shares(chance), float(np.logaddexp.reduce(chance))
         told_of = np.flatnonzero(share)
         noise = sum((n.noise for n in normals), np.zeros((size, size)))
         phi, covariance = np.zeros((len(ladder), size)), np.zeros((len(ladder), size, size))
         phi[told_of], covariance[told_of] = _answers(full[told_of], noise * unit, (scale * right)[told_of])
         return cls(
-            ladder, scale * phi, unit * covariance, plain, share, np.asarray(chi2), H, g, narrow, kind, common[which],
-            noise,
+            ladder, scale * phi, unit * covariance, plain, share, evidence, np.asarray(chi2), H, g, narrow, kind,
+            common[which], noise,
         )  # fmt: skip
 
     @property

@@ -19,7 +19,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.log import Mask
 from steelyard.logs.runs import runs
-from steelyard.spatial import Pose, Rotation, cross, cross_matrix
+from steelyard.spatial import Pose, Rotation, cross, cross_matrix, unit_vectors
 from steelyard.team.stacked import Stretch
 from steelyard.team.turns import turns_between
 
@@ -39,11 +39,13 @@ class Run:
 
     motion   (T, 12) angular acceleration, acceleration less gravity, omega omega^T (xx xy xz yy yz zz)
     pushed   (T, 6 N) moment and force of every robot in its own grasp axes, zero where it holds nothing
+    room     (T, 9) what stands still in the room: the axes x, y, z of H, or (T, 3) up alone where bases move
     rows     which rows of the recording these are
     """
 
     motion: Array
     pushed: Array
+    room: Array
     rows: slice
     rate: float
 
@@ -98,17 +100,17 @@ def from_poses(part: Stretch, path: Pose, known: Mask, gravity: Array, highest_h
     runs = []
     for rows in _runs(good, part, still, highest_hz):
         place, turn = path.position[rows], path.rotation[rows]
+        room = turn.matrix.reshape(-1, 9)
         if still:
             down = turn.inverse().apply(gravity)
             motion = np.zeros((len(down), 12))
             motion[:, 3:6] = -down
-            runs.append(Run(motion, pushed[rows], rows, part.rate))
+            runs.append(Run(motion, pushed[rows], room, rows, part.rate))
             continue
         motion = _moving(turn, place, gravity, part.rate, PATH_FILTER * highest_hz)
         inside = _inside(rows, part.rate, highest_hz)
-        runs.append(
-            Run(motion[inside.start - rows.start : inside.stop - rows.start], pushed[inside], inside, part.rate)
-        )
+        kept = slice(inside.start - rows.start, inside.stop - rows.start)
+        runs.append(Run(motion[kept], pushed[inside], room[kept], inside, part.rate))
     return BodyRows(part.name, still, tuple(runs))
 
 
@@ -173,7 +175,7 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
         if still:
             motion = np.zeros((rows.stop - rows.start, 12))
             motion[:, 3:6] = supported[rows]
-            runs.append(Run(motion, pushed[rows], rows, part.rate))
+            runs.append(Run(motion, pushed[rows], unit_vectors(supported[rows]), rows, part.rate))
             continue
         smooth = twist[rows]
         if PATH_FILTER * highest_hz < 0.45 * part.rate:
@@ -182,9 +184,8 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
         lifted = rise[:, 3:] + cross(smooth[:, :3], smooth[:, 3:]) + supported[rows]
         motion = features(smooth[:, :3], rise[:, :3], lifted)
         inside = _inside(rows, part.rate, highest_hz)
-        runs.append(
-            Run(motion[inside.start - rows.start : inside.stop - rows.start], pushed[inside], inside, part.rate)
-        )
+        kept = slice(inside.start - rows.start, inside.stop - rows.start)
+        runs.append(Run(motion[kept], pushed[inside], unit_vectors(supported[inside]), inside, part.rate))
     return BodyRows(part.name, still, tuple(runs))
 
 

@@ -12,6 +12,7 @@ from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import Group, gain_columns
+from steelyard.team.payload.spectra import Spectra
 
 # The features of the motion and the one of a bias among all that `Spectra` scatters.
 SEEN = np.array([*range(12), -1])
@@ -56,13 +57,14 @@ def _moved(fit: PayloadFit, changes: Array) -> Array:
     """Return d phi (10, N C) of each of C changes of the block (6, 6) that sums what a grasp pushes, (N, C, 6, 6)."""
     count, kinds = changes.shape[:2]
     flat = changes.reshape(count, 6 * kinds, 6)
-    right = np.zeros((kinds * count, 10))
+    right = np.zeros((kinds * count, 10 + len(fit.levers)))
     for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
         for part, blind in zip(group.parts, blinds, strict=True):
-            for W, S in zip(weights, part.scatter, strict=True):
-                pushes = S[SEEN, 12:-1].reshape(len(SEEN), count, 6).transpose(1, 2, 0)
+            for W, S in zip(weights, _seen(fit, part), strict=True):
+                pushes = S[:, 12 : 12 + 6 * count].reshape(-1, count, 6).transpose(1, 2, 0)
                 change = flat @ pushes
-                right += change.reshape(kinds * count, -1) @ (W @ _levers(blind)).reshape(10, -1).T
+                seen = (W @ _levers(fit, blind)).reshape(right.shape[1], -1)
+                right += change.reshape(kinds * count, -1) @ seen.T
     return np.asarray(_kept(fit) @ right.T)
 
 
@@ -74,9 +76,10 @@ def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
         for part, blind in zip(group.parts, blinds, strict=True):
             S = part.scatter
             mean = S[:, :, -1].sum(0) / max(float(S[:, -1, -1].sum()), 1e-300)
-            varying = (S[:, :, 12 + force] - S[:, :, -1:] * mean[12 + force])[:, SEEN]
+            seen = _seen(fit, part)
+            varying = seen[:, :, 12 + force] - seen[:, :, S.shape[2] - 1, None] * mean[12 + force]
             each = np.einsum("kau,kxu->axu", weights @ unit, varying)
-            moved = back @ _levers(blind).reshape(10, -1) @ each.reshape(-1, len(force))
+            moved = back @ _levers(fit, blind).reshape(back.shape[1], -1) @ each.reshape(-1, len(force))
             out += fit.gain**2 * moved @ moved.T
     return out
 
@@ -93,17 +96,30 @@ def weight_by_gains(groups: Sequence[Group], D: Array) -> float:
     return float(np.linalg.norm(whole @ pushed) / max(float(whole @ whole), 1e-300))
 
 
-def _levers(blind: Array) -> Array:
-    """Return what the wrench of a row with features SEEN says of the ten parameters (10, 6, 13) beside its bias."""
-    return np.concatenate([basis(), -blind[..., None]], axis=2)
+def _seen(fit: PayloadFit, part: Spectra) -> Array:
+    """Return the scatter (K, 13 + Q, Z) of the features by which a wrench tells the parameters with all that is there.
+
+    Q  of what stands still in the room, where the fit allows for biases there
+    """
+    S = part.scatter[:, SEEN]
+    return np.concatenate([S, part.room[..., : S.shape[2]]], axis=1) if len(fit.levers) else S
+
+
+def _levers(fit: PayloadFit, blind: Array) -> Array:
+    """Return what the wrench of a row with these features says of the parameters (P, 6, 13 + Q) beside its bias."""
+    out = np.zeros((len(blind), 6, len(SEEN) + fit.levers.shape[2]))
+    out[:10, :, :12], out[10:, :, len(SEEN) :] = basis(), fit.levers
+    out[:, :, 12] = -blind
+    return out
 
 
 def _kept(fit: PayloadFit) -> Array:
-    """Return F^-1 (10, 10) in the directions that the rows show."""
-    scaled = fit.information * np.outer(fit.scale, fit.scale)
-    inverse = np.linalg.pinv(scaled, hermitian=True, rcond=1e-10) * np.outer(fit.scale, fit.scale)
+    """Return F^-1 (10, P) in the directions that the rows show."""
+    scale = np.concatenate([fit.scale, np.ones(len(fit.levers))])
+    unit = np.outer(scale, scale)
+    inverse = np.linalg.pinv(fit.information * unit, hermitian=True, rcond=1e-10) * unit
     keep = np.eye(10) - (fit.scale[:, None] * (fit.lost @ fit.lost.T)) / fit.scale
-    return np.asarray(keep @ inverse)
+    return np.asarray(keep @ inverse[:10])
 
 
 def turned_by_step(X_BG: Pose) -> Array:

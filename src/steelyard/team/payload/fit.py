@@ -8,7 +8,7 @@ Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, ce
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
@@ -34,6 +34,9 @@ class PayloadFit:
     gain         spread of the force axes' gains that the recordings show
     gainless     share of the evidence that gains do not err at all
     weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
+    unsure       factor by which weights that come from the rows widen the covariance
+    levers       (U, 6, Q) of biases that keep their direction in the room (`home_bias`); none in this module. Where
+                 there are, information and blind are those of [phi, u]
     """
 
     parameters: Array
@@ -49,6 +52,8 @@ class PayloadFit:
     blind: tuple[tuple[Array, ...], ...]
     residual: Array
     chi2: float
+    unsure: float = 1.0
+    levers: Array = field(default_factory=lambda: np.zeros((0, 6, 0)))
 
 
 def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with_gain: bool = True) -> PayloadFit:
@@ -82,13 +87,13 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
     # in the noise already.
     last = groups[-1]
-    covariance = covariance * (1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0))
+    unsure = 1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0)
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
     blind, shown = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts)), models.shown(scale)
     return PayloadFit(
-        phi, covariance, shown.lost, scale, models.information[models.best], shown.condition, models.gain,
+        phi, covariance * unsure, shown.lost, scale, models.information[models.best], shown.condition, models.gain,
         models.gainless, groups, weights, blind, _residual(groups),
-        float(models.chi2[models.best]) / max(6 * rows - 10, 1.0),
+        float(models.chi2[models.best]) / max(6 * rows - 10, 1.0), unsure,
     )  # fmt: skip
 
 

@@ -29,6 +29,7 @@ FADE_SHARE, FADE_S = 0.1, 1.0
 class Spectra:
     """One recording: scatter (K, Z, Z) per band of [motion (12), pushed (6 N), 1], and rows (K,) in each.
 
+    room                 scatter (K, Q, Z + Q) of what stands still in the room (Q = 9 or 3) with these and itself
     judged, judged_rows  the same of the rows by which noise is judged: at rest not the means, which are mostly bias
     samples              rows of the recording that are in it
     """
@@ -36,6 +37,7 @@ class Spectra:
     name: str
     still: bool
     scatter: Array
+    room: Array
     rows: Array
     judged: Array
     judged_rows: Array
@@ -76,26 +78,29 @@ def band_edges(recordings: Sequence[BodyRows], highest_hz: float) -> Array:
 
 def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
     """Return the scatter of one recording in the bands that end at `edges` (K,) [Hz]."""
-    width = 12 + recording.runs[0].pushed.shape[1] + 1
+    first = recording.runs[0]
+    width, beside = 12 + first.pushed.shape[1] + 1, first.room.shape[1]
     scatter, rows = np.zeros((len(edges), width, width)), np.zeros(len(edges))
+    room = np.zeros((len(edges), beside, width + beside))
     judged, judged_rows = scatter.copy(), rows.copy()
     for run in recording.runs:
         hz = frequencies(run, highest_hz)
-        flat = np.ones((len(run.motion), width))
-        flat[:, :12], flat[:, 12:-1] = run.motion, run.pushed
+        flat = np.ones((len(run.motion), width + beside))
+        flat[:, :12], flat[:, 12 : width - 1], flat[:, width:] = run.motion, run.pushed, run.room
         if not recording.still:
             flat *= fade(len(flat), run.rate)[:, None]
         z = dct(flat, axis=0, norm="ortho")[: len(hz)]
         for band, chosen in enumerate(bands(hz, edges)):
-            scatter[band] += z[chosen].T @ z[chosen]
+            scatter[band] += z[chosen, :width].T @ z[chosen, :width]
+            room[band] += z[chosen, width:].T @ z[chosen]
             rows[band] += chosen.stop - chosen.start
-        first = int(recording.still)
-        for band, chosen in enumerate(bands(hz[first:], edges)):
-            part = z[first:][chosen]
+        begin = int(recording.still)
+        for band, chosen in enumerate(bands(hz[begin:], edges)):
+            part = z[begin:, :width][chosen]
             judged[band] += part.T @ part
             judged_rows[band] += len(part)
     samples = sum(len(run.motion) for run in recording.runs)
-    return Spectra(recording.name, recording.still, scatter, rows, judged, judged_rows, samples)
+    return Spectra(recording.name, recording.still, scatter, room, rows, judged, judged_rows, samples)
 
 
 def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Array:

@@ -47,6 +47,8 @@ FOLLOWED = 2
 LEVEL = 0.02
 # Noise above this share of the motion asks whether the payload is rigid.
 LOUD = 0.05
+# From this share on nobody can say that the payload turned at all.
+STILL_TURNS = 0.9
 
 
 @dataclass(frozen=True, eq=False)
@@ -143,11 +145,21 @@ class PoseTeam:
     @cached_property
     def rough(self) -> bool:
         """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
+        return bool((self.fit.noise > LOUD * self._moved).any())
+
+    @cached_property
+    def apart(self) -> Array | None:
+        """By how much robots disagree (2,) [rad, m], where that is a good part of a turn that is more than it."""
+        worst = self.fit.noise.max(0)
+        return worst if LOUD < worst[0] / self._moved[0] < STILL_TURNS else None
+
+    @cached_property
+    def _moved(self) -> Array:
+        """How far the payload turned and moved (2,), rms [rad, m]."""
         path = self.fit.team.motion
         middle = Rotation.nearest(path.rotation.matrix.mean(0))
         turned = float(np.sqrt((turns_between(middle, path.rotation) ** 2).mean()))
-        moved = float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))
-        return bool((self.fit.noise > LOUD * np.array([turned, moved])).any())
+        return np.array([turned, float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))])
 
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""

@@ -103,8 +103,8 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level
     blind[unknown] = lost
     turn = adjoint(grasps)
     turn[:, 3:, :3] = 0.0
-    delays, doubt = _delays(merged, grasps, noise, reference)
-    late = np.sqrt(np.maximum(np.diag(doubt), 0))
+    delays, doubt, white = _delays(merged, grasps, noise, reference)
+    late = np.sqrt(np.maximum(np.diag(doubt), 0) * _late_inflation(data, grasps, noise, white))
     return TwistFit(grasps, noise, Spread(spread, blind, late, turn), delays, doubt, float(np.sqrt(gained)))
 
 
@@ -317,8 +317,8 @@ def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown
     return np.array([max(float(ratio[kind == k].mean()), 1.0) for k in range(2)])
 
 
-def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) -> tuple[Array, Array]:
-    """Return how late every clock is against the reference's (N,) [s], and its covariance, beside known grasps."""
+def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) -> tuple[Array, Array, float]:
+    """Return how late every clock is against the reference's (N,) [s], its covariance, and all clocks' information."""
     count = merged.count
     size = 6 * count
     H, g = np.zeros((count, count)), np.zeros(count)
@@ -327,10 +327,24 @@ def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) ->
         P, fitted = split.P, split.J @ split.inner
         rate = fitted @ (split.WJ.T @ S[size:, size:] @ split.WJ) @ fitted.T
         H += (P * rate).reshape(count, 6, count, 6).sum((1, 3))
-        mixed = P @ (S[:size, size:] @ split.WJ)
-        g -= np.einsum("ak,ak->a", mixed, fitted).reshape(count, 6).sum(1)
+        g += _late_scores(split, S)
     others = np.arange(count) != reference
     delays, covariance = np.zeros(count), np.zeros((count, count))
     inverse = np.linalg.pinv(H[np.ix_(others, others)], hermitian=True)
     delays[others], covariance[np.ix_(others, others)] = inverse @ g[others], inverse
-    return delays, covariance
+    return delays, covariance, float(H.trace())
+
+
+def _late_scores(split: _Split, S: Array) -> Array:
+    """Return how much each clock (N,) wants to be later, from a scatter (12 N, 12 N) of twists and their slopes."""
+    size = len(split.W)
+    mixed = split.P @ (S[:size, size:] @ split.WJ)
+    return np.asarray(-np.einsum("ak,ak->a", mixed, split.J @ split.inner).reshape(-1, 6).sum(1))
+
+
+def _late_inflation(data: TwistScatter, grasps: Pose, noise: Array, white: float) -> float:
+    """Return how much larger than for `white` noise the scores of the clocks scatter over windows."""
+    windows = np.zeros((int(data.window.max()) + 1, data.count))
+    for S, spoke, window in zip(data.scatter, data.spoke, data.window, strict=True):
+        windows[window] += _late_scores(_Split.of(spoke, grasps, noise), S)
+    return max(float((windows**2).sum()) / max(white, 1e-300), 1.0) if len(windows) >= 4 else 1.0

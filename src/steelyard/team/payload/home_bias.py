@@ -1,0 +1,181 @@
+"""A bias that keeps its direction in the room: that of forces which a robot measures below its gimbal.
+
+Springs of a Delta, and sensors under a gimbal, err by a force that is constant in the robot's home, not in its grasp.
+Robot i errs by beta_i ~ N(0, b^2) along the axes e_k of the room, which are c_k(t) in B and turn as the payload does:
+
+    sum_i [p_i x c_k; c_k] beta_ik = sum_j u_jk [q_j x c_k; s_j c_k]
+
+with [s_j; q_j] (4,) the directions that the columns [1; p_i] span, so that u is up to twelve numbers (four where only
+up is known). What points up is weight without inertia: still poses cannot tell it from mass, motion can. The u are
+fitted beside the ten parameters; how large b is, and whether there is any, is averaged by evidence.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.regressor import basis
+from steelyard.spatial import cross_matrix
+from steelyard.team.payload.bias_models import Models, ladder_of, shares
+from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.payload.model import Normal, normal
+from steelyard.team.payload.spectra import Spectra
+
+# [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
+SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
+NONE = 30.0
+# Those that are asked first, and the share from which such a bias counts.
+ASKED = SIZES[:4:2]
+COUNTS = 0.01
+# From this share of none at all on it is not said that there is one.
+DOUBTED = 0.5
+# Gains with less than this share are not tried beside such a bias.
+UNLIKELY = 1e-5
+# A direction that the grasps span to less than this share of the longest is rounding.
+SPANNED = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class _Tried:
+    """Models without such a bias and at each of `sizes` (S,) [N], with the share (1 + S,) of each by evidence."""
+
+    models: list[Models]
+    share: Array
+    sizes: Array
+
+    @property
+    def counts(self) -> bool:
+        """Whether such a bias is likely enough to count."""
+        return bool(self.share[1:].sum() > COUNTS)
+
+    @property
+    def size(self) -> float:
+        """Rms size [N] of the bias, by evidence; zero where that leaves a share for none."""
+        return float(np.sqrt(self.share[1:] @ self.sizes**2)) if self.share[0] < DOUBTED else 0.0
+
+    def averaged(self, fit: PayloadFit, levers: Array) -> PayloadFit:
+        """Return the fit averaged over sizes by their share; what follows from the rows is that of the likeliest."""
+        means = [one.mean() for one in self.models]
+        phi = self.share @ [mean[:10] for mean in means]
+        covariance = np.zeros((10, 10))
+        for share, mean, one in zip(self.share, means, self.models, strict=True):
+            off = mean[:10] - phi
+            covariance += share * (one.covariance_about(mean)[:10, :10] + np.outer(off, off))
+        number = int(np.argmax(self.share))
+        likely = self.models[number]
+        beside = likely.recordings(likely.best)
+        starts = np.cumsum([0, *(len(group.parts) for group in fit.groups)])
+        gain = self.share @ [one.gain**2 for one in self.models]
+        return replace(
+            fit,
+            parameters=phi,
+            covariance=covariance * fit.unsure,
+            information=likely.information[likely.best],
+            gain=float(np.sqrt(gain)),
+            gainless=float(self.share @ [one.gainless for one in self.models]),
+            blind=tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts)),
+            levers=levers if number else fit.levers,
+        )
+
+
+def with_home_bias(
+    fit: PayloadFit, D: Array, C: Array, places: Array, with_gain: bool = True
+) -> tuple[PayloadFit, float]:
+    """Return the fit with biases that keep their direction in the room allowed for, and how large they are [N].
+
+    That is zero where there may be none.
+
+    places  (G, 3) [m] in B of the grasps on gimbals; without any the fit stays as it is. D, C as in `fit_payload`
+
+    Noise and its weights are kept: such a bias hardly changes within a recording.
+    """
+    if not len(places):
+        return fit, 0.0
+    homes = _Homes.of(fit, D, C, places)
+    # Without gains first, at a tenth of the cost: where no such bias shows, none does with them.
+    if not with_gain or homes.tried(ladder_of(len(homes.plain), False), ASKED).counts:
+        found = homes.tried(homes.likely(ladder_of(len(homes.plain), with_gain)), SIZES)
+        if found.counts:
+            return found.averaged(fit, homes.levers), found.size
+    return fit, 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Homes:
+    """The equations of every recording in [phi (10), bias (6)] and, `wide`, in [phi (10), u (U,), bias (6)]."""
+
+    plain: list[Normal]
+    wide: list[Normal]
+    levers: Array
+    C: Array
+    scale: Array
+
+    @classmethod
+    def of(cls, fit: PayloadFit, D: Array, C: Array, places: Array) -> _Homes:
+        """Return the equations with the weights of a fit."""
+        levers = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3)
+        plain, wide = [], []
+        for group, weights in zip(fit.groups, fit.weights, strict=True):
+            for part in group.parts:
+                plain.append(normal(part, D, weights, group.motion_noise))
+                wide.append(beside_home(plain[-1], part, D, weights, levers))
+        return cls(plain, wide, levers, C, fit.scale)
+
+    def likely(self, ladder: Array) -> Array:
+        """Return the sizes of a ladder (L, 4) without gains, and those with gains that count for something."""
+        share = Models.of(self.plain, self.C, ladder, self.scale).share
+        return ladder[(share > UNLIKELY) | ~ladder[:, 2:].any(1)]
+
+    def tried(self, ladder: Array, sizes: Array) -> _Tried:
+        """Return the answers without such a bias and at `sizes` [N] of it, each averaged over a ladder."""
+        none = Models.of(self.plain, self.C, ladder, self.scale)
+        models, chance = [none], [none.evidence + np.log(NONE)]
+        scale = np.concatenate([self.scale, np.ones(len(self.levers))])
+        for size in sizes:
+            models.append(Models.of(_held(self.wide, size), self.C, ladder, scale))
+            chance.append(models[-1].evidence - len(self.levers) * np.log(size))
+        return _Tried(models, shares(np.array(chance)), sizes)
+
+
+def home_levers(places: Array, axes: int) -> Array:
+    """Return the wrench E (U, 6, 3 axes) at B that each unit of u makes of what stands still in the room.
+
+    places  (G, 3) [m] of the grasps in B     axes  how many of the room's axes are known: 3, or 1 where only up is
+    """
+    spans, length, _ = np.linalg.svd(np.concatenate([np.ones((1, len(places))), places.T]), full_matrices=False)
+    columns = (spans * length)[:, length > SPANNED * length[0]].T
+    out = np.zeros((axes, len(columns), 6, axes, 3))
+    for k in range(axes):
+        out[k, :, :3, k] = cross_matrix(columns[:, 1:])
+        out[k, :, 3:, k] = columns[:, :1, None] * np.eye(3)
+    return out.reshape(-1, 6, 3 * axes)
+
+
+def beside_home(plain: Normal, part: Spectra, D: Array, W: Array, levers: Array) -> Normal:
+    """Return the normal equations of one recording in [phi (10), u (U,), bias (6)]; W (K, 6, 6)."""
+    count, width = len(levers), part.scatter.shape[-1]
+    H, g = np.zeros((16 + count, 16 + count)), np.zeros(16 + count)
+    old, new = np.r_[:10, 10 + count : 16 + count], np.arange(10, 10 + count)
+    H[np.ix_(old, old)], g[old] = plain.H, plain.g
+    WE = W[:, None] @ levers
+    H[np.ix_(new, new)] = np.einsum("kpix,kxy,qiy->pq", WE, part.room[..., width:], levers, optimize=True)
+    H[new, :10] = np.einsum("kpix,kxy,qiy->pq", WE, part.room[..., :12], basis(), optimize=True)
+    H[new, 10 + count :] = np.einsum("kpix,kx->pi", WE, part.room[..., width - 1])
+    H[:10, new], H[10 + count :, new] = H[new, :10].T, H[new, 10 + count :].T
+    g[new] = np.einsum("kpix,kxi->p", WE, part.room[..., 12 : width - 1] @ D.T)
+    noise = np.zeros((10 + count, 10 + count))
+    noise[:10, :10] = plain.noise
+    return replace(plain, H=H, g=g, noise=noise)
+
+
+def _held(normals: Sequence[Normal], size: float) -> list[Normal]:
+    """Return the equations with u held to zero by `size` [N], once for all recordings."""
+    H = normals[0].H.copy()
+    held = np.arange(10, len(H) - 6)
+    H[held, held] += size**-2.0
+    return [replace(normals[0], H=H), *normals[1:]]

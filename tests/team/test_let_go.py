@@ -1,0 +1,96 @@
+"""A robot that lets go bears its gripper still, so that it does not push with nothing."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from steelyard.inertia import InertialParameters
+from steelyard.logs.team_log import TeamLog
+from steelyard.simulate.team import TeamTrial, simulate_team
+from steelyard.simulate.team_cases import GRAVITY, Presence, Slip, TeamNoise, TeamScene
+from steelyard.team.changes.presence import strayers
+from steelyard.team.estimate import TeamEstimate
+from steelyard.team.joint import JointTeam
+from steelyard.team.stacked import stretches
+
+NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.3, torque_white_Nm=0.03)
+GRIPPER, LEAVES, WHO = 0.8, 8.0, 2
+
+
+def with_gripper(trial: TeamTrial, kg: float) -> tuple[TeamLog, InertialParameters]:
+    """The log with a point mass at one grasp, beyond its sensor, and all that is held before it lets go."""
+    name, recordings = f"robot{WHO}", []
+    for recording in trial.log.recordings:
+        track = recording.tracks[name]
+        # Noise of positions is far below what the gripper weighs, once it is smoothed.
+        place = track.channels["position"]
+        rows = np.arange(len(place))
+        smooth = np.stack([np.convolve(place[:, k], np.ones(21) / 21, "same") for k in range(3)], 1)
+        rise = np.gradient(np.gradient(smooth, track.time, axis=0), track.time, axis=0)
+        rise[(rows < 25) | (rows >= len(rows) - 25)] = 0.0
+        pull = kg * np.einsum("tji,tj->ti", track.channels["rotation"], rise + np.array([0.0, 0.0, GRAVITY]))
+        held = replace(track, channels={**track.channels, "force": track.channels["force"] + pull})
+        recordings.append(replace(recording, tracks={**recording.tracks, name: held}))
+    point = InertialParameters.from_point_masses(np.array([kg]), trial.truth.grasps.position[WHO][None])
+    return trial.log.with_recordings(*recordings), trial.truth.body + point
+
+
+def told(found: TeamEstimate, code: str) -> list[str]:
+    return [finding.message for finding in found.findings if finding.code == code]
+
+
+@pytest.mark.parametrize("six_axis", [frozenset[int](), frozenset({0, 1, 2, 3})], ids=["gimbals", "wrists"])
+def test_it_is_told_by_its_way_and_no_wrench_is_used_from_then_on(six_axis: frozenset[int]) -> None:
+    scene = TeamScene(
+        NOISE, 4, sensing="poses", six_axis=six_axis, motion_samples=2000, presence=(Presence(WHO, leaves=LEAVES),)
+    )
+    log, body = with_gripper(simulate_team(scene, 0), GRIPPER)
+    found = JointTeam().identify(log)
+    (said,) = told(found, "robot-left")
+    assert said.startswith(f"'robot{WHO}' let go of the payload at ")
+    assert said.endswith(" N, as of its gripper's weight; nobody's wrench is used meanwhile.")
+    assert not told(found, "grasp-slipped")
+    error = np.append(found.mass, found.com) - np.append(body.mass, body.com)
+    assert np.abs(error / found.std[:4]).max() < 4
+
+
+def test_a_robot_that_bears_little_has_not_let_go_where_its_grasp_slipped() -> None:
+    slip = Slip(WHO, np.array([0.008, 0.0, 0.006]), LEAVES)
+    scene = TeamScene(NOISE, 4, sensing="poses", motion_samples=2000, slip=slip, squeeze_N=30.0)
+    found = JointTeam().identify(simulate_team(scene, 3).log)
+    assert not told(found, "robot-left")
+    assert len(told(found, "grasp-slipped")) == 1
+
+
+def test_two_slips_of_one_grasp_are_two() -> None:
+    scene = TeamScene(NOISE, 4, sensing="poses", motion_samples=3000, slip=Slip(WHO, np.array([0.006, 0.005, 0]), 8.0))
+    first = simulate_team(scene, 0)
+    later = simulate_team(replace(scene, slip=Slip(WHO, np.array([0.012, 0.0, 0.0]), 18.0)), 0)
+    name = f"robot{WHO}"
+    was, now = first.log.recordings[-1], later.log.recordings[-1]
+    after = was.tracks[name].time - was.tracks[name].time[0] > 17.5
+    channels = {
+        k: np.where(after.reshape(-1, *[1] * (v.ndim - 1)), now.tracks[name].channels[k], v)
+        for k, v in was.tracks[name].channels.items()
+    }
+    tracks = {**was.tracks, name: replace(was.tracks[name], channels=channels)}
+    # The second begins where the first grasp was: both are steps.
+    found = JointTeam().identify(first.log.with_recordings(*first.log.recordings[:-1], replace(was, tracks=tracks)))
+    times = sorted(float(said.split(" at ")[1].split(" s of")[0]) for said in told(found, "grasp-slipped"))
+    start = float(was.tracks[name].time[0])
+    assert len(set(times)) == len(times) >= 2
+    assert times[0] - start == pytest.approx(8.05, abs=0.3)
+
+
+def test_a_step_while_a_robot_bears_little_is_no_way_of_its_own() -> None:
+    log = simulate_team(TeamScene(NOISE, 3, sensing="poses", kinds=("motion",), motion_samples=2000), 0).log
+    parts = stretches(log, {})
+    light = [np.tile([False, True, True], (len(part), 1)) for part in parts]
+    time = parts[0].time - parts[0].time[0]
+    slipped = np.where(time < 9.0, 0.0, 30.0)
+    rests = np.where(time % 3.0 < 1.5, 30.0 * np.sin(6.0 * time) + 40.0, 40.0)
+    off = [np.stack([rests, slipped, rests], axis=1)]
+    assert strayers(parts, light, off).tolist() == [False, False, True]
