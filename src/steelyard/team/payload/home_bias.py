@@ -28,7 +28,7 @@ from steelyard.team.payload.spectra import Spectra
 
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
 SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
-NONE = 30.0
+NONE = 100.0
 # Those that are asked first, and the share from which such a bias counts.
 ASKED = SIZES[:4:2]
 COUNTS = 0.01
