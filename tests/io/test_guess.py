@@ -214,6 +214,14 @@ def test_the_example_for_a_file_without_header_counts_columns(tmp_path: Path) ->
     assert read_recording(tmp_path / "log.toml").streams[0].channels["force"].tolist() == [W[:3]] * 2
 
 
+@pytest.mark.parametrize(("name", "mark"), [("stamp", "   # check the unit: s, ms, us or ns"), ("t_us", "")])
+def test_the_example_says_where_a_name_leaves_the_unit_of_time_open(tmp_path: Path, name: str, mark: str) -> None:
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, [name, "fx", "fy", "fz", "tx", "ty", "tz"], [1.7e15, *W], [1.7e15 + 1e4, *W])
+    unit = "us" if not mark else "s"
+    assert f'time     = {{ columns = ["{name}"], unit = "{unit}" }}{mark}\n' in str(caught.value)
+
+
 def test_a_file_that_does_not_say_gravity_has_a_note_of_what_was_assumed(tmp_path: Path) -> None:
     wrench = ["t", "fx", "fy", "fz", "tx", "ty", "tz"]
     bare(tmp_path, [*wrench, "qw", "qx", "qy", "qz"], [0, *W, *Q], [0.01, *W, *Q])

@@ -203,8 +203,10 @@ def _own_lines(table: Table, names: _Names) -> dict[str, str]:
     lines = {}
     stamps = next(_time_columns(names), ())
     if stamps:
-        units = '["s", "ns"]' if len(stamps) > 1 else f'"{_said_unit(names, stamps[0]) or "s"}"'
-        lines["time"] = f"{{ columns = {_columns(table, stamps)}, unit = {units} }}"
+        told = None if len(stamps) > 1 else _said_unit(names, stamps[0])
+        units = '["s", "ns"]' if len(stamps) > 1 else f'"{told or "s"}"'
+        mark = "" if told or len(stamps) > 1 else "   # check the unit: s, ms, us or ns"
+        lines["time"] = f"{{ columns = {_columns(table, stamps)}, unit = {units} }}{mark}"
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
         if (found := _vector(names, quantity)) and len(said := _said_units(names, quantity, found)) < 2:
             unit = said[0] if said and said[0] in UNITS[quantity] else next(iter(UNITS[quantity]))
