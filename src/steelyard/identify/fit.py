@@ -16,7 +16,7 @@ from steelyard.identify.correlated import score_in_time
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift
-from steelyard.identify.rest import at_rest
+from steelyard.identify.rest import at_rest, without_noise_of_rest
 from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments
@@ -89,6 +89,7 @@ def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest
     """
 
     def rested(steady: MotionLog) -> MotionLog:
+        steady = without_noise_of_rest(steady)
         first = solver(_problem(steady, replace(bias, drift=False), by_block=False))
         return at_rest(steady, first.linear[:10], first.bias)
 

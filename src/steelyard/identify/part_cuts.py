@@ -22,6 +22,7 @@ from steelyard.identify.fit import Bias, prepared
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.part_models import mixture
 from steelyard.identify.problem import Problem
+from steelyard.identify.rest import without_noise_of_rest
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
@@ -67,7 +68,7 @@ class PartCuts:
 
     def weighed(self, log: MotionLog) -> tuple[Estimate, Array]:
         """Return the estimate and the weight (K,) of every cut."""
-        log, problem = prepared(log, Bias.of(self.bias))
+        log, problem = prepared(log, Bias.of(self.bias), without_noise_of_rest)
         return self._answered(self._weights(problem), lambda cut: cut.answered(log, problem))
 
     def _of(self, cut: int) -> PartMasses:

@@ -37,6 +37,7 @@ from steelyard.identify.part_uneven import Uneven, suspicious, uneven
 from steelyard.identify.placement import misplaced, refused, with_mass
 from steelyard.identify.problem import Problem
 from steelyard.identify.recentred import apart, followed, recentred, strayed
+from steelyard.identify.rest import without_noise_of_rest
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
@@ -81,7 +82,7 @@ class PartMasses:
 
         Raises CannotAnswer where the log shows no weight.
         """
-        return self.answered(*prepared(log, Bias.of(self.bias)))
+        return self.answered(*prepared(log, Bias.of(self.bias), without_noise_of_rest))
 
     def answered(self, log: MotionLog, problem: Problem) -> Estimate:
         """Return the estimate of a log that carries its noise, and of its `problem`."""

@@ -13,6 +13,8 @@ from steelyard.logs.log import Mask, MotionLog, Noise
 RIPPLE = Noise.of_std(0.01, 0.002, 0.0, 0.0).acceleration
 # A row at rest leaves a chi-square of 6 degrees of freedom; one in a thousand lies above this.
 SURPRISE = 22.46
+# Mean squares of readings at rest above this many of their variances are no noise.
+MOVING = 2.0
 
 
 def at_rest(log: MotionLog, phi: Array, bias: Array) -> MotionLog:
@@ -39,6 +41,23 @@ def at_rest(log: MotionLog, phi: Array, bias: Array) -> MotionLog:
         return settled
     # Nobody measured the acceleration: rows that are not at rest after all say nothing.
     return settled.rows(resting | ~log.still)
+
+
+def without_noise_of_rest(log: MotionLog) -> MotionLog:
+    """Return a log that is at rest throughout without its accelerations, which are noise; any other as it is.
+
+    A free body's inertia takes up what such noise seems to say. That of given parts hangs on their masses, so that it
+    would move them. Readings well above their noise are of rows that move all the same, and stay.
+    """
+    if log.noise is None or not log.still.all():
+        return log
+    variance = np.stack([n.acceleration for n in log.noise])[log.noise_class]
+    readings = np.concatenate([log.angular_acceleration, log.acceleration], 1)
+    if ((readings**2).mean(0) > MOVING * variance.mean(0)).any():
+        return log
+    noise = tuple(replace(n, acceleration=np.minimum(n.acceleration, RIPPLE)) for n in log.noise)
+    nothing = np.zeros_like(log.acceleration)
+    return replace(log, angular_acceleration=nothing, acceleration=nothing, noise=noise)
 
 
 def _settled(log: MotionLog, quiet: MotionLog, resting: Mask) -> MotionLog:
