@@ -63,7 +63,7 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
     # what, old, new, message
     ("unknown section", "[log]", "[logs]", 'log.toml: unknown key "logs". Did you mean "log"? Keys here: log, noise, object, stream, robot.'),
     ("unknown key", "gravity =", "gravty =", 'log.toml, [log]: unknown key "gravty". Did you mean "gravity"? Keys here: gravity, wrench, tool.'),
-    ("unknown stream key", "torque  ", "torqe   ", 'log.toml, [[stream]] 1: unknown key "torqe". Did you mean "torque"? Keys here: path, topic, kind, time, delay, mount, force, torque, rotation, position, linear_velocity, angular_velocity, linear_acceleration, angular_acceleration, specific_force, gravity, joint_position, joint_torque.'),
+    ("unknown stream key", "torque  ", "torqe   ", 'log.toml, [[stream]] 1: unknown key "torqe". Did you mean "torque"? Keys here: path, topic, frames, kind, time, delay, mount, force, torque, rotation, position, linear_velocity, angular_velocity, linear_acceleration, angular_acceleration, specific_force, gravity, joint_position, joint_torque.'),
     ("unknown wrench", "[log]", '[log]\nwrench = "sensor"', 'log.toml, [log]: unknown wrench "sensor". Did you mean "on-sensor"? Possible here: on-sensor, on-object.'),
     ("gravity of two", "[0, 0, -9.81]", "[0, -9.81]", 'log.toml, [log]: "gravity" must be a list of 3 finite numbers; got [0, -9.81].'),
     ("gravity zero", "[0, 0, -9.81]", "[0, 0, 0]", 'log.toml, [log]: "gravity" must not be zero; on a level base it is [0, 0, -9.81].'),
@@ -93,8 +93,7 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
     ("joints", 'path     = "a.csv"', 'path = "a.csv"\njoint_position = { columns = ["q1"], unit = "rad" }', f'{STREAM}: "joint_position" is not supported yet: robot kinematics come later. Give the orientation of the sensor instead, as rotation = {{ columns = [..], form = .. }}.'),
     ("robot", "[log]", '[robot]\nmodel = "omnid"\n[log]', "log.toml: [robot] is not supported yet: forward kinematics come later. Give the orientation of the sensor instead, as rotation = { columns = [..], form = .. }."),
     ("team", "[log]", "[team]\n[log]", "log.toml: [team] makes this a team description. Use it with: steelyard team"),
-    ("topic", 'path     = "a.csv"', 'path = "a.csv"\ntopic = "/ft"', f'{STREAM}: "topic" belongs to bags, which are not supported yet. Export the topic to CSV.'),
-    ("bag", '"a.csv"', '"run.mcap"', 'log.toml names a bag'),
+    ("topic", 'path     = "a.csv"', 'path = "a.csv"\ntopic = "/ft"', 'DIR/a.csv: "topic" belongs to a bag (.mcap, .bag, .db3, or the folder of one).'),
     ("no torque", 'torque   = { columns = ["tx", "ty", "tz"], unit = "N*m" }\n', "", 'log.toml: no torque is given, only force, rotation. An answer needs the wrench: force and torque (torque = "zero" for a passive gimbal).'),
     ("no wrench", 'force    = { columns = ["fx", "fy", "fz"], unit = "N" }\ntorque   = { columns = ["tx", "ty", "tz"], unit = "N*m" }\n', "", 'log.toml: no force and no torque is given, only rotation. An answer needs the wrench: force and torque (torque = "zero" for a passive gimbal).'),
     ("no gravity", 'rotation = { columns = ["qw", "qx", "qy", "qz"], form = "quaternion-wxyz" }\n', "", "log.toml: nothing says where gravity points in the sensor frame; given are force, torque. Add rotation (S to W), gravity (in S) or specific_force (an accelerometer)."),
@@ -106,12 +105,6 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
 
 @pytest.mark.parametrize(("old", "new", "text"), [d[1:] for d in DESCRIPTIONS], ids=[d[0] for d in DESCRIPTIONS])
 def test_description(tmp_path: Path, old: str, new: str, text: str) -> None:
-    (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n")
-    if text == "log.toml names a bag":
-        text = (
-            "DIR/run.mcap: bags are not supported yet. Export each topic to a CSV file with its stamps, "
-            "and name those files in the description."
-        )
     assert message(write(tmp_path, swap(TOML, old, new))) == text
 
 
@@ -232,7 +225,7 @@ def test_unknown_kind_of_file_and_folder(tmp_path: Path) -> None:
     (tmp_path / "a.xlsx").write_bytes(b"x")
     (tmp_path / "folder").mkdir()
     assert message(tmp_path / "a.xlsx", BadFile) == (
-        'DIR/a.xlsx: unknown kind of data file ".xlsx". Readable are .csv, .tsv, .txt (also .gz), .npz, .parquet.'
+        'DIR/a.xlsx: unknown kind of data file ".xlsx". Readable are .csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag.'
     )
     assert message(tmp_path / "folder", BadFile) == (
         "DIR/folder: this is a folder, not a file of data. Name the file in it."

@@ -14,8 +14,8 @@ from steelyard.errors import CannotAnswer
 
 CORE = ("numpy", "scipy", "numba", "click", "manifold3d")
 EXTRAS = {
-    "pillow": "images", "pyarrow": "parquet", "pin": "peers", "rigeo": "peers", "pytetwild": "tetwild",
-    "tetgen": "tetgen",
+    "pillow": "images", "pyarrow": "parquet", "rosbags": "bags", "pin": "peers", "rigeo": "peers",
+    "pytetwild": "tetwild", "tetgen": "tetgen",
 }  # fmt: skip
 # A noise-free log must give the answer to rounding; the weak prior alone moves it by less than this share.
 TOLERANCE = 1e-4

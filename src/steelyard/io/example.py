@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 
 from steelyard.io.toml_string import toml_string
 
-_HEAD = """\
+HEAD = """\
 [log]
 gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
 wrench  = "on-sensor"        # or "on-object": what the robot applies to the object
@@ -48,7 +48,7 @@ def example_of(path: str, lines: Mapping[str, str], numbered: bool = False) -> s
         rows.append((name, lines.get(name, usual)))
     if "position" in lines:
         rows.append(("position", lines["position"]))
-    return _HEAD + "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows)
+    return HEAD + "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows)
 
 
 EXAMPLE = example_of("data.csv", _USUAL)

@@ -20,11 +20,11 @@ def own_rows(specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequen
 
     Streams without stamps keep all: their rows belong to those of the others by number.
     """
-    paths = [table.path for table in tables]
+    shared = [id(table) for table in tables]
     stamps = [time_columns(spec, table) for spec, table in zip(specs, tables, strict=True)]
     return [
-        _own(mine, clock) if clock and paths.count(path) > 1 else mine
-        for mine, clock, path in zip(cells, stamps, paths, strict=True)
+        _own(mine, clock) if clock and shared.count(table) > 1 else mine
+        for mine, clock, table in zip(cells, stamps, shared, strict=True)
     ]
 
 

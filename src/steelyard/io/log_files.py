@@ -21,7 +21,7 @@ from steelyard.logs.recording import Recording, Stream
 def read_recording(path: Path | str, data: Path | str | None = None) -> Recording:
     """Read a log.
 
-    path  a description (.toml), or a bare data file (.csv .tsv .txt, .gz of these, .npz, .parquet)
+    path  a description (.toml) of files and topics of bags, or a bare data file (.csv .tsv .txt, .gz, .npz, .parquet)
     data  folder in which relative paths are sought first; then $STEELYARD_DATA, then beside the description
 
     Returns the streams in SI, each on its own clock; all clocks count from one common origin.

@@ -30,7 +30,7 @@ _LONGEST_DELAY, _FURTHEST = 1e10, 10.0
 _JOINT = ("joint_position", "joint_torque")
 # What a robot of a team may tell beside QUANTITIES: the joints of an Omnid, and whether it holds the payload.
 ROBOT: dict[str, int] = {"joint_position": 6, "joint_torque": 3, "carrying": 1}
-_KEYS = ("path", "topic", "kind", "time", "delay", "mount", *QUANTITIES)
+_KEYS = ("path", "topic", "frames", "kind", "time", "delay", "mount", *QUANTITIES)
 
 
 @dataclass(frozen=True)
@@ -78,11 +78,17 @@ class StreamSpec:
     delay: float | None = None
     mount: Mount | None = None
     topic: str | None = None
+    frames: tuple[str, str] | None = None
     names: frozenset[str] = field(init=False)
 
     def __post_init__(self) -> None:
         zero = {"torque"} if self.zero_torque else set()
         object.__setattr__(self, "names", frozenset(q.name for q in self.quantities) | zero)
+
+    @property
+    def source(self) -> tuple[object, ...]:
+        """What its rows are read from: streams of one source have one table."""
+        return self.path, self.topic, self.frames
 
 
 def parse_stream(entry: Entry, robot: bool = False) -> StreamSpec:
@@ -108,13 +114,33 @@ def parse_stream(entry: Entry, robot: bool = False) -> StreamSpec:
         path,
         quantities,
         entry.where,
-        _time(entry),
+        _time(entry) or _stamped(entry, kind),
         kind == "poses",
         zero,
         _delay(entry),
         _mount(entry),
         entry.text("topic"),
+        _frames(entry),
     )
+
+
+def _stamped(stream: Entry, kind: str | None) -> TimeSpec | None:
+    """Return the clock of a topic whose stream names none: the stamps of its messages [ns]."""
+    if "topic" not in stream or kind == "poses":
+        return None
+    return TimeSpec(("stamp",), ("ns",), 0.0, f"{stream.where}, time")
+
+
+def _frames(stream: Entry) -> tuple[str, str] | None:
+    """Return the two frames of a topic of transforms, the second of which is meant as it lies in the first."""
+    if "frames" not in stream:
+        return None
+    value = stream.values["frames"]
+    if not isinstance(value, list) or len(value) != 2 or not all(isinstance(name, str) and name for name in value):
+        raise stream.error(f'"frames" must name two frames, such as ["base_link", "tool0"]; got {value!r}.')
+    if "topic" not in stream:
+        raise stream.error('"frames" belongs to a topic of transforms: topic = "/tf".')
+    return value[0].lstrip("/"), value[1].lstrip("/")
 
 
 def _refuse_joints(entry: Entry) -> None:

@@ -10,7 +10,7 @@ import numpy as np
 
 from steelyard import check
 from steelyard.check import Array
-from steelyard.errors import BadDescription, BadFile, BadValue
+from steelyard.errors import BadDescription, BadValue
 from steelyard.io.channels import channel, channel_with_gaps, require_one_length
 from steelyard.io.clocks import Clock, common_origin, require_likely_step, steady
 from steelyard.io.entries import listed
@@ -22,33 +22,30 @@ Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
 
 def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> list[Table]:
-    """Return the table of every stream; a file named twice is opened once."""
-    opened: dict[str, Table] = {}
+    """Return the table of every stream; a file, or topic of a bag, that is named twice is opened once."""
+    opened: dict[tuple[object, ...], Table] = {}
     for spec in specs:
-        if spec.topic is not None:
-            raise BadFile(
-                f'{spec.where}: "topic" belongs to bags, which are not supported yet. Export the topic to CSV.'
-            )
-        if spec.path not in opened:
-            opened[spec.path] = open_table(find_file(spec.path, folder, data, spec.where))
-    return [opened[spec.path] for spec in specs]
+        if spec.source not in opened:
+            path = find_file(spec.path, folder, data, spec.where)
+            opened[spec.source] = open_table(path, spec.topic, spec.frames)
+    return [opened[spec.source] for spec in specs]
 
 
 def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cells]:
     """Return the cells of every stream's own columns; each file is read once, whatever number of streams share it."""
     own: list[set[int]] = []
-    wanted: dict[Path, set[int]] = {}
-    exact: dict[Path, set[int]] = {}
+    wanted: dict[int, set[int]] = {}
+    exact: dict[int, set[int]] = {}
     for spec, table in zip(specs, tables, strict=True):
         stamps = time_columns(spec, table)
         own.append({*_chosen(spec, table, stamps), *stamps})
-        wanted.setdefault(table.path, set()).update(own[-1])
-        exact.setdefault(table.path, set()).update(stamps)
-    cells: dict[Path, Cells] = {}
+        wanted.setdefault(id(table), set()).update(own[-1])
+        exact.setdefault(id(table), set()).update(stamps)
+    cells: dict[int, Cells] = {}
     for table in tables:
-        if table.path not in cells:
-            cells[table.path] = table.read(sorted(wanted[table.path]), sorted(exact[table.path]))
-    return [{n: cells[table.path][n] for n in mine} for table, mine in zip(tables, own, strict=True)]
+        if id(table) not in cells:
+            cells[id(table)] = table.read(sorted(wanted[id(table)]), sorted(exact[id(table)]))
+    return [{n: cells[id(table)][n] for n in mine} for table, mine in zip(tables, own, strict=True)]
 
 
 def _chosen(spec: StreamSpec, table: Table, stamps: Sequence[int]) -> list[int]:
@@ -132,9 +129,10 @@ def seconds_of(
 
 
 def stream_names(specs: Sequence[StreamSpec]) -> list[str]:
-    """Return one name per stream: its path, with #2, #3 .. behind it where a file serves several streams."""
+    """Return one name per stream: its path and topic, with #2, #3 .. behind where one serves several streams."""
     names: list[str] = []
-    for i, spec in enumerate(specs):
-        before = sum(other.path == spec.path for other in specs[:i])
-        names.append(f"{spec.path}#{before + 1}" if before else spec.path)
+    called = [spec.path if spec.topic is None else f"{spec.path}:{spec.topic}" for spec in specs]
+    for i, name in enumerate(called):
+        before = called[:i].count(name)
+        names.append(f"{name}#{before + 1}" if before else name)
     return names

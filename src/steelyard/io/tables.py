@@ -14,8 +14,7 @@ from steelyard.io.table_header import Columns, Header
 Column = str | int
 
 TEXT = (".csv", ".tsv", ".txt")
-BAGS = (".mcap", ".bag", ".db3")
-KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet"
+KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag"
 
 
 class Table(Protocol):
@@ -33,18 +32,23 @@ class Table(Protocol):
         """Return columns by number, float64; those in `exact` stay int64 where the file writes integers."""
 
 
-def open_table(path: Path) -> Table:
-    """Look at the head of a data file and return its table; raises BadFile."""
-    from steelyard.io import array_table, parquet_table, text_table
+def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | None = None) -> Table:
+    """Look at the head of a data file and return its table; raises BadFile.
+
+    topic   that of a bag
+    frames  of a topic of transforms: the pose of the second in the first
+    """
+    from steelyard.io import array_table, bag_table, bags, parquet_table, text_table, transform_table
 
     suffix = data_suffix(path)
-    if path.is_dir() and not (path / "metadata.yaml").exists():
+    if bags.is_bag(path):
+        if topic is not None and frames is not None:
+            return transform_table.TransformTable.open(path, topic, frames)
+        return bag_table.BagTable.open(path, topic)
+    if topic is not None:
+        raise BadDescription(f'{path}: "topic" belongs to a bag ({", ".join(bags.SUFFIXES)}, or the folder of one).')
+    if path.is_dir():
         raise BadFile(f"{path}: this is a folder, not a file of data. Name the file in it.")
-    if suffix in BAGS or path.is_dir():
-        raise BadFile(
-            f"{path}: bags are not supported yet. Export each topic to a CSV file with its stamps, "
-            "and name those files in the description."
-        )
     if suffix not in (*TEXT, ".npz", ".parquet"):
         raise BadFile(f'{path}: unknown kind of data file "{suffix or path.name}". Readable are {KINDS}.')
     if path.stat().st_size == 0:

@@ -1,0 +1,52 @@
+"""An example of a description of a bag, in its own topics where their messages are the usual ones."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+from steelyard.io.bags import Topic
+from steelyard.io.example import HEAD
+from steelyard.io.toml_string import toml_string
+
+_FRAMES = '["base_link", FRAME]   # the sensor in the base: put your own frames here'
+_WRENCH = {
+    "geometry_msgs/msg/WrenchStamped": ("wrench.force", "wrench.torque"),
+    "geometry_msgs/msg/Wrench": ("force", "torque"),
+}
+_POSE = {
+    "tf2_msgs/msg/TFMessage": ("rotation", "position"),
+    "geometry_msgs/msg/PoseStamped": ("pose.orientation", "pose.position"),
+    "geometry_msgs/msg/TransformStamped": ("transform.rotation", "transform.translation"),
+    "geometry_msgs/msg/Pose": ("orientation", "position"),
+}
+_WIDTH = 8
+
+
+def bag_example(path: str, topics: Sequence[Topic], sensor: str) -> str:
+    """Return a description of the bag `path`: its first wrench, and its first pose, that of the frame `sensor`."""
+    wrench = first_wrench(topics) or Topic("/wrench", "geometry_msgs/msg/WrenchStamped", 0)
+    posed = [t for t in topics if t.kind in _POSE and t.name != "/tf_static"]
+    pose = next((t for kind in _POSE for t in posed if t.kind == kind), Topic("/tf", "tf2_msgs/msg/TFMessage", 0))
+    force, torque = _WRENCH[wrench.kind]
+    turn, place = _POSE[pose.kind]
+    felt = {
+        "force": f'{{ columns = ["{force}"], unit = "N" }}',
+        "torque": f'{{ columns = ["{torque}"], unit = "N*m" }}',
+    }
+    frames = {"frames": _FRAMES.replace("FRAME", toml_string(sensor))} if pose.kind == "tf2_msgs/msg/TFMessage" else {}
+    seen = {
+        **frames,
+        "rotation": f'{{ columns = ["{turn}"], form = "quaternion-xyzw" }}   # S to W',
+        "position": f'{{ columns = ["{place}"], unit = "m" }}',
+    }
+    return HEAD + _stream(path, wrench, felt) + "\n[[stream]]\n" + _stream(path, pose, seen)
+
+
+def first_wrench(topics: Sequence[Topic]) -> Topic | None:
+    """Return the first topic that holds wrenches, None where there is none."""
+    return next((topic for topic in topics if topic.kind in _WRENCH), None)
+
+
+def _stream(path: str, topic: Topic, lines: dict[str, str]) -> str:
+    rows = {"path": toml_string(path), "topic": toml_string(topic.name), **lines}
+    return "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows.items())

@@ -1,0 +1,347 @@
+"""Bags: the same log as a table and as a bag, poses out of transforms, and what a wrong bag is told."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from rosbags import rosbag1, rosbag2
+from rosbags.rosbag2.enums import StoragePlugin
+from rosbags.typesys import Stores, get_typestore
+
+import steelyard as sy
+from steelyard.errors import BadInput, MissingDependency
+from steelyard.io.log_files import read_recording
+from steelyard.spatial import Pose, Rotation
+
+ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+START = 1_700_000_000_000_000_000  # ns since 1970
+Message = tuple[str, str, int, Any]  # topic, type, time of receipt, message
+
+
+class Maker:
+    """Messages of one generation of ROS."""
+
+    def __init__(self, store: Any) -> None:
+        self.types = store.types
+        self.ros1 = store is ROS1
+
+    def header(self, stamp: int, frame: str) -> Any:
+        time = self.types["builtin_interfaces/msg/Time"](stamp // 10**9, stamp % 10**9)
+        return self.types["std_msgs/msg/Header"](*((0,) if self.ros1 else ()), time, frame)
+
+    def vector(self, values: Sequence[float], kind: str = "Vector3") -> Any:
+        return self.types[f"geometry_msgs/msg/{kind}"](*map(float, values))
+
+    def quaternion(self, turn: Rotation) -> Any:
+        return self.types["geometry_msgs/msg/Quaternion"](*np.roll(turn.quaternion_wxyz(), -1).tolist())
+
+    def wrench(self, stamp: int, force: Sequence[float], torque: Sequence[float]) -> Any:
+        both = self.types["geometry_msgs/msg/Wrench"](self.vector(force), self.vector(torque))
+        return self.types["geometry_msgs/msg/WrenchStamped"](self.header(stamp, "ft"), both)
+
+    def pose(self, stamp: int, pose: Pose) -> Any:
+        kind = self.types["geometry_msgs/msg/Pose"]
+        place = kind(self.vector(pose.position, "Point"), self.quaternion(pose.rotation))
+        return self.types["geometry_msgs/msg/PoseStamped"](self.header(stamp, "base"), place)
+
+    def transforms(self, stamp: int, poses: dict[tuple[str, str], Pose]) -> Any:
+        kind, transform = self.types["geometry_msgs/msg/TransformStamped"], self.types["geometry_msgs/msg/Transform"]
+        each = [
+            kind(self.header(stamp, parent), child, transform(self.vector(p.position), self.quaternion(p.rotation)))
+            for (parent, child), p in poses.items()
+        ]
+        return self.types["tf2_msgs/msg/TFMessage"](each)
+
+
+def write_bag(path: Path, messages: Sequence[Message], plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
+    """Write a bag; `.bag` is one of ROS 1. Returns what to name in a description."""
+    ros1 = path.suffix == ".bag"
+    store = ROS1 if ros1 else ROS2
+    encode = store.serialize_ros1 if ros1 else store.serialize_cdr
+    writer: Any = rosbag1.Writer(path) if ros1 else rosbag2.Writer(path, version=8, storage_plugin=plugin)
+    with writer:
+        kinds = dict.fromkeys((topic, kind) for topic, kind, *_ in messages)
+        connections = {each: writer.add_connection(*each, typestore=store) for each in kinds}
+        for topic, kind, received, message in messages:
+            writer.write(connections[topic, kind], received, encode(message, kind))
+    return path
+
+
+WRENCH, POSE, TF = "geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"
+MASS, COM = 1.2, np.array([0.01, -0.02, 0.09])
+
+
+def turns(count: int) -> Rotation:
+    """Return the turns of the sensor: eight attitudes, each held for an eighth of the time, moved between evenly."""
+    attitudes = np.random.default_rng(4).normal(size=(9, 3))
+    at = np.linspace(0, 8, count)
+    share = np.clip(at % 1 * 3 - 2, 0, 1)[:, None]
+    stop = np.minimum(at.astype(int), 7)
+    return Rotation.exp((1 - share) * attitudes[stop] + share * attitudes[stop + 1])
+
+
+def log_of(maker: Maker, count: int = 1600) -> tuple[list[Message], np.ndarray, Rotation]:
+    """Return messages of a wrench and a pose at 100 Hz, the wrench (N, 6) that they hold, and the turns."""
+    R = turns(count)
+    force = MASS * R.inverse().apply(np.tile([0, 0, 9.81], (count, 1)))
+    wrench = -np.concatenate([force, np.cross(COM, force)], 1)
+    wrench += np.random.default_rng(5).normal(size=wrench.shape) * np.repeat([0.05, 0.002], 3)
+    stamps = START + 10_000_000 * np.arange(count)
+    out: list[Message] = []
+    for n, stamp in enumerate(map(int, stamps)):
+        out.append(("/ft", WRENCH, stamp + 500_000, maker.wrench(stamp, wrench[n, :3], wrench[n, 3:])))
+        out.append(("/pose", POSE, stamp + 500_000, maker.pose(stamp, Pose(R[n], np.array([0.4, 0.0, 0.3])))))
+    return out, wrench, R
+
+
+DESCRIPTION = """
+[log]
+gravity = [0, 0, -9.81]
+wrench = "on-sensor"
+[[stream]]
+path = "PATH"
+topic = "/ft"
+force = { columns = ["wrench.force"], unit = "N" }
+torque = { columns = ["wrench.torque"], unit = "N*m" }
+[[stream]]
+path = "PATH"
+topic = "/pose"
+rotation = { columns = ["pose.orientation"], form = "quaternion-xyzw" }
+position = { columns = ["pose.position"], unit = "m" }
+"""
+
+
+def describe(folder: Path, name: str, text: str = DESCRIPTION) -> Path:
+    path = folder / "log.toml"
+    path.write_text(text.replace("PATH", name))
+    return path
+
+
+@pytest.mark.parametrize("kind", ["folder", "run.mcap", "run.db3", "run.bag"])
+def test_a_bag_reads_as_what_was_recorded(tmp_path: Path, kind: str) -> None:
+    store = ROS1 if kind == "run.bag" else ROS2
+    messages, wrench, R = log_of(Maker(store), 200)
+    plugin = StoragePlugin.SQLITE3 if kind == "run.db3" else StoragePlugin.MCAP
+    write_bag(tmp_path / ("run.bag" if kind == "run.bag" else "run"), messages, plugin)
+    name = {"folder": "run", "run.bag": "run.bag"}.get(kind, f"run/{kind}")
+    felt, seen = read_recording(describe(tmp_path, name)).streams
+    assert (felt.name, seen.name) == (f"{name}:/ft", f"{name}:/pose")
+    np.testing.assert_array_equal(felt.channels["force"], wrench[:, :3])
+    np.testing.assert_array_equal(felt.channels["torque"], wrench[:, 3:])
+    np.testing.assert_allclose(seen.channels["rotation"].reshape(-1, 3, 3), R.matrix, atol=1e-12)
+    np.testing.assert_allclose(felt.time, 0.01 * np.arange(200), atol=1e-12)  # stamps, not times of receipt
+
+
+def test_the_mass_of_a_bag(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", log_of(Maker(ROS2))[0])
+    estimate = sy.identify(describe(tmp_path, "run"))
+    assert abs(estimate.mass - MASS) < 4 * estimate.std[0]
+    assert estimate.std[0] < 0.005
+
+
+def test_a_pose_out_of_transforms(tmp_path: Path) -> None:
+    """base -> arm moves, arm -> wrist at another rate, wrist -> tool is fixed, and so is world -> base."""
+    maker = Maker(ROS2)
+    fixed = Pose(Rotation.exp([0.1, 0.2, -0.3]), np.array([0.0, 0.0, 0.1]))
+    world = Pose(Rotation.exp([0.0, 0.0, 1.0]), np.array([1.0, 2.0, 0.0]))
+    shoulder = [Pose(Rotation.exp([0.0, 0.01 * n, 0.0]), np.array([0.0, 0.001 * n, 0.5])) for n in range(100)]
+    wrist = [Pose(Rotation.exp([0.0, 0.0, 0.04 * n]), np.array([0.3, 0.0, 0.004 * n])) for n in range(25)]
+    out: list[Message] = [
+        ("/tf_static", TF, START, maker.transforms(0, {("wrist", "tool"): fixed, ("world", "base"): world}))
+    ]
+    for n in range(100):
+        stamp = START + n * 10_000_000
+        out.append(("/tf", TF, stamp, maker.transforms(stamp, {("base", "arm"): shoulder[n]})))
+        if n % 4 == 0:
+            out.append(("/tf", TF, stamp, maker.transforms(stamp, {("arm", "wrist"): wrist[n // 4]})))
+    write_bag(tmp_path / "run", out)
+    between = [Pose(Rotation.exp([0.0, 0.0, 0.01 * n]), np.array([0.3, 0.0, 0.001 * n])) for n in range(97)]
+    for frames, expected in (
+        (("base", "tool"), [shoulder[n] @ between[n] @ fixed for n in range(97)]),
+        (("world", "tool"), [world @ shoulder[n] @ between[n] @ fixed for n in range(97)]),
+        (("tool", "base"), [(shoulder[n] @ between[n] @ fixed).inverse() for n in range(97)]),
+        (("arm", "tool"), [between[4 * n] @ fixed for n in range(25)]),
+    ):
+        text = f'topic = "/tf"\nframes = ["{frames[0]}", "{frames[1]}"]\n'
+        table = _table(tmp_path / "run", frames)
+        values = table.read(range(8), (0,))
+        assert table.header.groups == {"position": (1, 2, 3), "rotation": (4, 5, 6, 7)}, text
+        found = Pose(
+            Rotation.from_quaternion_xyzw(np.stack([values[n] for n in range(4, 8)], 1)),
+            np.stack([values[n] for n in range(1, 4)], 1),
+        )
+        np.testing.assert_allclose(found.matrix(), [p.matrix() for p in expected], atol=1e-9, err_msg=str(frames))
+        assert values[0][0] == START
+
+
+def _table(path: Path, frames: tuple[str, str]) -> Any:
+    from steelyard.io.tables import open_table
+
+    return open_table(path, "/tf", frames)
+
+
+def test_lists_are_called_by_the_names_that_messages_give(tmp_path: Path) -> None:
+    from steelyard.io.tables import open_table
+
+    maker, kind = Maker(ROS2), "sensor_msgs/msg/JointState"
+    out: list[Message] = [
+        (
+            "/joints",
+            kind,
+            START + n,
+            ROS2.types[kind](maker.header(n, ""), ["a", "b"], *(np.array([n, -n], np.float64),) * 3),
+        )
+        for n in range(1, 4)
+    ]
+    write_bag(tmp_path / "run", out)
+    table = open_table(tmp_path / "run", "/joints")
+    names = table.header.names or ()
+    assert names[:4] == ("stamp", "received", "position[a]", "position[b]")
+    assert table.header.groups["effort"] == (6, 7)
+    read = table.read([0, 1, 3, 6], (0, 1))
+    assert [read[n].tolist() for n in (0, 1, 3, 6)] == [
+        [1, 2, 3],
+        [START + n for n in (1, 2, 3)],
+        [-1, -2, -3],
+        [1, 2, 3],
+    ]
+
+
+STREAM = 'log.toml, [[stream]] 1 ("run")'
+TOPICS = (
+    "Topics here: /ft (geometry_msgs/msg/WrenchStamped, 20 messages), "
+    "/pose (geometry_msgs/msg/PoseStamped, 20 messages)."
+)
+EXAMPLE = """\
+[log]
+gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
+wrench  = "on-sensor"        # or "on-object": what the robot applies to the object
+
+[[stream]]
+path     = "run"
+topic    = "/ft"
+force    = { columns = ["wrench.force"], unit = "N" }
+torque   = { columns = ["wrench.torque"], unit = "N*m" }
+
+[[stream]]
+path     = "run"
+topic    = "/pose"
+rotation = { columns = ["pose.orientation"], form = "quaternion-xyzw" }   # S to W
+position = { columns = ["pose.position"], unit = "m" }
+"""
+# What is wrong -> text of the description that is swapped, and all that is said of it.
+WRONG = {
+    "other topic": ('"/ft"', '"/fts"', f'DIR/run: there is no topic "/fts". Did you mean "/ft"? {TOPICS}'),
+    "no topic": (
+        'topic = "/ft"\n',
+        "",
+        f"DIR/run: a bag needs a description that says which topic is what. {TOPICS} For example:\n{EXAMPLE}",
+    ),
+    "other field": (
+        '"wrench.force"',
+        '"force"',
+        f'{STREAM}, force: there is no column "force". Columns here: wrench.force, wrench.torque, stamp, received.',
+    ),
+    "frames of a wrench": (
+        'topic = "/ft"',
+        'topic = "/ft"\nframes = ["a", "b"]',
+        'DIR/run: "frames" belongs to transforms; topic "/ft" holds geometry_msgs/msg/WrenchStamped.',
+    ),
+    "one frame": (
+        'topic = "/ft"',
+        'topic = "/ft"\nframes = ["a"]',
+        f'{STREAM}: "frames" must name two frames, such as ["base_link", "tool0"]; got [\'a\'].',
+    ),
+    "frames of nothing": (
+        'topic = "/ft"',
+        'frames = ["a", "b"]',
+        f'{STREAM}: "frames" belongs to a topic of transforms: topic = "/tf".',
+    ),
+}
+
+
+def message(path: Path) -> str:
+    with pytest.raises(BadInput) as error:
+        read_recording(path)
+    return str(error.value).replace(str(path.parent), "DIR")
+
+
+@pytest.mark.parametrize(("old", "new", "said"), WRONG.values(), ids=WRONG.keys())
+def test_wrong_descriptions(tmp_path: Path, old: str, new: str, said: str) -> None:
+    write_bag(tmp_path / "run", log_of(Maker(ROS2), 20)[0])
+    assert old in DESCRIPTION
+    assert message(describe(tmp_path, "run", DESCRIPTION.replace(old, new, 1))) == said
+
+
+def test_a_bare_bag_is_told_its_description(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", log_of(Maker(ROS2), 20)[0])
+    assert message(tmp_path / "run").endswith(EXAMPLE)
+    (tmp_path / "log.toml").write_text(EXAMPLE)
+    assert len(read_recording(tmp_path / "log.toml").streams) == 2
+
+
+def test_garbage_is_no_bag(tmp_path: Path) -> None:
+    for name in ("run.mcap", "run.db3", "run.bag"):
+        (tmp_path / name).write_bytes(b"\x89MCAP0\r\n" + bytes(99))
+        said = message(describe(tmp_path, name))
+        assert said.startswith(f"DIR/{name}: cannot be read as a bag (")
+        assert said.endswith("). Record or convert it again.")
+
+
+def test_a_bag_that_ends_early_is_named(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", log_of(Maker(ROS2), 400)[0])
+    whole = (tmp_path / "run" / "run.mcap").read_bytes()
+    (tmp_path / "cut.mcap").write_bytes(whole[: len(whole) // 2])
+    said = message(describe(tmp_path, "cut.mcap"))
+    assert said.startswith("DIR/cut.mcap: ")
+
+
+def test_files_packed_as_a_whole_are_not_unpacked(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", log_of(Maker(ROS2), 20)[0])
+    metadata = tmp_path / "run" / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("compression_mode: ''", "compression_mode: FILE"))
+    assert message(describe(tmp_path, "run")).startswith("DIR/run: the files of this bag are packed as a whole.")
+
+
+def test_frames_that_nothing_ties(tmp_path: Path) -> None:
+    maker = Maker(ROS2)
+    out: list[Message] = [("/tf", TF, START, maker.transforms(START, {("base", "arm"): Pose.identity()}))]
+    write_bag(tmp_path / "run", out)
+    text = DESCRIPTION.replace('topic = "/pose"', 'topic = "/tf"\nframes = ["base", "tool"]').replace("/ft", "/tf")
+    with pytest.raises(BadInput) as error:
+        _table(tmp_path / "run", ("base", "tool")).read([0])
+    assert str(error.value).endswith('no transforms lead from "base" to "tool". Frames here: arm, base.'), text
+
+
+def test_a_bare_bag_names_the_frame_of_its_wrench(tmp_path: Path) -> None:
+    maker = Maker(ROS2)
+    out = [m for m in log_of(maker, 20)[0] if m[0] == "/ft"]
+    out.append(("/tf", TF, START, maker.transforms(START, {("base", "ft"): Pose.identity()})))
+    write_bag(tmp_path / "run", out)
+    assert 'frames   = ["base_link", "ft"]   # the sensor in the base' in message(tmp_path / "run")
+
+
+def test_bags_without_rosbags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setitem(__import__("sys").modules, "rosbags.rosbag1", None)
+    (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n")
+    with pytest.raises(MissingDependency) as error:
+        read_recording(describe(tmp_path, "run.mcap"))
+    assert (
+        str(error.value) == "Reading bags needs the package 'rosbags'. Install it with: pip install 'steelyard[bags]'"
+    )
+
+
+def test_messages_of_another_type_are_not_read(tmp_path: Path) -> None:
+    """What a bag itself says of its types would be compiled."""
+    maker = Maker(ROS2)
+    write_bag(tmp_path / "run", [("/s", "std_msgs/msg/Float64", START, maker.types["std_msgs/msg/Float64"](1.0))])
+    metadata = tmp_path / "run" / "metadata.yaml"
+    metadata.write_text(metadata.read_text().replace("std_msgs/msg/Float64", "own_msgs/msg/Strange"))
+    text = DESCRIPTION.replace("/ft", "/s")
+    assert 'topic "/s" holds own_msgs/msg/Strange, a type of message that is not read.' in message(
+        describe(tmp_path, "run", text)
+    )
