@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadDescription
 from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.example import EXAMPLE
@@ -31,6 +32,16 @@ def default_gravity() -> Array:
     return np.array([0.0, 0.0, -STANDARD_GRAVITY])
 
 
+@dataclass(frozen=True)
+class ArmSpec:
+    """Where the arm is described: path of its URDF as written, the sensor's link, and the base's, None for the root."""
+
+    urdf: str
+    sensor_link: str
+    base_link: str | None
+    where: str
+
+
 @dataclass(frozen=True, eq=False)
 class Description:
     """What a description says.
@@ -40,6 +51,7 @@ class Description:
     noise        standard deviations, SI
     tool         path of a result, as written
     placed       pose of O in S, None where nothing says
+    arm          where the arm's joints are described, None where nothing says
     notes        what was left to be assumed
     """
 
@@ -49,6 +61,7 @@ class Description:
     noise: Mapping[str, float] = field(default_factory=dict)
     tool: str | None = None
     placed: ObjectPose | None = None
+    arm: ArmSpec | None = None
     notes: tuple[str, ...] = ()
 
 
@@ -63,16 +76,13 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     if "team" in top:
         raise top.error("[team] makes this a team description. Use it with: steelyard team")
     top.only(*_SECTIONS)
-    if "robot" in top:
-        raise top.error(
-            "[robot] is not supported yet: forward kinematics come later. "
-            "Give the orientation of the sensor instead, as rotation = { columns = [..], form = .. }."
-        )
     log = top.section("log")
     log.only("gravity", "wrench", "tool")
     gravity = parse_gravity(log) if "gravity" in log else default_gravity()
     placed = parse_object_pose(top.section("object"))
     streams = _streams(top)
+    arm = _arm(top) if "robot" in top else None
+    _require_arm_for_joints(streams, arm)
     told = "gravity" in log or any(quantity.name == "gravity" for spec in streams for quantity in spec.quantities)
     return Description(
         streams=streams,
@@ -81,6 +91,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         noise=_noise(top.section("noise")),
         tool=log.text("tool"),
         placed=placed,
+        arm=arm,
         notes=() if told else (LEVEL_BASE,),
     )
 
@@ -102,6 +113,30 @@ def _short(values: Array) -> str:
 def _noise(entry: Entry) -> dict[str, float]:
     entry.only(*NOISE)
     return {key: entry.positive(key, _LOUDEST) for key in NOISE if key in entry}
+
+
+def _arm(top: Entry) -> ArmSpec:
+    entry = top.section("robot")
+    if "model" in entry:
+        raise entry.error('"model" is for teams. Give an arm\'s urdf = "arm.urdf" and sensor_link = "..".')
+    entry.only("urdf", "sensor_link", "base_link")
+    for key, example in (("urdf", 'urdf = "arm.urdf"'), ("sensor_link", 'sensor_link = "tool0"')):
+        entry.require(key, example)
+    return ArmSpec(str(entry.text("urdf")), str(entry.text("sensor_link")), entry.text("base_link"), entry.where)
+
+
+def _require_arm_for_joints(streams: Sequence[StreamSpec], arm: ArmSpec | None) -> None:
+    """Raise BadDescription where joints have no arm, or the pose that they tell is told again."""
+    for spec in streams:
+        if "joint_position" not in spec.names:
+            continue
+        if arm is None:
+            raise BadDescription(
+                f'{spec.where}: "joint_position" needs the arm. Add [robot] with urdf = "arm.urdf" and sensor_link = '
+                '".."; or give the orientation of the sensor, as rotation = { columns = [..], form = .. }.'
+            )
+        if twice := [name for other in streams for name in ("rotation", "position") if name in other.names]:
+            raise BadDescription(f'{spec.where}: "joint_position" tells the {twice[0]}, too. Give one of them.')
 
 
 def _streams(top: Entry) -> tuple[StreamSpec, ...]:

@@ -9,13 +9,16 @@ from pathlib import Path
 from steelyard import check
 from steelyard.errors import BadFile
 from steelyard.io import guess
-from steelyard.io.description import Description, read_description
+from steelyard.io.arm_joints import posed
+from steelyard.io.description import ArmSpec, Description, read_description
 from steelyard.io.joined_tables import own_rows
 from steelyard.io.missing_rows import without_missing
 from steelyard.io.requirements import require_answerable, require_matched_rows
 from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
 from steelyard.io.tables import Table, find_file, open_table
+from steelyard.io.urdf_files import read_arm
 from steelyard.logs.recording import Recording, Stream
+from steelyard.robots.serial import SerialArm
 
 
 def read_recording(path: Path | str, data: Path | str | None = None) -> Recording:
@@ -73,6 +76,9 @@ def _recording(
     )
     require_matched_rows(streams, path.name)
     streams, findings = without_missing(specs, streams)
+    if description.arm is not None:
+        arm = _arm(description.arm, path, data)
+        streams = tuple(posed(*each, arm) for each in zip(specs, tables, streams, strict=True))
     tool = description.tool
     tool = None if tool is None else str(find_file(tool, path.parent, data, f"{path.name}, [log], tool"))
     placed = description.placed
@@ -88,3 +94,7 @@ def _recording(
         findings=findings,
         notes=description.notes,
     )
+
+
+def _arm(said: ArmSpec, path: Path, data: Path | None) -> SerialArm:
+    return read_arm(find_file(said.urdf, path.parent, data, f"{said.where}, urdf"), said.sensor_link, said.base_link)

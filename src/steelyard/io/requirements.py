@@ -12,6 +12,7 @@ from steelyard.logs.recording import QUANTITIES, Stream
 def require_answerable(specs: Sequence[StreamSpec], name: str) -> None:
     """Raise BadDescription where quantities that every answer needs are missing, or one is given twice."""
     given = [quantity for spec in specs for quantity in spec.names]
+    given += ["rotation"] * given.count("joint_position")
     for quantity in given:
         if given.count(quantity) > 1:
             raise BadDescription(f'{name}: "{quantity}" is given by {given.count(quantity)} streams. Give it in one.')

@@ -35,7 +35,7 @@ _KEYS = ("path", "topic", "frames", "kind", "time", "delay", "mount", *QUANTITIE
 
 @dataclass(frozen=True)
 class QuantitySpec:
-    """Which columns hold a quantity; `form` says how a rotation is written."""
+    """Which columns hold a quantity; `form` says how a rotation is written, `open_count` that any number will do."""
 
     name: str
     columns: tuple[Column, ...]
@@ -43,10 +43,13 @@ class QuantitySpec:
     where: str
     form: str | None = None
     frame: str = "S"
+    open_count: bool = False
 
     @property
-    def count(self) -> int:
-        """How many columns the quantity has."""
+    def count(self) -> int | None:
+        """How many columns the quantity has; None where its description does not know."""
+        if self.open_count:
+            return None
         return FORMS[self.form] if self.form else (QUANTITIES | ROBOT)[self.name]
 
 
@@ -97,11 +100,13 @@ def parse_stream(entry: Entry, robot: bool = False) -> StreamSpec:
     entry.require("path", 'path = "log.csv"')
     path = str(entry.text("path"))
     entry = Entry(entry.values, f'{entry.where} ("{path}")')
-    if not robot:
-        _refuse_joints(entry)
+    if not robot and "joint_torque" in entry:
+        raise entry.error('"joint_torque" is of use for an Omnid of a team only. Leave it out: the sensor measures.')
     zero = entry.values.get("torque") == "zero"
     quantities = tuple(
-        _quantity(entry, name) for name in (*QUANTITIES, *ROBOT) if name in entry and not (zero and name == "torque")
+        _quantity(entry, name, robot)
+        for name in (*QUANTITIES, *ROBOT)
+        if name in entry and not (zero and name == "torque")
     )
     if not quantities:
         raise entry.error('no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }')
@@ -143,16 +148,7 @@ def _frames(stream: Entry) -> tuple[str, str] | None:
     return value[0].lstrip("/"), value[1].lstrip("/")
 
 
-def _refuse_joints(entry: Entry) -> None:
-    for key in _JOINT:
-        if key in entry:
-            raise entry.error(
-                f'"{key}" is not supported yet: robot kinematics come later. '
-                "Give the orientation of the sensor instead, as rotation = { columns = [..], form = .. }."
-            )
-
-
-def _quantity(stream: Entry, name: str) -> QuantitySpec:
+def _quantity(stream: Entry, name: str, robot: bool) -> QuantitySpec:
     entry = stream.table(name)
     if name == "rotation":
         return _rotation(entry)
@@ -164,7 +160,9 @@ def _quantity(stream: Entry, name: str) -> QuantitySpec:
         entry = Entry({**entry.values, "unit": spelled(name, said)}, entry.where)
     unit = entry.choice("unit", units, units[0])
     frame = entry.choice("frame", ("S", "W"), "S") if framed else "W" if name == "position" else "S"
-    return QuantitySpec(name, _columns(entry, (QUANTITIES | ROBOT)[name]), unit, entry.where, frame=frame)
+    of_arm = name == "joint_position" and not robot
+    columns = _columns(entry, None if of_arm else (QUANTITIES | ROBOT)[name])
+    return QuantitySpec(name, columns, unit, entry.where, frame=frame, open_count=of_arm)
 
 
 def _rotation(entry: Entry) -> QuantitySpec:
@@ -178,13 +176,13 @@ def _rotation(entry: Entry) -> QuantitySpec:
     return QuantitySpec("rotation", _columns(entry, FORMS[form]), unit, entry.where, form=form)
 
 
-def _columns(entry: Entry, count: int) -> tuple[Column, ...]:
-    """Return `count` column names or numbers; one alone may name an NPZ array that holds all of them."""
-    value = entry.require("columns", f"columns = [..] with {count} names")
+def _columns(entry: Entry, count: int | None) -> tuple[Column, ...]:
+    """Return `count` column names or numbers, any if None; one alone may name an array that holds all of them."""
+    value = entry.require("columns", f"columns = [..] with {count or 'their'} names")
     good = isinstance(value, list) and all(isinstance(c, str | int) and not isinstance(c, bool) for c in value)
     if not good or any(isinstance(c, int) and c < 0 for c in value):
         raise entry.error(f'"columns" must be a list of names or of numbers from 0; got {value!r}.')
-    if len(value) not in (1, count):
+    if (count is not None and len(value) not in (1, count)) or not value:
         raise entry.error(f'"columns" must have {count} entries; got {len(value)}: {value!r}.')
     if len(set(value)) != len(value):
         raise entry.error(f'"columns" names a column twice: {value!r}.')

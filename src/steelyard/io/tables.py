@@ -88,10 +88,10 @@ def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Pa
     )
 
 
-def choose_columns(header: Header, wanted: Sequence[Column], count: int, where: str) -> tuple[int, ...]:
-    """Return the numbers of the `count` columns that `wanted` names; raises BadDescription listing all."""
+def choose_columns(header: Header, wanted: Sequence[Column], count: int | None, where: str) -> tuple[int, ...]:
+    """Return the numbers of the `count` columns (any, if None) that `wanted` names; raises BadDescription."""
     numbers = [n for column in wanted for n in _find(header, column, where)]
-    if len(numbers) != count:
+    if count is not None and len(numbers) != count:
         raise BadDescription(f"{where}: {count} columns are needed; {list(wanted)} gives {len(numbers)}.")
     return tuple(numbers)
 

@@ -2,5 +2,6 @@
 
 from steelyard.robots.delta import Delta
 from steelyard.robots.omnid import Omnid
+from steelyard.robots.serial import Joint, SerialArm
 
-__all__ = ["Delta", "Omnid"]
+__all__ = ["Delta", "Joint", "Omnid", "SerialArm"]
