@@ -16,15 +16,21 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.regressor import basis, motion_map
 from steelyard.logs.log import Integers, Mask
+from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.payload.spectra import Spectra
 
 # Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
 ROUNDING = 1e-6
 
 
+def weight(phi: Array) -> float:
+    """Return roughly what a payload of parameters phi (P,) weighs [N], for thresholds."""
+    return float(abs(phi[0]) * ROUNDED_GRAVITY)
+
+
 def least_noise(phi: Array) -> float:
     """Return the variance [N^2] below which no force's noise is judged, for a payload of parameters phi (P,)."""
-    return float((ROUNDING * abs(phi[0]) * 9.81) ** 2)
+    return weight(ROUNDING * phi) ** 2
 
 
 @dataclass(frozen=True, eq=False)
