@@ -9,17 +9,17 @@ Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, ce
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
-from steelyard.team.payload.model import Group, least_noise, normal, residual_scatter
+from steelyard.team.payload.model import Group, Normal, least_noise, normal, residual_scatter
+from steelyard.team.payload.settling import settled
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
-ROUNDS = 12
+FEWEST, ROUNDS = 1, 12
 # Noise has settled where it changes by less than this share.
 SETTLED = 0.03
 
@@ -64,37 +64,35 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     ladder = ladder_of(sum(len(group.parts) for group in groups), with_gain)
     phi, groups = _start(groups, D, size)
     scale = _units(phi, size)
-    starts = np.cumsum([0, *(len(group.parts) for group in groups)])
-    for left in reversed(range(ROUNDS)):
-        weights = tuple(group.weights(phi) for group in groups)
-        normals = [
-            normal(part, D, W, group.motion_noise)
-            for group, W in zip(groups, weights, strict=True)
-            for part in group.parts
-        ]
-        models = Models.of(normals, C, ladder, scale)
-        phi, beside = models.mean(), models.recordings(models.best)
-        renewed = tuple(_judged(g, D, beside, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
-        change = max(
-            float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max())
-            for new, old in zip(renewed, groups, strict=True)
-        )
-        # Weights and groups that are told belong together, however it ends.
-        if not left or change < SETTLED:
-            break
-        groups = renewed
-    covariance = models.covariance_about(phi)
+    found = settled(groups, phi, _Equations(D), C, ladder, scale, FEWEST, ROUNDS, SETTLED)
+    phi, models, groups = found.phi, found.models, found.groups
     # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
     # in the noise already.
     last = groups[-1]
     unsure = 1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0)
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
-    blind, shown = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts)), models.shown(scale)
+    shown = models.shown(scale)
     return PayloadFit(
-        phi, covariance * unsure, shown.lost, scale, models.information[models.best], shown.condition, models.gain,
-        models.gainless, groups, weights, blind, _residual(groups),
+        phi, models.covariance_about(phi) * unsure, shown.lost, scale, models.information[models.best],
+        shown.condition, models.gain, models.gainless, groups, found.weights, found.blind, _residual(groups),
         float(models.chi2[models.best]) / max(6 * rows - 10, 1.0), unsure,
     )  # fmt: skip
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Those of a rigid payload; D (6, 6 N) as of `fit_payload`."""
+
+    D: Array
+
+    def weights(self, group: Group, phi: Array) -> Array:
+        return group.weights(phi)
+
+    def normals(self, group: Group, W: Array) -> list[Normal]:
+        return [normal(part, self.D, W, group.motion_noise) for part in group.parts]
+
+    def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
+        return _judged(group, self.D, beside, start)
 
 
 def _units(phi: Array, size: float) -> Array:
