@@ -15,7 +15,6 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.whose_slip import whose_slip
-from steelyard.team.changes.yielding import Yields, stiffened
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.search import F, searched
 from steelyard.team.clocks.unsteady import steadied
@@ -29,6 +28,7 @@ from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.twists import require_one_velocity_unit
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
+from steelyard.team.poses.yielding import Yields, stiffened
 from steelyard.team.published import require_wrenches
 from steelyard.team.team_findings import (
     gains,
