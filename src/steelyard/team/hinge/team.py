@@ -36,7 +36,7 @@ from steelyard.team.payload.spectra import band_edges
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.statistic import OWN
 from steelyard.team.poses.team import CLOCK_ROUNDS, FEW_ROWS, PUNCTUAL, mean_gravity
-from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.stacked import Stretch, all_poses, row_slices, stretches
 
 # Rows that are enough to come near the optimum.
 ROUGH_ROWS = 200
@@ -79,17 +79,15 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
 
 def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
     """Return how motion and angle change (T, 7), recording by recording."""
-    ends = np.cumsum([0, *(len(part) for part in parts)])
-    each = zip(parts, ends[:-1], ends[1:], strict=True)
-    return np.concatenate([rates(team.rows(slice(a, b)), part.rate) for part, a, b in each])
+    each = zip(parts, row_slices(parts), strict=True)
+    return np.concatenate([rates(team.rows(rows), part.rate) for part, rows in each])
 
 
 def _places(before: tuple[Stretch, ...], after: tuple[Stretch, ...]) -> Integers:
     """Return which row of `before` is nearest to each of `after`, recording by recording."""
-    starts = np.cumsum([0, *(len(part) for part in before)])
     middles = [(part.time[1:] + part.time[:-1]) / 2 for part in before]
-    each = zip(middles, after, starts[:-1], strict=True)
-    return np.concatenate([start + np.searchsorted(middle, now.time) for middle, now, start in each])
+    each = zip(middles, after, row_slices(before), strict=True)
+    return np.concatenate([rows.start + np.searchsorted(middle, now.time) for middle, now, rows in each])
 
 
 def identify_two_bodies(
@@ -195,10 +193,8 @@ def _kinds(
 
     Raises CannotAnswer where there are none.
     """
-    gravity, made, start = mean_gravity(log, fit.team.homes), [], 0
-    for part in parts:
-        rows = slice(start, start + len(part))
-        start += len(part)
+    gravity, made = mean_gravity(log, fit.team.homes), []
+    for part, rows in zip(parts, row_slices(parts), strict=True):
         team = fit.team.rows(rows)
         made.append((team, fit.residual[rows], *bodies_of(part, team, gravity, highest_hz)))
     wrong, turned = robot_of_other_sign([(team, one, two) for team, _, one, two in made], sums, log.names, highest_hz)

@@ -7,7 +7,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from itertools import pairwise
 from typing import Any, Generic, Protocol, TypeVar
 
 import numpy as np
@@ -15,6 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.team.payload.bias_models import Models, Recordings
 from steelyard.team.payload.model import Normal
+from steelyard.team.stacked import row_slices
 
 
 class Banded(Protocol):
@@ -68,12 +68,11 @@ class Round(Generic[G]):
         normals = [n for group, W in zip(groups, weights, strict=True) for n in equations.normals(group, W)]
         models = Models.of(normals, C, ladder, scale)
         beside = models.recordings(models.best)
-        ends = np.cumsum([0, *(len(group.parts) for group in groups)]).tolist()
+        places = row_slices([group.parts for group in groups])
         renewed = tuple(
-            equations.judged(group, W, beside, start)
-            for group, W, start in zip(groups, weights, ends[:-1], strict=True)
+            equations.judged(group, W, beside, own.start) for group, W, own in zip(groups, weights, places, strict=True)
         )
-        blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(ends))
+        blind = tuple(tuple(beside.blind[own]) for own in places)
         return cls(models.mean(), models, blind, groups, weights, renewed)
 
     @property
