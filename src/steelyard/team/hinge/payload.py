@@ -14,7 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.team.hinge.rows import BIAS, COUNT, Bands, Sums, noisy
 from steelyard.team.payload.bias_models import Recordings, ladder_of
-from steelyard.team.payload.model import Normal, least_noise
+from steelyard.team.payload.model import LEAST_MASS, Normal, least_noise, of_force, units_of_body
 from steelyard.team.payload.settling import Round, settled
 
 # The first of twelve is that of `_start`.
@@ -82,7 +82,7 @@ class HingedPayload:
 
 def _forces(sums: Sums) -> Array:
     """Return which of the pushes (6 N,) are forces."""
-    return np.asarray(np.arange(sums.seven.shape[1]) % 6 >= 3, dtype=np.float64)
+    return of_force(sums.seven.shape[1]).astype(np.float64)
 
 
 def fit_hinged_payload(
@@ -100,10 +100,10 @@ def fit_hinged_payload(
     V[range(7), range(7)] += 1e-6 * np.diag(V)
     both = np.concatenate([sums.first, sums.second]) * axes
     C = both @ both.T
-    C[range(BIAS), range(BIAS)] += 1e-6 * np.where(np.arange(BIAS) % 6 < 3, size**2, 1.0)
+    C[range(BIAS), range(BIAS)] += 1e-6 * np.where(of_force(BIAS), 1.0, size**2)
     equations = _Equations(sums, V)
     phi, kinds = _start(kinds, equations, C, ladder, size)
-    scale = _units(max(abs(float(phi[0])), 1e-3), size)
+    scale = _units(max(abs(float(phi[0])), LEAST_MASS), size)
     found = settled(kinds, phi, equations, C, ladder, scale, FEWEST, ROUNDS, SETTLED)
     phi, models, kinds = found.phi, found.models, found.groups
     shown = models.shown(scale)
@@ -116,8 +116,8 @@ def fit_hinged_payload(
 
 
 def _units(mass: float, size: float) -> Array:
-    whole = [mass, *[mass * size] * 3, *[mass * size**2] * 6]
-    return np.array([*whole, *[mass * size] * 2, *[mass * size**2] * 5])
+    # Of the second body's seven, two are first moments.
+    return np.concatenate([units_of_body(mass, size), np.repeat([mass * size, mass * size**2], [2, 5])])
 
 
 def _start(

@@ -15,7 +15,16 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
-from steelyard.team.payload.model import Group, Normal, least_noise, normal, residual_scatter
+from steelyard.team.payload.model import (
+    LEAST_MASS,
+    Group,
+    Normal,
+    least_noise,
+    normal,
+    of_force,
+    residual_scatter,
+    units_of_body,
+)
 from steelyard.team.payload.settling import settled
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
@@ -63,7 +72,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     """
     ladder = ladder_of(sum(len(group.parts) for group in groups), with_gain)
     phi, groups = _start(groups, D, size)
-    scale = _units(phi, size)
+    scale = units_of_body(max(abs(float(phi[0])), LEAST_MASS), size)
     found = settled(groups, phi, _Equations(D), C, ladder, scale, FEWEST, ROUNDS, SETTLED)
     phi, models, groups = found.phi, found.models, found.groups
     # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
@@ -95,11 +104,6 @@ class _Equations:
         return _judged(group, self.D, beside, start)
 
 
-def _units(phi: Array, size: float) -> Array:
-    mass = max(abs(float(phi[0])), 1e-3)
-    return np.concatenate([[mass], np.full(3, mass * size), np.full(6, mass * size**2)])
-
-
 def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tuple[Group, ...]]:
     """Return phi by least squares with moments in units of force times size, and the noise that is then left."""
     unit = np.concatenate([np.full(3, size**2), np.ones(3)])
@@ -111,7 +115,7 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
     every = [
         normal(part, D, np.repeat(weight, len(g.wrench_noise), 0), g.motion_noise) for g in loud for part in g.parts
     ]
-    flat = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)])
+    flat = units_of_body(1.0, size)
     first = Models.of(every, np.diag(unit), np.array([[0.0, 1.0, 0.0, 0.0]]), flat).recordings(0)
     left, count = np.zeros(6), 0.0
     for k, part in enumerate(part for group in loud for part in group.parts):
@@ -136,7 +140,7 @@ def _judged(group: Group, D: Array, beside: Recordings, start: int) -> Group:
     thin = rows < 1
     if thin.any() and not thin.all():
         seen[thin] = seen[~thin].mean(0)
-    size = np.maximum((D[:, np.arange(D.shape[1]) % 6 >= 3] ** 2).mean(1), 1e-12)
+    size = np.maximum((D[:, of_force(D.shape[1])] ** 2).mean(1), 1e-12)
     seen = np.maximum(seen, least_noise(phi) * size)
     least = np.maximum(0.02 * seen, least_noise(phi) * size)
     # Where the path errs less than was thought, its noise shrinks with it.
