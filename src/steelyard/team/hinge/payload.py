@@ -146,7 +146,22 @@ class _Equations:
         return [_normal(part, kind, W, self.sums) for part in kind.parts]
 
     def judged(self, kind: Kind, W: Array, beside: Recordings, start: int) -> Kind:
-        return replace(kind, wrench_noise=_judged(kind, W, self.V, beside, start))
+        """Return the kind with the noise of force axes renewed: one step of expectation maximisation per band."""
+        seen, size = np.zeros(len(kind.wrench_noise)), np.zeros(len(kind.wrench_noise))
+        phi = beside.phi
+        for k, part in enumerate(kind.parts):
+            solution, doubt = beside.solution(start + k), beside.doubt(start + k)
+            values, vectors = np.linalg.eigh(doubt)
+            factor = vectors * np.sqrt(np.maximum(values, 0.0))
+            for band, z in enumerate(part.z):
+                # At rest the means are mostly bias.
+                z = z[1:] if part.still and band == 0 else z
+                left = np.concatenate([(z[..., -1] - z[..., :-1] @ solution)[..., None], z[..., :-1] @ factor], axis=-1)
+                pulled = W[band] @ left
+                seen[band] += float(np.einsum("nip,ij,njp->", pulled, self.V, pulled, optimize=True))
+                size[band] += len(z) * float(np.trace(W[band] @ self.V))
+        share = np.where(size > 0, seen / np.maximum(size, 1e-300), 1.0)
+        return replace(kind, wrench_noise=np.maximum(kind.wrench_noise * share, least_noise(phi)))
 
 
 def _normal(part: Bands, kind: Kind, W: Array, sums: Sums) -> Normal:
@@ -159,22 +174,3 @@ def _normal(part: Bands, kind: Kind, W: Array, sums: Sums) -> Normal:
         noise += rows * np.einsum("ijp,ik,jl,klq->pq", N, weight, motion, N, optimize=True)
     each = np.concatenate([sums.first, sums.second]) * (_forces(sums) * part.mean)
     return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each)
-
-
-def _judged(kind: Kind, W: Array, V: Array, beside: Recordings, start: int) -> Array:
-    """Return the noise (K,) of the force axes renewed: one step of expectation maximisation per band."""
-    seen, size = np.zeros(len(kind.wrench_noise)), np.zeros(len(kind.wrench_noise))
-    phi = beside.phi
-    for k, part in enumerate(kind.parts):
-        solution, doubt = beside.solution(start + k), beside.doubt(start + k)
-        values, vectors = np.linalg.eigh(doubt)
-        factor = vectors * np.sqrt(np.maximum(values, 0.0))
-        for band, z in enumerate(part.z):
-            # At rest the means are mostly bias.
-            z = z[1:] if part.still and band == 0 else z
-            left = np.concatenate([(z[..., -1] - z[..., :-1] @ solution)[..., None], z[..., :-1] @ factor], axis=-1)
-            pulled = W[band] @ left
-            seen[band] += float(np.einsum("nip,ij,njp->", pulled, V, pulled, optimize=True))
-            size[band] += len(z) * float(np.trace(W[band] @ V))
-    share = np.where(size > 0, seen / np.maximum(size, 1e-300), 1.0)
-    return np.asarray(np.maximum(kind.wrench_noise * share, least_noise(phi)))

@@ -101,7 +101,29 @@ class _Equations:
         return [normal(part, self.D, W, group.motion_noise) for part in group.parts]
 
     def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
-        return _judged(group, self.D, beside, start)
+        """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
+        squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
+        for k, part in enumerate(group.parts):
+            squares += residual_scatter(part, self.D, beside.solution(start + k), beside.doubt(start + k))
+            rows += part.judged_rows
+        phi = beside.phi
+        M = motion_map(phi)[:, :6]
+        shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
+        # The mean of a variance given its rows, not the likeliest: weights must not be promised too high.
+        seen = squares / np.maximum(rows - 2, 0.5 * rows + 1e-9)[:, None]
+        thin = rows < 1
+        if thin.any() and not thin.all():
+            seen[thin] = seen[~thin].mean(0)
+        size = np.maximum((self.D[:, of_force(self.D.shape[1])] ** 2).mean(1), 1e-12)
+        seen = np.maximum(seen, least_noise(phi) * size)
+        least = np.maximum(0.02 * seen, least_noise(phi) * size)
+        # Where the path errs less than was thought, its noise shrinks with it.
+        share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
+        return replace(
+            group,
+            motion_noise=group.motion_noise * share[:, None, None],
+            wrench_noise=np.maximum(seen - shared * share[:, None], least),
+        )
 
 
 def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tuple[Group, ...]]:
@@ -124,32 +146,6 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
     phi = first.phi
     noise = np.maximum(left / max(count, 1.0), least_noise(phi) * unit)
     return phi, tuple(replace(g, wrench_noise=np.tile(noise, (len(g.wrench_noise), 1))) for g in groups)
-
-
-def _judged(group: Group, D: Array, beside: Recordings, start: int) -> Group:
-    """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
-    squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
-    for k, part in enumerate(group.parts):
-        squares += residual_scatter(part, D, beside.solution(start + k), beside.doubt(start + k))
-        rows += part.judged_rows
-    phi = beside.phi
-    M = motion_map(phi)[:, :6]
-    shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
-    # The mean of a variance given its rows, not the likeliest: weights must not be promised too high.
-    seen = squares / np.maximum(rows - 2, 0.5 * rows + 1e-9)[:, None]
-    thin = rows < 1
-    if thin.any() and not thin.all():
-        seen[thin] = seen[~thin].mean(0)
-    size = np.maximum((D[:, of_force(D.shape[1])] ** 2).mean(1), 1e-12)
-    seen = np.maximum(seen, least_noise(phi) * size)
-    least = np.maximum(0.02 * seen, least_noise(phi) * size)
-    # Where the path errs less than was thought, its noise shrinks with it.
-    share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
-    return replace(
-        group,
-        motion_noise=group.motion_noise * share[:, None, None],
-        wrench_noise=np.maximum(seen - shared * share[:, None], least),
-    )
 
 
 def _residual(groups: tuple[Group, ...]) -> Array:

@@ -5,9 +5,8 @@ Source: expectation maximisation, Dempster, Laird, Rubin 1977.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -18,11 +17,7 @@ from steelyard.team.stacked import row_slices
 
 
 class Banded(Protocol):
-    """Recordings of one kind, with common bands and the noise of each."""
-
-    @property
-    def parts(self) -> Sequence[Any]:
-        """The recordings."""
+    """Recordings of one kind with common bands."""
 
     @property
     def wrench_noise(self) -> Array:
@@ -65,10 +60,10 @@ class Round(Generic[G]):
     ) -> Round[G]:
         """Return the round from phi (P,) and the noise of groups; C, ladder and scale as of `Models`."""
         weights = tuple(equations.weights(group, phi) for group in groups)
-        normals = [n for group, W in zip(groups, weights, strict=True) for n in equations.normals(group, W)]
-        models = Models.of(normals, C, ladder, scale)
+        normals = [equations.normals(group, W) for group, W in zip(groups, weights, strict=True)]
+        models = Models.of([one for each in normals for one in each], C, ladder, scale)
         beside = models.recordings(models.best)
-        places = row_slices([group.parts for group in groups])
+        places = row_slices(normals)
         renewed = tuple(
             equations.judged(group, W, beside, own.start) for group, W, own in zip(groups, weights, places, strict=True)
         )
