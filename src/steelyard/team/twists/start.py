@@ -12,11 +12,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.spatial import Pose, Rotation, axial_vector
-from steelyard.team.poses.start import NOISE_SHARE
+from steelyard.team.poses.start import NOISE_SHARE, ONE_AXIS, TURNS
 from steelyard.team.twists.statistic import TwistScatter
-
-# Turns about the one axis of rotation that are tried where it is the only one; below this share a second axis is none.
-TURNS, ONE_AXIS = 24, 0.1
 
 
 def first_grasps(data: TwistScatter, reference: int, names: tuple[str, ...], level: Array | None = None) -> Pose:
