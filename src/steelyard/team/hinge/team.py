@@ -21,7 +21,6 @@ from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.assembled import known
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
-from steelyard.team.hinge.axis import Split
 from steelyard.team.hinge.bodies import FROM_TEN, both_bodies, second_body, seen_from, seven_rows
 from steelyard.team.hinge.payload import HingedPayload, Kind, fit_hinged_payload
 from steelyard.team.hinge.poses import GUESS, Hinged, HingedFit, finished, fit_hinged, followed, rates
@@ -37,6 +36,7 @@ from steelyard.team.payload.spectra import band_edges
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.statistic import OWN
 from steelyard.team.poses.team import CLOCK_ROUNDS, FEW_ROWS, PUNCTUAL, mean_gravity
+from steelyard.team.split import Split
 from steelyard.team.stacked import Stretch, all_poses, row_slices, stretches
 
 # Rows that are enough to come near the optimum.

@@ -19,8 +19,8 @@ from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.hinge.axis import Split, smoothed, split_of
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.split import Split, smoothed, split_of
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twists.rows import TwistStretch, twist_stretches
 from steelyard.team.twists.slips_between import slip_between
