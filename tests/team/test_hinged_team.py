@@ -23,11 +23,11 @@ from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.axis import find_split
 from steelyard.team.hinge.bodies import FROM_TEN, least_mass
 from steelyard.team.hinge.rows import COUNT, EXCHANGED, SEVEN, about_z, equations
 from steelyard.team.hinge.team import _places
 from steelyard.team.joint import JointTeam
+from steelyard.team.split import find_split
 from steelyard.team.stacked import stretches
 from steelyard.team.team_findings import open_parameters
 

@@ -19,9 +19,9 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.axis import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
+from steelyard.team.split import bodies, find_hinge, find_split, moving_twists, rigidity_findings
 from steelyard.team.stacked import stretches
 from steelyard.team.twists.fit import fit_twists
 from steelyard.team.twists.rows import twist_stretches

@@ -11,10 +11,10 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
-from steelyard.team.changes.yielding import stiffened
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
+from steelyard.team.poses.yielding import stiffened
 
 NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, torque_white_Nm=0.1)
 ALL = frozenset({0, 1, 2})
@@ -55,7 +55,7 @@ def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) ->
     """So that the test above cannot pass for want of an effect."""
     made = trial((1e5, 3e3))
     now = off(JointTeam().identify(made.log), made)
-    monkeypatch.setattr("steelyard.team.changes.yielding.SUSPECT", np.inf)
+    monkeypatch.setattr("steelyard.team.poses.yielding.SUSPECT", np.inf)
     before = off(JointTeam().identify(made.log), made)
     assert before[0] > 10 * now[0]
     assert before[1] > 3

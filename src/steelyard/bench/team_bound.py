@@ -24,6 +24,7 @@ from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.joint import JointTeam
 from steelyard.team.payload.body_rows import balance_frame, summing
+from steelyard.team.payload.model import of_force
 from steelyard.team.poses.fit import information
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.solver import Solver
@@ -58,7 +59,7 @@ def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:
     grasps = standing.fit.team.grasps
     frame = balance_frame(grasps)
     D = summing(frame.inverse() @ grasps)
-    forces = D[:, np.arange(D.shape[1]) % 6 >= 3]
+    forces = D[:, of_force(D.shape[1])]
     weights = np.repeat([noise.pose_rad**-2, noise.pose_m**-2], 3)
     path = np.linalg.inv(np.einsum("nia,i,nib->ab", *[adjoint_inverse(grasps), weights, adjoint_inverse(grasps)]))
     path = adjoint_inverse(frame) @ path @ adjoint_inverse(frame).T

@@ -93,14 +93,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     click.echo(estimate_table(best, title, seen.truth.people, _names(best, shape, seen)))
     click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
     say(f"The page with the parts in 3D: {output}")
-    if keep is None:
-        say("Keep log, views, cloud and parts with --keep DIR.")
-        return
-    say(f"Log, cloud and parts are in {keep}; try: {command_line('identify', log, '--parts', keep / 'parts.npz')}")
-    if views:
-        say(f"The views are in {views}; try: {command_line('scan', views, '-o', keep / 'cloud.ply')}")
-    else:
-        say("The views are not kept: that needs pip install 'steelyard[images]'.")
+    _say_what_is_kept(keep, log, views)
 
 
 def _kept_views(seen: Seen, folder: Path) -> Path | None:
@@ -113,6 +106,18 @@ def _kept_views(seen: Seen, folder: Path) -> Path | None:
     except MissingDependency:
         return None
     return folder
+
+
+def _say_what_is_kept(keep: Path | None, log: Path, views: Path | None) -> None:
+    """Say where the made files are, and what to try on them."""
+    if keep is None:
+        say("Keep log, views, cloud and parts with --keep DIR.")
+        return
+    say(f"Log, cloud and parts are in {keep}; try: {command_line('identify', log, '--parts', keep / 'parts.npz')}")
+    if views:
+        say(f"The views are in {views}; try: {command_line('scan', views, '-o', keep / 'cloud.ply')}")
+    else:
+        say("The views are not kept: that needs pip install 'steelyard[images]'.")
 
 
 def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, Estimate]:

@@ -7,10 +7,7 @@ import re
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.recording import STANDARD_GRAVITY
-
-_POUND_FORCE = 4.4482216152605
-_INCH = 0.0254
+from steelyard.logs.recording import INCH, POUND_FORCE, STANDARD_GRAVITY
 
 TIME: dict[str, int] = {"s": 1, "ms": 1000, "us": 1_000_000, "ns": 1_000_000_000}  # per second, exact
 
@@ -19,8 +16,8 @@ ANGLE: dict[str, float] = {"rad": 1.0, "deg": float(np.pi / 180)}
 
 # Quantity -> unit -> factor to SI. One "g" depends on the place: see `local_g`.
 UNITS: dict[str, dict[str, float]] = {
-    "force": {"N": 1.0, "kN": 1e3, "kgf": STANDARD_GRAVITY, "lbf": _POUND_FORCE},
-    "torque": {"N*m": 1.0, "N*mm": 1e-3, "kgf*m": STANDARD_GRAVITY, "lbf*in": _POUND_FORCE * _INCH},
+    "force": {"N": 1.0, "kN": 1e3, "kgf": STANDARD_GRAVITY, "lbf": POUND_FORCE},
+    "torque": {"N*m": 1.0, "N*mm": 1e-3, "kgf*m": STANDARD_GRAVITY, "lbf*in": POUND_FORCE * INCH},
     "position": LENGTH,
     "linear_velocity": {"m/s": 1.0},
     "angular_velocity": {"rad/s": 1.0, "deg/s": ANGLE["deg"]},

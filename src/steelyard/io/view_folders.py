@@ -95,8 +95,8 @@ def _intrinsics(camera: dict[str, float]) -> Intrinsics:
     return Intrinsics(int(camera["width"]), int(camera["height"]), *(camera[key] for key in ("fx", "fy", "cx", "cy")))
 
 
-def _poses(path: Path) -> tuple[list[str], Pose]:
-    """Return the names of the views and the poses (V,) of the camera in W."""
+def _rows(path: Path) -> list[tuple[int, dict[str, Any]]]:
+    """Return the rows of a table of poses by column, each with its line in the file."""
     if not path.exists():
         raise BadFile(f"{path}: this file is missing. It needs the columns {', '.join(_COLUMNS)}.")
     try:
@@ -108,14 +108,20 @@ def _poses(path: Path) -> tuple[list[str], Pose]:
         raise BadFile(f"{path}: cannot be read as CSV; {error}.") from None
     if len(numbered) > MOST_VIEWS:
         raise BadFile(f"{path}: these are more than {MOST_VIEWS} views. Leave views out.")
-    line, rows = [number for number, _ in numbered], [row for _, row in numbered]
-    missing = [key for key in _COLUMNS if not rows or key not in rows[0]]
+    missing = [key for key in _COLUMNS if not numbered or key not in numbered[0][1]]
     if len(missing) == len(_COLUMNS):
         raise BadFile(f"{path}: expected the columns {', '.join(_COLUMNS)} and a row per view.")
     if missing:
         raise BadFile(f"{path}: {_named(missing)} missing among its columns. It needs {', '.join(_COLUMNS)}.")
+    return numbered
+
+
+def _poses(path: Path) -> tuple[list[str], Pose]:
+    """Return the names of the views and the poses (V,) of the camera in W."""
+    rows = _rows(path)
+    line = [number for number, _ in rows]
     names, numbers = [], np.empty((len(rows), 7))
-    for k, row in enumerate(rows):
+    for k, (_, row) in enumerate(rows):
         names.append(_name(path, line[k], str(row["name"] or "")))
         for c, key in enumerate(_COLUMNS[1:]):
             try:

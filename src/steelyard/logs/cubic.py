@@ -16,9 +16,28 @@ def cubic(known: Array, values: Array, time: Array) -> Array:
     one sample ("not a knot").
     Source: de Boor, A Practical Guide to Splines, 1978, chapter IV.
     """
+    slope, last = _slopes(known, values), len(known) - 1
+    out, piece = np.empty((len(time), values.shape[1])), 0
+    for m in range(len(time)):
+        if time[m] < known[piece]:
+            piece = 0
+        while piece < last - 1 and time[m] >= known[piece + 1]:
+            piece += 1
+        step, since = known[piece + 1] - known[piece], time[m] - known[piece]
+        for k in range(values.shape[1]):
+            rise = (values[piece + 1, k] - values[piece, k]) / step
+            bend = (slope[piece, k] + slope[piece + 1, k] - 2 * rise) / step
+            out[m, k] = values[piece, k] + since * (
+                slope[piece, k] + since * ((rise - slope[piece, k]) / step - bend + since * bend / step)
+            )
+    return out
+
+
+@numba.njit(cache=True, error_model="numpy")
+def _slopes(known: Array, values: Array) -> Array:
+    """Return the slopes (T, D) of the spline at the samples: tridiagonal equations, eliminated downwards."""
     T, D = values.shape
     slope, upper, last = np.empty((T, D)), np.empty(T), T - 1
-    # The tridiagonal equations of the slopes at the samples, eliminated downwards.
     first, second = known[1] - known[0], known[2] - known[1]
     both = first + second
     upper[0] = both / second
@@ -43,17 +62,4 @@ def cubic(known: Array, values: Array, time: Array) -> Array:
     for t in range(last - 1, -1, -1):
         for k in range(D):
             slope[t, k] -= upper[t] * slope[t + 1, k]
-    out, piece = np.empty((len(time), D)), 0
-    for m in range(len(time)):
-        if time[m] < known[piece]:
-            piece = 0
-        while piece < last - 1 and time[m] >= known[piece + 1]:
-            piece += 1
-        step, since = known[piece + 1] - known[piece], time[m] - known[piece]
-        for k in range(D):
-            rise = (values[piece + 1, k] - values[piece, k]) / step
-            bend = (slope[piece, k] + slope[piece + 1, k] - 2 * rise) / step
-            out[m, k] = values[piece, k] + since * (
-                slope[piece, k] + since * ((rise - slope[piece, k]) / step - bend + since * bend / step)
-            )
-    return out
+    return slope

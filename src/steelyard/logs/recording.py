@@ -12,7 +12,12 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.spatial import Pose, Rotation
 
+# [m/s^2] Standard gravity, by which g and kgf are read.
 STANDARD_GRAVITY = 9.80665
+# [N], [m] A pound of force and an inch.
+POUND_FORCE, INCH = 4.4482216152605, 0.0254
+# [m/s^2] Gravity as most descriptions round it: for thresholds, which a thousandth does not move.
+ROUNDED_GRAVITY = 9.81
 
 # Quantity -> number of columns (rotation is stored as matrices).
 QUANTITIES: dict[str, int] = {

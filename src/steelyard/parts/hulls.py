@@ -48,26 +48,20 @@ def hulls_of(start: Any, member: Any, nodes: int, points: int) -> Hulls:
 
 
 @numba.njit(cache=True, nogil=True)
-def vertices_of_both(pool: Any, offset: Any, length: Any, a: int, b: int, mark: Any, stamp: int, rows: Any) -> int:
-    """Write the vertices of two clusters into `rows`, each once; return how many."""
-    count = 0
-    for node in (a, b):
-        for k in range(offset[node], offset[node] + length[node]):
-            v = pool[k]
-            if mark[v] != stamp:
-                mark[v] = stamp
-                rows[count] = v
-                count += 1
-    return count
-
-
-@numba.njit(cache=True, nogil=True)
 def both(hulls: Hulls, a: int, b: int) -> int:
     """Write the vertices of two clusters into `hulls.rows`, each once, those of `a` first; return how many."""
     vertex, offset, length = borrowed(hulls.vertex), borrowed(hulls.offset), borrowed(hulls.length)
     mark, rows, state = borrowed(hulls.mark), borrowed(hulls.rows), borrowed(hulls.state)
     state[1] += 1
-    return int(vertices_of_both(vertex, offset, length, a, b, mark, state[1], rows))
+    stamp, count = state[1], 0
+    for node in (a, b):
+        for k in range(offset[node], offset[node] + length[node]):
+            v = vertex[k]
+            if mark[v] != stamp:
+                mark[v] = stamp
+                rows[count] = v
+                count += 1
+    return count
 
 
 @numba.njit(cache=True, nogil=True)

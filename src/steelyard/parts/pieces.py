@@ -121,37 +121,10 @@ def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> A
     parent, total = np.arange(count), np.zeros(count)
     for t in range(len(piece)):
         total[piece[t]] += size[t]
-    while True:
-        # The ends of every contact, by cluster.
-        start = np.zeros(count + 1, np.int64)
-        for e in range(len(pairs)):
-            a, b = root(parent, piece[pairs[e, 0]]), root(parent, piece[pairs[e, 1]])
-            if a != b:
-                start[a + 1] += 1
-                start[b + 1] += 1
-        start = np.cumsum(start)
-        fill, far, weight = start[:-1].copy(), np.empty(start[-1], np.int64), np.empty(start[-1])
-        for e in range(len(pairs)):
-            a, b = root(parent, piece[pairs[e, 0]]), root(parent, piece[pairs[e, 1]])
-            if a != b:
-                far[fill[a]], far[fill[b]] = b, a
-                weight[fill[a]] = weight[fill[b]] = pull[e]
-                fill[a] += 1
-                fill[b] += 1
-        goal, strength = np.full(count, -1, np.int64), np.zeros(count)
-        for a in range(count):
-            if parent[a] != a or total[a] >= least:
-                continue
-            for k in range(start[a], start[a + 1]):
-                strength[far[k]] += weight[k]
-            best = -1
-            for k in range(start[a], start[a + 1]):
-                if best < 0 or strength[far[k]] > strength[best]:
-                    best = far[k]
-            for k in range(start[a], start[a + 1]):
-                strength[far[k]] = 0.0
-            goal[a] = best
+    joined = True
+    while joined:
         joined = False
+        goal = _strongest(total, least, _contacts(parent, piece, pairs, pull))
         for a in range(count):
             if goal[a] >= 0:
                 p, q = root(parent, a), root(parent, goal[a])
@@ -159,12 +132,49 @@ def _rounds(piece: Any, size: Array, pairs: Any, pull: Array, least: float) -> A
                     parent[max(p, q)] = min(p, q)
                     total[min(p, q)] += total[max(p, q)]
                     joined = True
-        if not joined:
-            break
     label = np.empty(len(piece), np.int64)
     for t in range(len(piece)):
         label[t] = root(parent, piece[t])
     return label
+
+
+@numba.njit(cache=True, nogil=True)
+def _contacts(parent: Any, piece: Any, pairs: Any, pull: Array) -> tuple[Any, Any, Array]:
+    """Return the contacts of each cluster a, start[a] to start[a + 1]: the cluster beyond, and how much it pulls."""
+    start = np.zeros(len(parent) + 1, np.int64)
+    for e in range(len(pairs)):
+        a, b = root(parent, piece[pairs[e, 0]]), root(parent, piece[pairs[e, 1]])
+        if a != b:
+            start[a + 1] += 1
+            start[b + 1] += 1
+    start = np.cumsum(start)
+    fill, far, weight = start[:-1].copy(), np.empty(start[-1], np.int64), np.empty(start[-1])
+    for e in range(len(pairs)):
+        a, b = root(parent, piece[pairs[e, 0]]), root(parent, piece[pairs[e, 1]])
+        if a != b:
+            far[fill[a]], far[fill[b]] = b, a
+            weight[fill[a]] = weight[fill[b]] = pull[e]
+            fill[a] += 1
+            fill[b] += 1
+    return start, far, weight
+
+
+@numba.njit(cache=True, nogil=True)
+def _strongest(total: Array, least: float, contacts: tuple[Any, Any, Array]) -> Any:
+    """Return the neighbour that pulls each cluster below the least size most, -1 where there is none."""
+    start, far, weight = contacts
+    goal, strength = np.full(len(total), -1, np.int64), np.zeros(len(total))
+    for a in range(len(total)):
+        if total[a] >= least:
+            continue
+        for k in range(start[a], start[a + 1]):
+            strength[far[k]] += weight[k]
+        for k in range(start[a], start[a + 1]):
+            if goal[a] < 0 or strength[far[k]] > strength[goal[a]]:
+                goal[a] = far[k]
+        for k in range(start[a], start[a + 1]):
+            strength[far[k]] = 0.0
+    return goal
 
 
 def _specks_to_nearest(mesh: TetMesh, piece: Integers, size: Array) -> Integers:

@@ -19,7 +19,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.parts.hierarchy import Hierarchy
-from steelyard.parts.hulls import vertices_of_both
+from steelyard.parts.hulls import Hulls, both, hulls_of, keep, keep_in_place
 from steelyard.parts.seam_costs import AREA, BEHIND, LENGTH, PAINT, TURN, VECTOR, WIDTH, price_of, support_of
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import HullWork, hull_work
@@ -101,9 +101,12 @@ def seam_tree(
     moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
     centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
     given = volume, share, colour, centre, contact, touch
-    work, leaves = hull_work(len(xyz)), (start, member.astype(np.int64))
+    work = hull_work(len(xyz))
     merges, cost, seam, node_volume, hull = with_stand_ins(
-        xyz, lambda known: _merge(xyz, leaves, _Clusters.of(*given), _BLUNT, work, known)
+        xyz,
+        lambda known: _merge(
+            xyz, _Clusters.of(*given), hulls_of(start, member, 2 * count - 1, len(xyz)), _BLUNT, work, known
+        ),
     )
     whole = mesh.volume
     return SeamTree(Hierarchy(piece, merges, cost, node_volume * whole, hull * whole), seam)
@@ -264,73 +267,66 @@ def _join(at: _Clusters, p: int, q: int, hull: float, node: int) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _kept(pool: Any, filled: int, point: Any, count: int) -> Any:
-    """Return the pool of vertices, grown where it must be, with those of a hull just found (point[:, 2]) added."""
-    if filled + count > len(pool):
-        larger = np.empty(2 * (filled + count), np.int64)
-        larger[:filled] = pool[:filled]
-        pool = larger
-    for i in range(count):
-        pool[filled + i] = point[i, 2]
-    return pool
+def _hull_of_both(
+    xyz: Array, at: _Clusters, hulls: Hulls, p: int, q: int, tolerance: float, work: HullWork, stand_ins: StandIns
+) -> tuple[float, int]:
+    """Return the volume of the hull of two clusters, and how many vertices it has; `work` holds them."""
+    count = both(hulls, at.node[p], at.node[q])
+    return sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
+
+
+@numba.njit(cache=True, nogil=True)
+def _next_pair(
+    xyz: Array, at: _Clusters, hulls: Hulls, tolerance: float, work: HullWork, stand_ins: StandIns
+) -> tuple[int, int, bool, float, int]:
+    """Return the rows of the two clusters to join next, whether nothing asks for it, and their hull: volume, vertices.
+
+    Hulls only grow: a pair is priced by the larger of the hulls known to lie in its union until it is the cheapest.
+    """
+    last_p, last_q, hull, kept = -1, -1, 0.0, -1
+    p = _cheapest(at)
+    while p >= 0 and not at.exact[p, at.best[p]]:
+        q = at.best[p]
+        hull, kept = _hull_of_both(xyz, at, hulls, p, q, tolerance, work, stand_ins)
+        last_p, last_q = p, q
+        at.known[p, q], at.exact[p, q] = hull, True
+        at.price[p, q] = _price(at, p, q, hull)[0]
+        at.best[p] = _best_partner(p, at.price, at.alive)
+        p = _cheapest(at)
+    apart = p < 0  # bodies of different colours that do not touch
+    p, q = _two_smallest(at) if apart else (p, at.best[p])
+    if last_p != p or last_q != q:
+        hull, kept = _hull_of_both(xyz, at, hulls, p, q, tolerance, work, stand_ins)
+    return p, q, apart, hull, kept
 
 
 @numba.njit(cache=True, nogil=True)
 def _merge(
-    xyz: Array, leaves: tuple[Any, Any], at: _Clusters, tolerance: float, work: HullWork, stand_ins: StandIns
+    xyz: Array, at: _Clusters, hulls: Hulls, tolerance: float, work: HullWork, stand_ins: StandIns
 ) -> tuple[Any, Array, Array, Array, Array]:
-    """Return merges, cost, seam, volume and hull of every node; leaf k has the vertices member[start[k]:start[k + 1]].
-
-    Hulls only grow: a pair is priced by the larger of the hulls known to lie in its union until it is the cheapest.
-    """
-    start, member = leaves
-    n = len(start) - 1
-    merges = np.empty((n - 1, 2), np.int64)
+    """Return merges, cost, seam, volume and hull of every node; `hulls` holds the vertices of the leaves."""
+    n = len(at.alive)
+    merges, gone = np.empty((n - 1, 2), np.int64), np.zeros(2 * n - 1, np.bool_)
     cost, seam = np.empty(n - 1), np.empty(n - 1)
     node_volume, node_hull = np.empty(2 * n - 1), np.empty(2 * n - 1)
-    pool = np.empty(len(member) + 64 * n, np.int64)
-    offset, length = np.empty(n, np.int64), np.empty(n, np.int64)
-    filled, stamp = 0, 0
-    rows, mark = np.empty(len(xyz), np.int64), np.full(len(xyz), -1, np.int64)
     for k in range(n):
-        at.hull[k], kept = sure_hull(xyz, member[start[k] :], start[k + 1] - start[k], tolerance, work, stand_ins)
-        pool = _kept(pool, filled, work.point, kept)
-        offset[k], length[k] = filled, kept
-        filled += kept
+        at.hull[k], kept = sure_hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, stand_ins)
+        keep_in_place(hulls, k, work.point, work.stack, kept, False)
         node_volume[k], node_hull[k] = at.volume[k], at.hull[k]
     for made in range(n - 1):
         _price_changed(at)
         _find_partners(at)
         at.changed[:] = False
-        kept, hull = -1, 0.0
-        last_p, last_q = -1, -1
-        while True:
-            p = _cheapest(at)
-            if p < 0 or at.exact[p, at.best[p]]:
-                break
-            q = at.best[p]
-            stamp += 1
-            count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
-            hull, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
-            at.known[p, q], at.exact[p, q] = hull, True
-            last_p, last_q = p, q
-            at.price[p, q] = _price(at, p, q, hull)[0]
-            at.best[p] = _best_partner(p, at.price, at.alive)
-        apart = p < 0  # bodies of different colours that do not touch
-        p, q = _two_smallest(at) if apart else (p, at.best[p])
-        if last_p != p or last_q != q:
-            stamp += 1
-            count = vertices_of_both(pool, offset, length, p, q, mark, stamp, rows)
-            hull, kept = sure_hull(xyz, rows, count, tolerance, work, stand_ins)
+        p, q, apart, hull, kept = _next_pair(xyz, at, hulls, tolerance, work, stand_ins)
         if apart:
             paint = PAINT * min(at.share[p], at.share[q])
             cost[made], seam[made] = np.inf, paint + max(0.0, hull - at.volume[p] - at.volume[q])
         else:
             cost[made], seam[made] = _price(at, p, q, hull)
-        pool = _kept(pool, filled, work.point, kept)
-        offset[p], length[p] = filled, kept
-        filled += kept
-        merges[made, 0], merges[made, 1] = min(at.node[p], at.node[q]), max(at.node[p], at.node[q])
-        _join(at, p, q, hull, n + made)
-        node_volume[n + made], node_hull[n + made] = at.volume[p], hull
+        a, b, node = at.node[p], at.node[q], n + made
+        merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
+        gone[a] = gone[b] = True
+        keep(hulls, node, gone, work.point, work.stack, kept, False)
+        _join(at, p, q, hull, node)
+        node_volume[node], node_hull[node] = at.volume[p], hull
     return merges, cost, seam, node_volume, node_hull

@@ -29,22 +29,8 @@ def turned_view(frame: Frame) -> Array:
 
 def picture(scene: Scene, colours: dict[int, tuple[int, int, int]], com: Array | None) -> Html:
     """Return the parts as an SVG: triangles from far to near, lit from above left; the centre of mass as a mark."""
-    bodies = placed(scene)
-    frame = Frame.of(scene)
-    view = turned_view(frame)
-    total = sum(len(b.triangles) for b in bodies)
-    faces, fills = [], []
-    for body in bodies:
-        most = max(int(MOST_TRIANGLES * len(body.triangles) / max(total, 1)), 12)
-        v, t = thinned(body.vertices, body.triangles, most)
-        corners = v[t] @ view.T
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        unit = unit_vectors(across)
-        near = unit[:, 2] > 0
-        light = 0.42 + 0.62 * np.maximum(unit @ _LIGHT, 0)
-        faces.append(corners[near])
-        fills.append(np.clip(light[near, None] * np.array(colours[body.label]), 0, 255))
-    corners, fill = np.concatenate(faces), np.concatenate(fills)
+    view = turned_view(Frame.of(scene))
+    corners, fill = _lit(scene, colours, view)
     if not len(corners):
         return Html("")
     low, high = corners[..., :2].min((0, 1)), corners[..., :2].max((0, 1))
@@ -61,14 +47,34 @@ def picture(scene: Scene, colours: dict[int, tuple[int, int, int]], com: Array |
         Html(f'<path d="M{a:g} {b:g}L{c:g} {d:g} {e:g} {f:g}Z" fill="{p}" stroke="{p}"/>')
         for (a, b, c, d, e, f), p in zip(flat.tolist(), paint, strict=True)
     ]
-    mark = joined()
-    if com is not None:
-        x, y = on_paper(view @ com).tolist()
-        mark = joined(
-            tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=9, fill="#fff", stroke="#111", stroke_width=2),
-            Html(f'<path d="M{x:.1f} {y:.1f}v-9a9 9 0 0 1 9 9zv9a9 9 0 0 1-9-9z" fill="#111"/>'),
-        )
+    mark = joined() if com is None else _mark(*on_paper(view @ com).tolist())
     return tag(
         "svg", tag("g", *shapes, stroke_width=0.6, stroke_linejoin="round"), mark,
         viewBox=f"0 0 {_WIDTH:g} {_HEIGHT:g}", role="img", aria_label="The parts of the object", class_="still",
     )  # fmt: skip
+
+
+def _lit(scene: Scene, colours: dict[int, tuple[int, int, int]], view: Array) -> tuple[Array, Array]:
+    """Return the triangles (F, 3, 3) that face the viewer, in the axes of `view` (3, 3), and their colours (F, 3)."""
+    bodies = placed(scene)
+    total = sum(len(b.triangles) for b in bodies)
+    faces, fills = [], []
+    for body in bodies:
+        most = max(int(MOST_TRIANGLES * len(body.triangles) / max(total, 1)), 12)
+        v, t = thinned(body.vertices, body.triangles, most)
+        corners = v[t] @ view.T
+        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+        unit = unit_vectors(across)
+        near = unit[:, 2] > 0
+        light = 0.42 + 0.62 * np.maximum(unit @ _LIGHT, 0)
+        faces.append(corners[near])
+        fills.append(np.clip(light[near, None] * np.array(colours[body.label]), 0, 255))
+    return np.concatenate(faces), np.concatenate(fills)
+
+
+def _mark(x: float, y: float) -> Html:
+    """Return the sign of a centre of mass."""
+    return joined(
+        tag("circle", cx=f"{x:.1f}", cy=f"{y:.1f}", r=9, fill="#fff", stroke="#111", stroke_width=2),
+        Html(f'<path d="M{x:.1f} {y:.1f}v-9a9 9 0 0 1 9 9zv9a9 9 0 0 1-9-9z" fill="#111"/>'),
+    )

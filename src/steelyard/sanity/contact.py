@@ -13,6 +13,7 @@ from steelyard.findings import Finding
 from steelyard.identify.regressor import design
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
+from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.logs.runs import runs
 from steelyard.sanity import consensus
 from steelyard.sanity.consensus import LEVER, Consensus, Slices
@@ -31,7 +32,7 @@ SLICE, FEWEST_ROWS, MOST_SLICES, FEWEST_SLICES = 0.1, 4, 3000, 20
 # Contact: less likely than 10^-SURPRISE by chance, a squared misfit above RATIO, and above these [N m, N].
 SURPRISE, RATIO, SMALLEST_TORQUE, SMALLEST_FORCE = 10.0, 2.0, 0.05, 0.5
 # ... and above this share of the weight: a base tilted by 2 degrees or 3 % of cross-talk look like less.
-LEAST_SHARE, GRAVITY = 0.12, 9.81
+LEAST_SHARE = 0.12
 # A push has no longer lever than this [m], beside a twist of the hand [N m]; and leaves this share of the log alone.
 LONGEST_PUSH, LARGEST_TWIST, LEAST_LEFT = 2.0, 3.0, 0.22
 # A touch begins and ends gently: this share of its length is left out on either side, one to LONGEST_GUARD slices.
@@ -171,7 +172,7 @@ def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:
 
 def _large(x: Array, touch: Touch) -> bool:
     """Whether the extra wrench is more than small errors of model, base and calibration may leave on the body x."""
-    weight = GRAVITY * abs(float(x[0]))
+    weight = ROUNDED_GRAVITY * abs(float(x[0]))
     lever = LEVER + float(np.linalg.norm(x[1:4])) / max(abs(float(x[0])), 1e-9)
     least_force = max(SMALLEST_FORCE, LEAST_SHARE * weight)
     return touch.force > least_force or touch.torque > max(SMALLEST_TORQUE, LEAST_SHARE * weight * lever)

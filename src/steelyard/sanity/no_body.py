@@ -15,6 +15,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.sanity.torques import UNITS
 
 # Chi-square per degree of freedom above which no body explains a wrench, and what another unit must bring it down to:
@@ -57,7 +58,7 @@ def examine_wrench_unit(
 
 
 def examine_body(
-    estimate: Estimate, known: tuple[Finding, ...], gravity: float = 9.81, noise: float = 0.0
+    estimate: Estimate, known: tuple[Finding, ...], gravity: float = ROUNDED_GRAVITY, noise: float = 0.0
 ) -> tuple[Finding, ...]:
     """Return `wrench-unexplained` where the residuals of the best body are more than noise, and nothing says why.
 

@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.logs.recording import Recording
+from steelyard.logs.recording import STANDARD_GRAVITY, Recording
 from steelyard.sanity.glance import Glance, Seen, in_other_axes
 from steelyard.sanity.mirrored import REFLECTIONS, in_words
 from steelyard.sanity.static_fit import columns, solve
@@ -33,8 +33,8 @@ NEAR = 0.02
 UNITS = (
     (4.44822, "forces in N are read as lbf"),
     (1 / 4.44822, "forces in lbf are read as N"),
-    (9.80665, "forces in N are read as kgf, or torques in kgf*m as N*m"),
-    (1 / 9.80665, "forces in kgf are read as N, or torques in N*m as kgf*m"),
+    (STANDARD_GRAVITY, "forces in N are read as kgf, or torques in kgf*m as N*m"),
+    (1 / STANDARD_GRAVITY, "forces in kgf are read as N, or torques in N*m as kgf*m"),
     (1 / 0.112985, "torques in N*m are read as lbf*in"),
     (0.112985, "torques in lbf*in are read as N*m"),
     (100.0, "torques in N*m are read as N*cm"),

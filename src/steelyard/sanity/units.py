@@ -54,7 +54,8 @@ def _gravity_channel(recording: Recording) -> tuple[Recording, tuple[Finding, ..
         size = float(np.median(np.linalg.norm(values, axis=1)))
         if ONE_G[0] < size < ONE_G[1]:
             message = (
-                f"Gravity in '{stream.name}' has the length {size:.3g}, so it is in g; it was multiplied by 9.80665."
+                f"Gravity in '{stream.name}' has the length {size:.3g}, so it is in g; it was multiplied by "
+                f"{STANDARD_GRAVITY}."
             )
             return scaled(recording, stream, (quantity,), STANDARD_GRAVITY), (Finding.of("gravity-in-g", message),)
     return recording, ()

@@ -140,8 +140,8 @@ def surfels(
     box = _box_of(mask, low, pitch, floor, layers * cell)
     # Cubes are counted from the corner of the table; the index holds those over the mask, with one to spare.
     i0, j0 = max(int((box[0, 0] - low[0]) / cell) - 1, 0), max(int((box[0, 1] - low[1]) / cell) - 1, 0)
-    nx, ny = int((box[1, 0] - low[0]) / cell) + 2 - i0, int((box[1, 1] - low[1]) / cell) + 2 - j0
-    index = np.full((6, layers, nx, ny), -1, np.int32)  # neighbours on a level surface lie side by side
+    wide, deep = int((box[1, 0] - low[0]) / cell) + 2 - i0, int((box[1, 1] - low[1]) / cell) + 2 - j0
+    index = np.full((6, layers, wide, deep), -1, np.int32)  # neighbours on a level surface lie side by side
     size = 4096
     sums, last = np.zeros((size, 8)), np.full(size, -1, np.int32)
     n = 0
@@ -163,13 +163,11 @@ def surfels(
                 layer = int(np.floor((h - floor) / cell))
                 if layer < 0 or layer >= layers:
                     continue
-                faces, nxc, nyc = _normal_of(depth[k], unit, fx, fy, a, b, z, u, v, step, noise)
+                faces, nx, ny = _normal_of(depth[k], unit, fx, fy, a, b, z, u, v, step, noise)
                 if not faces:
                     continue
-                nxw = R[k, 0, 0] * nxc + R[k, 0, 1] * nyc - R[k, 0, 2]
-                nyw = R[k, 1, 0] * nxc + R[k, 1, 1] * nyc - R[k, 1, 2]
-                nzw = R[k, 2, 0] * nxc + R[k, 2, 1] * nyc - R[k, 2, 2]
-                main = _main_direction(nxw, nyw, nzw)
+                nx, ny, nz = _turned(R, k, nx, ny)
+                main = _main_direction(nx, ny, nz)
                 i, j = int((x - low[0]) / cell) - i0, int((y - low[1]) / cell) - j0
                 row = index[main, layer, i, j]
                 if row < 0:
@@ -178,13 +176,8 @@ def surfels(
                         size *= 2
                     row = index[main, layer, i, j] = n
                     n += 1
-                sums[row, 0] += x
-                sums[row, 1] += y
-                sums[row, 2] += h
-                sums[row, 3] += nxw
-                sums[row, 4] += nyw
-                sums[row, 5] += nzw
-                sums[row, 6] += 1
+                for column, number in enumerate((x, y, h, nx, ny, nz, 1.0)):
+                    sums[row, column] += number
                 if last[row] != k:
                     sums[row, 7] += 1
                     last[row] = k
@@ -223,6 +216,16 @@ def _facing(
     x, y = -x / z, -y / z
     asked = (1 - x * a - y * b) ** 2 >= 0.25 * FACING**2 * (1 + x * x + y * y) * (1 + a * a + b * b)
     return asked, x, y
+
+
+@numba.njit(cache=True, nogil=True, forceinline=True)
+def _turned(R: Any, k: int, x: float, y: float) -> tuple[float, float, float]:
+    """Return a normal (x, y, -1) in the axes of camera k in those of the table."""
+    return (
+        R[k, 0, 0] * x + R[k, 0, 1] * y - R[k, 0, 2],
+        R[k, 1, 0] * x + R[k, 1, 1] * y - R[k, 1, 2],
+        R[k, 2, 0] * x + R[k, 2, 1] * y - R[k, 2, 2],
+    )
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)

@@ -13,7 +13,7 @@ from steelyard.shape.exact_sign import determinant
 
 # Columns of the tables below.
 _LINK, _FAN, KEPT = 0, 1, 2
-_CORNER, _BESIDE, FIRST, FAR, _STATE, QUEUED = 0, 3, 6, 7, 8, 9
+_BESIDE, FIRST, FAR, _STATE, QUEUED = 3, 6, 7, 8, 9  # after three corners
 _OFFSET, _ABOVE, _MOST = 3, 4, 5
 QUEUE, _FREE, _SEEN, _FRESH = 0, 1, 2, 3
 _GONE, _HULL, _VISIBLE, _BEHIND = 0, 1, 2, 3  # states of a face

@@ -15,12 +15,10 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.whose_slip import whose_slip
-from steelyard.team.changes.yielding import Yields, stiffened
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.search import F, searched
 from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.axis import UNPLACED, Split, find_split, rigidity_findings
 from steelyard.team.hinge.bodies import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
@@ -29,7 +27,9 @@ from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.twists import require_one_velocity_unit
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
+from steelyard.team.poses.yielding import Yields, stiffened
 from steelyard.team.published import require_wrenches
+from steelyard.team.split import UNPLACED, Split, find_split, rigidity_findings
 from steelyard.team.team_findings import (
     gains,
     late_clocks,

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -159,6 +160,12 @@ def bridged(good: Mask, time: Array) -> Mask:
     for k in np.flatnonzero((gap > 1) & ((gap <= BRIDGED + 1) | (np.diff(time[there]) <= BRIEF))):
         out[there[k] : there[k + 1]] = True
     return out
+
+
+def row_slices(parts: Sequence[Sized]) -> list[slice]:
+    """Return which rows each part has where all stand one after the other."""
+    ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
+    return [slice(a, b) for a, b in pairwise(ends)]
 
 
 def _rate(time: Array) -> float:

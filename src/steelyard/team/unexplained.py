@@ -16,7 +16,7 @@ from steelyard.findings import Finding
 from steelyard.team.misread.forces import likely_factor
 from steelyard.team.misread.torques import torque_factor
 from steelyard.team.payload.fit import PayloadFit
-from steelyard.team.payload.model import Group
+from steelyard.team.payload.model import Group, weight
 
 # What is left counts from this share of the payload's weight, and from so many times the noise of the highest band;
 # noise below 2 Hz has less than three times it. Less is enough where one robot explains it.
@@ -27,7 +27,6 @@ FLAT, SLOW = 1.5, 5.0
 UNLIKE = 0.05
 # Rows of a band that show its noise.
 FEWEST = 20
-GRAVITY = 9.81
 
 
 def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
@@ -40,9 +39,9 @@ def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Fin
 
 
 def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
-    weight = abs(float(fit.parameters[0])) * GRAVITY
+    heavy = weight(fit.parameters)
     group, rms, coloured = _worst(fit.groups, slice(3, 6))
-    if rms < SHARE * weight or coloured < OF_ONE:
+    if rms < SHARE * heavy or coloured < OF_ONE:
         return
     silent = [name for name, flat in zip(names, _flat(group, len(names)), strict=True) if flat]
     factor = None if silent else likely_factor(fit.groups, D)
@@ -58,7 +57,7 @@ def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding
         why = f"What {_listed(suspects)} says does not go with the others, as where it is turned by some degrees. "
     text = (
         f"What the robots push {_when(group)} leaves {rms:.2g} N rms that no "
-        f"rigid payload explains, {100 * rms / weight:.0f} % of its weight, and too slow for noise of the sensors. "
+        f"rigid payload explains, {100 * rms / heavy:.0f} % of its weight, and too slow for noise of the sensors. "
         f"{why}The answer is not to be trusted."
     )
     if suspects:
@@ -74,7 +73,7 @@ def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding
 
 def _moments(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
     size = float(fit.scale[1] / fit.scale[0])
-    lever = abs(float(fit.parameters[0])) * GRAVITY * size
+    lever = weight(fit.parameters) * size
     group, rms, coloured = _worst(fit.groups, slice(0, 3))
     if rms < SHARE * lever or coloured < COLOURED:
         return

@@ -29,7 +29,7 @@ from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_ru
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
-from steelyard.team.payload.model import Group, unit_bias
+from steelyard.team.payload.model import Group, unit_bias, units_of_body
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
@@ -209,7 +209,7 @@ def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float], size: float
     left = team.parameters - points
     require_lift(float(left.mass), WITHOUT_WRISTS)
     # What is left of a body less points need be none: masses that are too large take more than there is.
-    units = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)]) * float(left.mass)
+    units = units_of_body(float(left.mass), size)
     return replace(team, parameters=InertialParameters(consistent(left.vector, team.covariance, units)))
 
 

@@ -14,7 +14,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.regressor import motion_map
 from steelyard.team.payload.fit import PayloadFit, fit_payload
-from steelyard.team.payload.model import Group
+from steelyard.team.payload.model import Group, weight
 from steelyard.team.payload.spectra import Spectra
 
 # A recording is odd that leaves so many times what others do (rms), and this share of the weight; it is looked into
@@ -32,9 +32,9 @@ def without_odd(
     Arguments as in `fit_payload`
     """
     parts = [part for group in groups for part in group.parts]
-    weight, odd, fit = abs(float(payload.parameters[0])) * 9.81, list[int](), payload
+    heavy, odd, fit = weight(payload.parameters), list[int](), payload
     left = _left(payload.parameters, parts, D, size)
-    if len(parts) < FEWEST or left.max() < max(SHARE * weight / 2, SUSPECT * float(np.median(left))):
+    if len(parts) < FEWEST or left.max() < max(SHARE * heavy / 2, SUSPECT * float(np.median(left))):
         return payload, ()
     while len(odd) + 1 <= MOST * len(parts):
         odd.append(int(np.argmax(np.where(np.isin(np.arange(len(parts)), odd), 0.0, left))))
@@ -43,7 +43,7 @@ def without_odd(
         others = float(np.sqrt((np.delete(left, odd) ** 2).mean()))
         if fit.lost.shape[1] > payload.lost.shape[1]:
             break
-        if left[odd].min() > max(SHARE * weight, ODD * others):
+        if left[odd].min() > max(SHARE * heavy, ODD * others):
             return fit, tuple(_finding(fit.parameters, parts[k], D) for k in sorted(odd))
     return payload, ()
 

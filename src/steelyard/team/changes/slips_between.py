@@ -16,7 +16,7 @@ from scipy.special import fdtri
 
 from steelyard.check import Array
 from steelyard.team.changes.slips import WINDOW_S, Slip, SlipAt
-from steelyard.team.stacked import Stretch
+from steelyard.team.stacked import Stretch, row_slices
 
 # How likely noise alone may be taken for a slip, in one log, and the size [m, rad] from which a step counts.
 CHANCE, LEAST_M, LEAST_RAD = 1e-4, 2e-3, 4e-3
@@ -60,10 +60,9 @@ def as_large_as_slips(slip: Slip) -> bool:
 
 def _windows(parts: Sequence[Stretch], apart: Array, robot: int) -> tuple[Array, Array]:
     """Return means (B, 6) of one robot's residuals (T, 6) over a second each, and the recording (B,) of each."""
-    means, recording, start = [], [], 0
-    for number, part in enumerate(parts):
-        rows = apart[start : start + len(part)][part.seen[:, robot]]
-        start += len(part)
+    means, recording = [], []
+    for number, (part, own) in enumerate(zip(parts, row_slices(parts), strict=True)):
+        rows = apart[own][part.seen[:, robot]]
         pieces = min(round(len(rows) / (WINDOW_S * part.rate)), len(rows))
         for piece in np.array_split(rows, max(1, pieces)) if len(rows) else ():
             means.append(piece.mean(0))

@@ -18,6 +18,7 @@ from steelyard.identify.regressor import motion_map
 from steelyard.logs.log import Mask
 from steelyard.logs.runs import runs
 from steelyard.team.payload.body_rows import LEAST_CYCLES, BodyRows, Run
+from steelyard.team.payload.model import weight
 
 # What is left is averaged over MEAN_S. It counts where it is so many times the usual (median) and this share of the
 # weight; rows within MARGIN_S [s] of that are left out, too.
@@ -26,7 +27,6 @@ TIMES, SHARE = 8.0, 0.03
 # Where more of a recording is touched, it is left out if there are others. What is usual in it is at most so many times
 # what it is in another.
 MOST, UNLIKE = 0.4, 2.0
-GRAVITY = 9.81
 
 
 @dataclass(frozen=True)
@@ -62,7 +62,7 @@ def without_touched(
         if not pushes[k]:
             continue
         others = min(usual[:k] + usual[k + 1 :], default=np.inf)
-        least = max(TIMES * min(usual[k], UNLIKE * others), SHARE * GRAVITY * abs(float(phi[0])))
+        least = max(TIMES * min(usual[k], UNLIKE * others), SHARE * weight(phi))
         touched = [
             _around(np.linalg.norm(push, axis=1) > least, run.rate)
             for push, run in zip(pushes[k], body.runs, strict=True)

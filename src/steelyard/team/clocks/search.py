@@ -16,7 +16,7 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.clocks.unsteady import Steady
-from steelyard.team.twists.turning_speed import turning_speed
+from steelyard.team.turning_speed import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps of STEP_S.
 FARTHEST_S, SHARE, STEP_S = 2.0, 0.25, 0.05

@@ -18,8 +18,8 @@ from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.changes.scores import Scores
 from steelyard.team.clocks.errors import ClockError, ClockErrors
+from steelyard.team.scores import Scores
 
 # Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
 STRETCHES, ROWS = 20, 100

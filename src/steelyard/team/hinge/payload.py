@@ -7,28 +7,31 @@ robots and gain are integrated out, averaged over their sizes by evidence.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
-from itertools import pairwise
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.team.hinge.rows import BIAS, COUNT, Bands, Sums, noisy
-from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
-from steelyard.team.payload.model import Normal, least_noise
+from steelyard.team.payload.bias_models import Recordings, ladder_of
+from steelyard.team.payload.model import LEAST_MASS, Normal, least_noise, of_force, units_of_body
+from steelyard.team.payload.settling import Round, settled
 
-ROUNDS = 12
+# The first of twelve is that of `_start`.
+FEWEST, ROUNDS = 2, 11
 SETTLED = 0.01
 
 
 @dataclass(frozen=True, eq=False)
 class Kind:
-    """Recordings at rest, or in motion, with common bands: motion (K, 7, 7) noise of H's accelerations and the hinge's,
-    force (K,) variance of a force axis [N^2]."""
+    """Recordings at rest, or in motion, with common bands.
+
+    motion_noise  (K, 7, 7) of H's accelerations and the hinge's     wrench_noise  (K,) variance of a force axis [N^2]
+    """
 
     parts: tuple[Bands, ...]
-    motion: Array
-    force: Array
+    motion_noise: Array
+    wrench_noise: Array
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,15 +71,18 @@ class HingedPayload:
     @property
     def residual(self) -> Array:
         """Rms (2,) of what is left per row of the summed moment and force, as far as force noise makes it."""
-        rows = np.concatenate([sum(p.rows for p in kind.parts) * np.ones(len(kind.force)) for kind in self.kinds])
-        force = float(np.concatenate([kind.force for kind in self.kinds]) @ rows / rows.sum())
+        noise = np.concatenate([kind.wrench_noise for kind in self.kinds])
+        rows = np.concatenate(
+            [sum(p.rows for p in kind.parts) * np.ones_like(kind.wrench_noise) for kind in self.kinds]
+        )
+        force = float(noise @ rows / rows.sum())
         unit = self.sums.seven[:6] ** 2 @ _forces(self.sums)
         return np.asarray(np.sqrt(force * unit.reshape(2, 3).mean(1)))
 
 
 def _forces(sums: Sums) -> Array:
     """Return which of the pushes (6 N,) are forces."""
-    return np.asarray(np.arange(sums.seven.shape[1]) % 6 >= 3, dtype=np.float64)
+    return of_force(sums.seven.shape[1]).astype(np.float64)
 
 
 def fit_hinged_payload(
@@ -94,77 +100,77 @@ def fit_hinged_payload(
     V[range(7), range(7)] += 1e-6 * np.diag(V)
     both = np.concatenate([sums.first, sums.second]) * axes
     C = both @ both.T
-    C[range(BIAS), range(BIAS)] += 1e-6 * np.where(np.arange(BIAS) % 6 < 3, size**2, 1.0)
-    scale, phi = _units(1.0, size), np.zeros(COUNT)
-    kinds = tuple(Kind(k.parts, k.motion, np.ones(len(k.force))) for k in kinds)
-    for number in range(ROUNDS):
-        weights = tuple(_weights(kind, V, phi, started=number > 0) for kind in kinds)
-        normals = [_normal(p, k, W, sums, number > 0) for k, W in zip(kinds, weights, strict=True) for p in k.parts]
-        models = Models.of(normals, C, ladder, scale)
-        phi = models.mean()
-        if number == 0:
-            scale = _units(max(abs(float(phi[0])), 1e-3), size)
-        beside = models.recordings(models.best)
-        starts = np.cumsum([0, *(len(kind.parts) for kind in kinds)])
-        renewed = tuple(
-            _judged(kind, W, V, beside, int(s)) for kind, W, s in zip(kinds, weights, starts[:-1], strict=True)
-        )
-        change = max(float(np.abs(np.log(n.force / k.force)).max()) for n, k in zip(renewed, kinds, strict=True))
-        # Weights and kinds that are told belong together, however it ends.
-        if (number > 1 and change < SETTLED) or number == ROUNDS - 1:
-            break
-        kinds = renewed
+    C[range(BIAS), range(BIAS)] += 1e-6 * np.where(of_force(BIAS), 1.0, size**2)
+    equations = _Equations(sums, V)
+    phi, kinds = _start(kinds, equations, C, ladder, size)
+    scale = _units(max(abs(float(phi[0])), LEAST_MASS), size)
+    found = settled(kinds, phi, equations, C, ladder, scale, FEWEST, ROUNDS, SETTLED)
+    phi, models, kinds = found.phi, found.models, found.groups
     shown = models.shown(scale)
     rows = 7 * sum(float(p.rows.sum()) for k in kinds for p in k.parts)
-    blind = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts))
     return HingedPayload(
         phi, models.covariance_about(phi), shown.lost, scale, np.outer(scale, scale) * shown.inverse, shown.condition,
-        models.gain, models.gainless, float(models.chi2[models.best]) / max(rows - COUNT, 1.0), kinds, weights, blind,
-        sums,
+        models.gain, models.gainless, float(models.chi2[models.best]) / max(rows - COUNT, 1.0), kinds, found.weights,
+        found.blind, sums,
     )  # fmt: skip
 
 
 def _units(mass: float, size: float) -> Array:
-    whole = [mass, *[mass * size] * 3, *[mass * size**2] * 6]
-    return np.array([*whole, *[mass * size] * 2, *[mass * size**2] * 5])
+    # Of the second body's seven, two are first moments.
+    return np.concatenate([units_of_body(mass, size), np.repeat([mass * size, mass * size**2], [2, 5])])
 
 
-def _weights(kind: Kind, V: Array, phi: Array, started: bool) -> Array:
-    """Return the inverse (K, 7, 7) of the noise of a row."""
-    noise = kind.force[:, None, None] * V
-    if started:
+def _start(
+    kinds: tuple[Kind, ...], equations: _Equations, C: Array, ladder: Array, size: float
+) -> tuple[Array, tuple[Kind, ...]]:
+    """Return phi as if the motion had no noise, and the noise of force axes that is then left."""
+    loud = tuple(Kind(k.parts, np.zeros_like(k.motion_noise), np.ones(len(k.wrench_noise))) for k in kinds)
+    first = Round.of(loud, np.zeros(COUNT), equations, C, ladder, _units(1.0, size))
+    left = zip(kinds, first.renewed, strict=True)
+    return first.phi, tuple(replace(kind, wrench_noise=new.wrench_noise) for kind, new in left)
+
+
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Those of two bodies with a hinge; V (7, 7) is what a unit of noise on every force axis makes of a row."""
+
+    sums: Sums
+    V: Array
+
+    def weights(self, kind: Kind, phi: Array) -> Array:
         M = np.einsum("ijp,p->ij", noisy(), phi)
-        noise = noise + M @ kind.motion @ M.T
-    return np.asarray(np.linalg.inv(noise))
+        noise = kind.wrench_noise[:, None, None] * self.V + M @ kind.motion_noise @ M.T
+        return np.asarray(np.linalg.inv(noise))
+
+    def normals(self, kind: Kind, W: Array) -> list[Normal]:
+        return [_normal(part, kind, W, self.sums) for part in kind.parts]
+
+    def judged(self, kind: Kind, W: Array, beside: Recordings, start: int) -> Kind:
+        """Return the kind with the noise of force axes renewed: one step of expectation maximisation per band."""
+        seen, size = np.zeros(len(kind.wrench_noise)), np.zeros(len(kind.wrench_noise))
+        phi = beside.phi
+        for k, part in enumerate(kind.parts):
+            solution, doubt = beside.solution(start + k), beside.doubt(start + k)
+            values, vectors = np.linalg.eigh(doubt)
+            factor = vectors * np.sqrt(np.maximum(values, 0.0))
+            for band, z in enumerate(part.z):
+                # At rest the means are mostly bias.
+                z = z[1:] if part.still and band == 0 else z
+                left = np.concatenate([(z[..., -1] - z[..., :-1] @ solution)[..., None], z[..., :-1] @ factor], axis=-1)
+                pulled = W[band] @ left
+                seen[band] += float(np.einsum("nip,ij,njp->", pulled, self.V, pulled, optimize=True))
+                size[band] += len(z) * float(np.trace(W[band] @ self.V))
+        share = np.where(size > 0, seen / np.maximum(size, 1e-300), 1.0)
+        return replace(kind, wrench_noise=np.maximum(kind.wrench_noise * share, least_noise(phi)))
 
 
-def _normal(part: Bands, kind: Kind, W: Array, sums: Sums, started: bool) -> Normal:
+def _normal(part: Bands, kind: Kind, W: Array, sums: Sums) -> Normal:
     """Return the normal equations of one recording in [parameters (17), bias (12)]."""
     wide = COUNT + BIAS
     S, noise, N = np.zeros((wide + 1, wide + 1)), np.zeros((COUNT, COUNT)), noisy()
-    for z, weight, motion, rows in zip(part.z, W, kind.motion, part.rows, strict=True):
+    for z, weight, motion, rows in zip(part.z, W, kind.motion_noise, part.rows, strict=True):
         flat = (np.linalg.cholesky(weight).T @ z).reshape(-1, wide + 1)
         S += flat.T @ flat
-        if started:
-            noise += rows * np.einsum("ijp,ik,jl,klq->pq", N, weight, motion, N, optimize=True)
+        noise += rows * np.einsum("ijp,ik,jl,klq->pq", N, weight, motion, N, optimize=True)
     each = np.concatenate([sums.first, sums.second]) * (_forces(sums) * part.mean)
     return Normal(S[:wide, :wide], S[:wide, -1], noise, float(S[-1, -1]), each)
-
-
-def _judged(kind: Kind, W: Array, V: Array, beside: Recordings, start: int) -> Kind:
-    """Return the kind with the noise of force axes renewed: one step of expectation maximisation per band."""
-    seen, size = np.zeros(len(kind.force)), np.zeros(len(kind.force))
-    phi = beside.phi
-    for k, part in enumerate(kind.parts):
-        solution, doubt = beside.solution(start + k), beside.doubt(start + k)
-        values, vectors = np.linalg.eigh(doubt)
-        factor = vectors * np.sqrt(np.maximum(values, 0.0))
-        for band, z in enumerate(part.z):
-            # At rest the means are mostly bias.
-            z = z[1:] if part.still and band == 0 else z
-            left = np.concatenate([(z[..., -1] - z[..., :-1] @ solution)[..., None], z[..., :-1] @ factor], axis=-1)
-            pulled = W[band] @ left
-            seen[band] += float(np.einsum("nip,ij,njp->", pulled, V, pulled, optimize=True))
-            size[band] += len(z) * float(np.trace(W[band] @ V))
-    share = np.where(size > 0, seen / np.maximum(size, 1e-300), 1.0)
-    return Kind(kind.parts, kind.motion, np.maximum(kind.force * share, least_noise(phi)))

@@ -20,8 +20,7 @@ from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.assembled import known
 from steelyard.team.consistent import consistent
-from steelyard.team.estimate import GraspEstimate, HingeEstimate, TeamEstimate
-from steelyard.team.hinge.axis import Split
+from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.hinge.bodies import FROM_TEN, both_bodies, second_body, seen_from, seven_rows
 from steelyard.team.hinge.payload import HingedPayload, Kind, fit_hinged_payload
 from steelyard.team.hinge.poses import GUESS, Hinged, HingedFit, finished, fit_hinged, followed, rates
@@ -31,12 +30,14 @@ from steelyard.team.hinge.start import first_hinged
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.payload.body_rows import BodyRows, reach, require_runs
 from steelyard.team.payload.doubt import turned_by_step
+from steelyard.team.payload.model import of_force
 from steelyard.team.payload.motion_noise import shares_of, tilt_noise
 from steelyard.team.payload.spectra import band_edges
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.statistic import OWN
 from steelyard.team.poses.team import CLOCK_ROUNDS, FEW_ROWS, PUNCTUAL, mean_gravity
-from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.split import Split
+from steelyard.team.stacked import Stretch, all_poses, row_slices, stretches
 
 # Rows that are enough to come near the optimum.
 ROUGH_ROWS = 200
@@ -79,17 +80,15 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
 
 def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
     """Return how motion and angle change (T, 7), recording by recording."""
-    ends = np.cumsum([0, *(len(part) for part in parts)])
-    each = zip(parts, ends[:-1], ends[1:], strict=True)
-    return np.concatenate([rates(team.rows(slice(a, b)), part.rate) for part, a, b in each])
+    each = zip(parts, row_slices(parts), strict=True)
+    return np.concatenate([rates(team.rows(rows), part.rate) for part, rows in each])
 
 
 def _places(before: tuple[Stretch, ...], after: tuple[Stretch, ...]) -> Integers:
     """Return which row of `before` is nearest to each of `after`, recording by recording."""
-    starts = np.cumsum([0, *(len(part) for part in before)])
     middles = [(part.time[1:] + part.time[:-1]) / 2 for part in before]
-    each = zip(middles, after, starts[:-1], strict=True)
-    return np.concatenate([start + np.searchsorted(middle, now.time) for middle, now, start in each])
+    each = zip(middles, after, row_slices(before), strict=True)
+    return np.concatenate([rows.start + np.searchsorted(middle, now.time) for middle, now, rows in each])
 
 
 def identify_two_bodies(
@@ -104,7 +103,7 @@ def identify_two_bodies(
     kinds, turned = _kinds(log, parts, fit, sums, highest_hz)
     size = reach(team.grasps)
     six_axis = np.repeat([not log.force_only(name) for name in log.names], 6)
-    force = np.arange(len(six_axis)) % 6 >= 3
+    force = of_force(len(six_axis))
     payload = fit_hinged_payload(kinds, sums, np.where(force, 1.0, size * six_axis), size, gains)
     require_lift(float(payload.parameters[0]), "the forces")
     doubt, frame = _Doubt.of(payload, fit, force), hinge_frame(team)
@@ -119,15 +118,10 @@ def identify_two_bodies(
     moment, push = payload.residual
     rows, still = (sum(p.samples for k in kinds for p in k.parts if p.still or every) for every in (True, False))
     late = {name: seconds - late[log.reference] for name, seconds in late.items()}
-    line = fit.covariance[-6:, -6:]
-    across = np.eye(3) - np.outer(team.axis, team.axis)
-    at_point = np.concatenate([-cross_matrix(frame.position), np.eye(3)], axis=1)
     held = tuple(tuple(log.names[i] for i in np.flatnonzero(who)) for who in (~team.second, team.second))
-    hinge = HingeEstimate(
-        team.axis, frame.position, float(np.rad2deg(_largest(line[:3, :3], across))),
-        _largest(at_point @ line @ at_point.T, across), float(np.abs(team.angle).max()),
-        both_bodies(seventeen, _spreads(payload, doubt, frame), float(outer[0, 0]), payload.scale, frame, held),
-    )  # fmt: skip
+    hinge = _hinge(
+        fit, both_bodies(seventeen, _spreads(payload, doubt, frame), float(outer[0, 0]), payload.scale, frame, held)
+    )
     found = TeamEstimate(
         parameters=body, covariance=outer, method="joint",
         evidence=Evidence(COUNT - payload.lost.shape[1], payload.condition, rows, still, push, moment, payload.chi2),
@@ -137,6 +131,18 @@ def identify_two_bodies(
         clock_offset_std_s=_late_std(fit, log) if clocks else {}, hinge=hinge, findings=turned,
     )  # fmt: skip
     return found, payload
+
+
+def _hinge(fit: HingedFit, bodies: tuple[BodyEstimate, BodyEstimate]) -> HingeEstimate:
+    """Return the hinge where it is nearest to the middle of the grasps, and how well it is known across its line."""
+    team, line = fit.team, fit.covariance[-6:, -6:]
+    point = hinge_frame(team).position
+    across = np.eye(3) - np.outer(team.axis, team.axis)
+    at_point = np.concatenate([-cross_matrix(point), np.eye(3)], axis=1)
+    return HingeEstimate(
+        team.axis, point, float(np.rad2deg(_largest(line[:3, :3], across))),
+        _largest(at_point @ line @ at_point.T, across), float(np.abs(team.angle).max()), bodies,
+    )  # fmt: skip
 
 
 def _spreads(payload: HingedPayload, doubt: _Doubt, frame: Pose) -> tuple[tuple[Array, Array], ...]:
@@ -195,10 +201,8 @@ def _kinds(
 
     Raises CannotAnswer where there are none.
     """
-    gravity, made, start = mean_gravity(log, fit.team.homes), [], 0
-    for part in parts:
-        rows = slice(start, start + len(part))
-        start += len(part)
+    gravity, made = mean_gravity(log, fit.team.homes), []
+    for part, rows in zip(parts, row_slices(parts), strict=True):
         team = fit.team.rows(rows)
         made.append((team, fit.residual[rows], *bodies_of(part, team, gravity, highest_hz)))
     wrong, turned = robot_of_other_sign([(team, one, two) for team, _, one, two in made], sums, log.names, highest_hz)

@@ -8,11 +8,10 @@ from itertools import permutations, product
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.recording import STANDARD_GRAVITY
+from steelyard.logs.recording import INCH, POUND_FORCE, STANDARD_GRAVITY
 
 # Units taken for newtons: force, and the torque that goes with it, in SI.
-_POUND, _INCH = 4.4482216152605, 0.0254
-_UNITS = {"kgf": (STANDARD_GRAVITY, STANDARD_GRAVITY), "lbf": (_POUND, _POUND * _INCH), "kN": (1e3, 1e3)}
+_UNITS = {"kgf": (STANDARD_GRAVITY, STANDARD_GRAVITY), "lbf": (POUND_FORCE, POUND_FORCE * INCH), "kN": (1e3, 1e3)}
 # As given; what makes newtons of units taken for them; what undoes newtons taken for such units.
 _NAMES = ("N", *_UNITS, *["N"] * len(_UNITS))
 _SIZES = np.array([(1.0, 1.0), *_UNITS.values(), *((1 / f, 1 / t) for f, t in _UNITS.values())])

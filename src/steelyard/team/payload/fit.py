@@ -9,17 +9,26 @@ Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, ce
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
-from itertools import pairwise
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
-from steelyard.team.payload.model import Group, least_noise, normal, residual_scatter
+from steelyard.team.payload.model import (
+    LEAST_MASS,
+    Group,
+    Normal,
+    least_noise,
+    normal,
+    of_force,
+    residual_scatter,
+    units_of_body,
+)
+from steelyard.team.payload.settling import settled
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
-ROUNDS = 12
+FEWEST, ROUNDS = 1, 12
 # Noise has settled where it changes by less than this share.
 SETTLED = 0.03
 
@@ -63,43 +72,58 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     """
     ladder = ladder_of(sum(len(group.parts) for group in groups), with_gain)
     phi, groups = _start(groups, D, size)
-    scale = _units(phi, size)
-    starts = np.cumsum([0, *(len(group.parts) for group in groups)])
-    for left in reversed(range(ROUNDS)):
-        weights = tuple(group.weights(phi) for group in groups)
-        normals = [
-            normal(part, D, W, group.motion_noise)
-            for group, W in zip(groups, weights, strict=True)
-            for part in group.parts
-        ]
-        models = Models.of(normals, C, ladder, scale)
-        phi, beside = models.mean(), models.recordings(models.best)
-        renewed = tuple(_judged(g, D, beside, int(s)) for g, s in zip(groups, starts[:-1], strict=True))
-        change = max(
-            float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max())
-            for new, old in zip(renewed, groups, strict=True)
-        )
-        # Weights and groups that are told belong together, however it ends.
-        if not left or change < SETTLED:
-            break
-        groups = renewed
-    covariance = models.covariance_about(phi)
+    scale = units_of_body(max(abs(float(phi[0])), LEAST_MASS), size)
+    found = settled(groups, phi, _Equations(D), C, ladder, scale, FEWEST, ROUNDS, SETTLED)
+    phi, models, groups = found.phi, found.models, found.groups
     # Weights come from the noise of as many bands, each found from its rows: Meier 1953, of whose 4 / rows one half is
     # in the noise already.
     last = groups[-1]
     unsure = 1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0)
     rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
-    blind, shown = tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts)), models.shown(scale)
+    shown = models.shown(scale)
     return PayloadFit(
-        phi, covariance * unsure, shown.lost, scale, models.information[models.best], shown.condition, models.gain,
-        models.gainless, groups, weights, blind, _residual(groups),
+        phi, models.covariance_about(phi) * unsure, shown.lost, scale, models.information[models.best],
+        shown.condition, models.gain, models.gainless, groups, found.weights, found.blind, _residual(groups),
         float(models.chi2[models.best]) / max(6 * rows - 10, 1.0), unsure,
     )  # fmt: skip
 
 
-def _units(phi: Array, size: float) -> Array:
-    mass = max(abs(float(phi[0])), 1e-3)
-    return np.concatenate([[mass], np.full(3, mass * size), np.full(6, mass * size**2)])
+@dataclass(frozen=True, eq=False)
+class _Equations:
+    """Those of a rigid payload; D (6, 6 N) as of `fit_payload`."""
+
+    D: Array
+
+    def weights(self, group: Group, phi: Array) -> Array:
+        return group.weights(phi)
+
+    def normals(self, group: Group, W: Array) -> list[Normal]:
+        return [normal(part, self.D, W, group.motion_noise) for part in group.parts]
+
+    def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
+        """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
+        squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
+        for k, part in enumerate(group.parts):
+            squares += residual_scatter(part, self.D, beside.solution(start + k), beside.doubt(start + k))
+            rows += part.judged_rows
+        phi = beside.phi
+        M = motion_map(phi)[:, :6]
+        shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
+        # The mean of a variance given its rows, not the likeliest: weights must not be promised too high.
+        seen = squares / np.maximum(rows - 2, 0.5 * rows + 1e-9)[:, None]
+        thin = rows < 1
+        if thin.any() and not thin.all():
+            seen[thin] = seen[~thin].mean(0)
+        size = np.maximum((self.D[:, of_force(self.D.shape[1])] ** 2).mean(1), 1e-12)
+        seen = np.maximum(seen, least_noise(phi) * size)
+        least = np.maximum(0.02 * seen, least_noise(phi) * size)
+        # Where the path errs less than was thought, its noise shrinks with it.
+        share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
+        return replace(
+            group,
+            motion_noise=group.motion_noise * share[:, None, None],
+            wrench_noise=np.maximum(seen - shared * share[:, None], least),
+        )
 
 
 def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tuple[Group, ...]]:
@@ -113,7 +137,7 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
     every = [
         normal(part, D, np.repeat(weight, len(g.wrench_noise), 0), g.motion_noise) for g in loud for part in g.parts
     ]
-    flat = np.concatenate([[1.0], np.full(3, size), np.full(6, size**2)])
+    flat = units_of_body(1.0, size)
     first = Models.of(every, np.diag(unit), np.array([[0.0, 1.0, 0.0, 0.0]]), flat).recordings(0)
     left, count = np.zeros(6), 0.0
     for k, part in enumerate(part for group in loud for part in group.parts):
@@ -122,32 +146,6 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
     phi = first.phi
     noise = np.maximum(left / max(count, 1.0), least_noise(phi) * unit)
     return phi, tuple(replace(g, wrench_noise=np.tile(noise, (len(g.wrench_noise), 1))) for g in groups)
-
-
-def _judged(group: Group, D: Array, beside: Recordings, start: int) -> Group:
-    """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
-    squares, rows = np.zeros((len(group.wrench_noise), 6)), np.zeros(len(group.wrench_noise))
-    for k, part in enumerate(group.parts):
-        squares += residual_scatter(part, D, beside.solution(start + k), beside.doubt(start + k))
-        rows += part.judged_rows
-    phi = beside.phi
-    M = motion_map(phi)[:, :6]
-    shared = np.einsum("kii->ki", M @ group.motion_noise @ M.T)
-    # The mean of a variance given its rows, not the likeliest: weights must not be promised too high.
-    seen = squares / np.maximum(rows - 2, 0.5 * rows + 1e-9)[:, None]
-    thin = rows < 1
-    if thin.any() and not thin.all():
-        seen[thin] = seen[~thin].mean(0)
-    size = np.maximum((D[:, np.arange(D.shape[1]) % 6 >= 3] ** 2).mean(1), 1e-12)
-    seen = np.maximum(seen, least_noise(phi) * size)
-    least = np.maximum(0.02 * seen, least_noise(phi) * size)
-    # Where the path errs less than was thought, its noise shrinks with it.
-    share = np.minimum(1.0, (seen / np.maximum(shared, 1e-300)).max(1))
-    return replace(
-        group,
-        motion_noise=group.motion_noise * share[:, None, None],
-        wrench_noise=np.maximum(seen - shared * share[:, None], least),
-    )
 
 
 def _residual(groups: tuple[Group, ...]) -> Array:

@@ -14,7 +14,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import numpy as np
 
@@ -25,6 +24,7 @@ from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import Normal, normal
 from steelyard.team.payload.spectra import Spectra
+from steelyard.team.stacked import row_slices
 
 # [N] the sizes that are tried; none at all is beforehand so many times as likely as any of them.
 SIZES = np.array([0.03, 0.1, 0.3, 1.0, 3.0])
@@ -69,7 +69,7 @@ class _Tried:
         number = int(np.argmax(self.share))
         likely = self.models[number]
         beside = likely.recordings(likely.best)
-        starts = np.cumsum([0, *(len(group.parts) for group in fit.groups)])
+        places = row_slices([group.parts for group in fit.groups])
         gain = self.share @ [one.gain**2 for one in self.models]
         return replace(
             fit,
@@ -78,7 +78,7 @@ class _Tried:
             information=likely.information[likely.best],
             gain=float(np.sqrt(gain)),
             gainless=float(self.share @ [one.gainless for one in self.models]),
-            blind=tuple(tuple(beside.blind[a:b]) for a, b in pairwise(starts)),
+            blind=tuple(tuple(beside.blind[own]) for own in places),
             levers=levers if number else fit.levers,
         )
 

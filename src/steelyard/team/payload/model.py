@@ -16,15 +16,23 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.regressor import basis, motion_map
 from steelyard.logs.log import Integers, Mask
+from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.payload.spectra import Spectra
 
 # Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
 ROUNDING = 1e-6
+# [kg] Units of a payload are those of no less than this.
+LEAST_MASS = 1e-3
+
+
+def weight(phi: Array) -> float:
+    """Return roughly what a payload of parameters phi (P,) weighs [N], for thresholds."""
+    return float(abs(phi[0]) * ROUNDED_GRAVITY)
 
 
 def least_noise(phi: Array) -> float:
     """Return the variance [N^2] below which no force's noise is judged, for a payload of parameters phi (P,)."""
-    return float((ROUNDING * abs(phi[0]) * 9.81) ** 2)
+    return weight(ROUNDING * phi) ** 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -62,16 +70,26 @@ class Normal:
     pulls: Array
 
 
+def units_of_body(mass: float, size: float) -> Array:
+    """Return units (10,) of a body's parameters: mass, mass times size, mass times size squared."""
+    return np.repeat([mass, mass * size, mass * size**2], [1, 3, 6])
+
+
+def of_force(axes: int) -> Mask:
+    """Return which of so many axes (6 N,) of pushes, the moment of each before its force, are those of forces."""
+    return np.asarray(np.arange(axes) % 6 >= 3)
+
+
 def gain_columns(D: Array) -> tuple[Integers, Array]:
     """Return which of the 6 N pushes are forces (3 N,), and the unit wrench at B of each (6, 3 N)."""
-    force: Integers = np.flatnonzero(np.arange(D.shape[1]) % 6 >= 3).astype(np.int64)
+    force: Integers = np.flatnonzero(of_force(D.shape[1])).astype(np.int64)
     return force, D[:, force]
 
 
 def unit_bias(D: Array, six_axis: Mask, size: float) -> Array:
     """Return C (6, 6): a unit bias on every force axis, and `size` [m] times that on moments of six-axis wrists."""
     _, forces = gain_columns(D)
-    moment = np.repeat(six_axis, 6) & (np.arange(D.shape[1]) % 6 < 3)
+    moment = np.repeat(six_axis, 6) & ~of_force(D.shape[1])
     moments = D[:, moment] * size
     out = forces @ forces.T + moments @ moments.T
     # Two grasps leave the moment about their line without bias; a thousandth keeps C regular.

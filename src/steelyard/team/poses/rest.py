@@ -14,7 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.team.poses.fit import PoseFit
-from steelyard.team.stacked import Stretch
+from steelyard.team.stacked import Stretch, row_slices
 
 # Rows that a rest must have, and rests and windows of motion that must be there to be compared.
 ROWS, RESTS, WINDOWS = 10, 2, 4
@@ -29,10 +29,9 @@ def shares_at_rest(parts: Sequence[Stretch], fit: PoseFit) -> Array | None:
     rows = round(np.median([n for n, still in zip(sizes, rest, strict=True) if still] or [0]))
     if rows < ROWS or all(rest):
         return None
-    resting, moving, start = list[float](), list[float](), 0
-    for part, still in zip(parts, rest, strict=True):
-        left = (fit.rows.residual[start : start + len(part)] / np.repeat(fit.noise, 3, axis=1))[part.seen.all(1)]
-        start += len(part)
+    resting, moving = list[float](), list[float]()
+    for part, own, still in zip(parts, row_slices(parts), rest, strict=True):
+        left = (fit.rows.residual[own] / np.repeat(fit.noise, 3, axis=1))[part.seen.all(1)]
         if len(left) >= rows / 2:
             pieces = 1 if still else max(1, len(left) // rows)
             means = [(piece.mean(0) ** 2).mean() for piece in np.array_split(left, pieces)]

@@ -25,7 +25,7 @@ from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.poses.measured import Team, TeamMotion
 from steelyard.team.poses.rest import shares_at_rest
 from steelyard.team.poses.start import ENOUGH, first_team
-from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.stacked import Stretch, all_poses, row_slices, stretches
 from steelyard.team.turns import turns_between, twists_between
 
 # Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
@@ -112,20 +112,16 @@ class PoseTeam:
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        left, start = [], 0
-        for part in self.parts:
-            rows = slice(start, start + len(part))
-            start += len(part)
+        left = []
+        for part, rows in zip(self.parts, row_slices(self.parts), strict=True):
             left.append(Left(part.time, part.seen, self.fit.rows.residual[rows], self.fit.rows.data.twists[rows]))
         return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
 
     def slip(self, log: TeamLog) -> SlipAt | None:
         """Return the clearest slip, within a recording or else between two."""
-        best, start = None, 0
+        best = None
         apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
-        for number, part in enumerate(self.parts):
-            rows = slice(start, start + len(part))
-            start += len(part)
+        for number, (part, rows) in enumerate(zip(self.parts, row_slices(self.parts), strict=True)):
             slip = find_slip(apart[rows], part.seen, part.rate, noise)
             if slip is not None and (best is None or slip.score > best.slip.score):
                 best = SlipAt(number, float(part.time[slip.row]), slip)
@@ -137,8 +133,7 @@ class PoseTeam:
         if found.between:
             return step_between(found, parts, self._off(parts))
         raw = parts[found.recording]
-        start = sum(len(part) for part in self.parts[: found.recording])
-        apart = self.residuals(raw, start)[:, found.slip.robot]
+        apart = self.residuals(raw, row_slices(self.parts)[found.recording].start)[:, found.slip.robot]
         noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
         return found.renewed(apart, raw.seen[:, found.slip.robot], raw, noise)
 
@@ -190,12 +185,12 @@ class PoseTeam:
         noise = noise_alone(self.fit.J, self.fit.W)
         left = self._off(stretches(log, self.late)) / np.sqrt(np.einsum("nii->ni", noise))
         each = np.sqrt((left**2).mean(-1))
-        return np.split(each, np.cumsum([len(part) for part in self.parts])[:-1])
+        return np.split(each, [rows.stop for rows in row_slices(self.parts)[:-1]])
 
     def _off(self, parts: tuple[Stretch, ...]) -> Array:
         """Return the residuals (T, N, 6) of recordings one after the other."""
-        starts = np.cumsum([0, *(len(part) for part in self.parts)])
-        return np.concatenate([self.residuals(raw, int(start)) for raw, start in zip(parts, starts, strict=False)])
+        places = row_slices(self.parts)
+        return np.concatenate([self.residuals(raw, rows.start) for raw, rows in zip(parts, places, strict=True)])
 
     def rows(self, log: TeamLog, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their poses, and a row's covariance.
@@ -206,12 +201,10 @@ class PoseTeam:
         frame = balance_frame(fit.team.grasps)
         noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", fit.J, fit.W, fit.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
-        out, start, residual = [], 0, fit.rows.residual
-        for part in self.parts:
-            rows = slice(start, start + len(part))
-            start += len(part)
+        out = []
+        for part, rows in zip(self.parts, row_slices(self.parts), strict=True):
             body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
-            out.append((body, residual[rows]))
+            out.append((body, fit.rows.residual[rows]))
         return out, noise
 
 
@@ -231,10 +224,9 @@ def _twists(parts: tuple[Stretch, ...], team: Team) -> Array:
 
     At the ends of recordings, where only one side is known, it stays zero.
     """
-    J, start, out = adjoint_inverse(team.grasps), 0, []
-    for part in parts:
-        motion = team.motion[start : start + len(part)]
-        start += len(part)
+    J, out = adjoint_inverse(team.grasps), []
+    for part, rows in zip(parts, row_slices(parts), strict=True):
+        motion = team.motion[rows]
         half = max(1, round(0.05 * part.rate))
         twist = np.zeros((len(part), 6))
         if len(part) > 2 * half:

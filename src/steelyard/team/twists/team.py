@@ -19,8 +19,8 @@ from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.hinge.axis import Split, smoothed, split_of
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.split import Split, smoothed, split_of
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twists.rows import TwistStretch, twist_stretches
 from steelyard.team.twists.slips_between import slip_between
@@ -76,17 +76,17 @@ class TwistTeam:
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        J, W, left = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), []
+        left = []
         for part in self.parts:
             slope = -rates_of_change(part)
             apart = self._left(part)[0] - slope * self.fit.delays[:, None]
             left.append(Left(part.rows.time, part.seen, apart, slope))
-        return clock_errors(log, tuple(left), J, W)
+        return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
 
     def off(self, log: TeamLog) -> list[Array]:
         """Return by how many times its noise each twist is off (T, N) what the others say, for every recording."""
-        alone = noise_alone(adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1))
-        noise, raw = np.sqrt(np.einsum("nii->ni", alone)), twist_stretches(log, self.late)
+        noise = np.sqrt(np.einsum("nii->ni", noise_alone(self.fit.J, self.fit.W)))
+        raw = twist_stretches(log, self.late)
         return [
             np.sqrt(((self._against(was, now) / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
         ]
@@ -95,7 +95,7 @@ class TwistTeam:
         """Return the clearest slip, within a recording or else between two; none where a hinge is the cause."""
         if self.split is not None and self.split.sure:
             return None
-        J, W, best = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1), None
+        J, W, best = self.fit.J, self.fit.W, None
         noise = noise_alone(J, W)
         for number, part in enumerate(self.parts):
             apart = np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate
@@ -111,9 +111,9 @@ class TwistTeam:
         if found.between:
             return found
         raw, robot = twist_stretches(log, self.late)[found.recording], found.slip.robot
-        J, W = adjoint_inverse(self.fit.grasps), np.repeat(self.fit.noise**-2.0, 3, axis=1)
+        noise = noise_alone(self.fit.J, self.fit.W)[robot]
         apart = np.cumsum(self._against(raw, self.parts[found.recording])[:, robot], axis=0) / raw.rows.rate
-        return found.renewed(apart, raw.seen[:, robot], raw.rows, noise_alone(J, W)[robot], drifts=True)
+        return found.renewed(apart, raw.seen[:, robot], raw.rows, noise, drifts=True)
 
     @cached_property
     def split(self) -> Split | None:
@@ -161,14 +161,14 @@ class TwistTeam:
     def _against(self, was: TwistStretch, now: TwistStretch) -> Array:
         """Return what twists (T, N, 6) of a recording as it was differ by from the motion that is left of it now."""
         fused, _ = fused_twist(now.twist, now.seen, self.fit.grasps, self.fit.noise)
-        moved = np.einsum("nij,tj->tni", adjoint_inverse(self.fit.grasps), fused)
+        moved = np.einsum("nij,tj->tni", self.fit.J, fused)
         told = was.seen & now.seen.any(1, keepdims=True)
         return np.asarray((was.twist - moved) * told[..., None])
 
     def _left(self, part: TwistStretch) -> tuple[Array, Array, Array]:
         """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6)."""
         fused, covariance = fused_twist(part.twist, part.seen, self.fit.grasps, self.fit.noise)
-        moved = np.einsum("nij,tj->tni", adjoint_inverse(self.fit.grasps), fused)
+        moved = np.einsum("nij,tj->tni", self.fit.J, fused)
         return (part.twist - moved) * part.seen[..., None], fused, covariance
 
     def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:

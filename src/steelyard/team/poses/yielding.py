@@ -23,9 +23,9 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation, cross
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.changes.scores import Scores
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.team import PoseTeam
+from steelyard.team.scores import Scores
 
 # Rows that are enough, stretches that they are cut into, and the least there must be.
 ROWS, STRETCHES, LEAST = 3000, 40, 200
