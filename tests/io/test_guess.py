@@ -298,3 +298,20 @@ def test_a_rotation_that_is_read_is_not_asked_for_in_angles(tmp_path: Path) -> N
     names = ["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"]
     stream = bare(tmp_path, names, [*W, *Q, 1, 2, 3])
     assert "rotation" in stream.channels
+
+
+@pytest.mark.parametrize("name", ["", "Zeit", "Unnamed: 0"])
+def test_the_only_column_of_dates_is_the_clock(tmp_path: Path, name: str) -> None:
+    names = [name, "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz", "mode"]
+    numbers = ",".join(f"{value:g}" for value in [*W, *Q])
+    rows = [f"2026-01-01 12:00:00.{k:02d},{numbers},auto" for k in (0, 1)]
+    (tmp_path / "data.csv").write_text("\n".join([",".join(names), *rows]))
+    (stream,) = read_recording(tmp_path / "data.csv").streams
+    assert stream.time is not None
+    assert np.diff(stream.time) == pytest.approx(0.01)
+
+
+def test_an_index_in_brackets_is_no_unit(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("time,O_T_EE[0],O_T_EE[1]\n0,1,2\n")
+    with pytest.raises(BadDescription, match="no force and no torque was recognised"):
+        read_recording(tmp_path / "data.csv")

@@ -45,7 +45,7 @@ _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
 _TIMES = ("t", "time", "timestamp", "stamp")
 _SECONDS = ("secs", "seconds")  # the whole stamp, unless its nanoseconds stand beside it
 _SPLIT = (("sec", "nanosec"), ("secs", "nsecs"))  # ROS; "header.stamp." may stand in front
-_UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+_UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
 _SEPARATOR = re.compile(r"[^a-z0-9]+")
 
 _EPOCH = (1e9, 1e10)  # [s] stamps since 1970 lie here from 2001 to 2286
@@ -58,10 +58,11 @@ _NEW_POSE = float(np.cos(np.radians(5)))
 
 @dataclass(frozen=True)
 class _Names:
-    """Column numbers by simplified name, and units by column number."""
+    """Column numbers by simplified name, units by column number, and the numbers of columns that hold dates."""
 
     plain: dict[str, int]
     units: dict[int, str]
+    dates: tuple[int, ...] = ()
 
     def find(self, name: str, alone: bool) -> int | None:
         """Return the column called `name`, or, unless `alone`, the only one ending in it after a prefix."""
@@ -110,9 +111,10 @@ def _simplified(table: Table) -> _Names:
             units[number] = unit.group(1)
         simple = _simple(name[: unit.start()] if unit else name)
         if simple in plain:
-            raise _cannot_tell(table, f'two columns are called "{simple}"', _own_lines(table, _Names(plain, units)))
+            known = _Names(plain, units, header.dates)
+            raise _cannot_tell(table, f'two columns are called "{simple}"', _own_lines(table, known))
         plain[simple] = number
-    return _Names({**plain, **_array_names(header)}, units)
+    return _Names({**plain, **_array_names(header)}, units, header.dates)
 
 
 def _simple(name: str) -> str:
@@ -151,10 +153,15 @@ def _rotation(names: _Names) -> QuantitySpec | None:
 
 
 def _time_columns(names: _Names) -> Iterator[tuple[int, ...]]:
-    """Yield the columns that may be the clock, the likeliest first: one, or seconds and nanoseconds."""
+    """Yield the columns that may be the clock, the likeliest first: one, or seconds and nanoseconds.
+
+    The only column of dates is the clock whatever its name, as the index of pandas, which has none.
+    """
     yield from _whole_stamps(names, _TIMES)
     yield from (found for pair in _SPLIT if (found := names.all_of(pair, False)))
     yield from _whole_stamps(names, _SECONDS)
+    if len(names.dates) == 1:
+        yield names.dates
 
 
 def _whole_stamps(names: _Names, stems: Sequence[str]) -> Iterator[tuple[int, ...]]:
