@@ -315,3 +315,43 @@ def test_an_index_in_brackets_is_no_unit(tmp_path: Path) -> None:
     (tmp_path / "data.csv").write_text("time,O_T_EE[0],O_T_EE[1]\n0,1,2\n")
     with pytest.raises(BadDescription, match="no force and no torque was recognised"):
         read_recording(tmp_path / "data.csv")
+
+
+JOINED = "__time,/ft/force/x,/ft/force/y,/ft/force/z,/ft/torque/x,/ft/torque/y,/ft/torque/z,"
+JOINED += ",".join(f"/tf/base/tool0/{name}" for name in ("translation/x", "translation/y", "translation/z"))
+JOINED += "," + ",".join(f"/tf/base/tool0/rotation/{name}" for name in "xyzw")
+
+
+def joined_rows() -> str:
+    wrench, pose = ",".join(f"{v:g}" for v in W), ",".join(f"{v:g}" for v in [1, 2, 3, *Q])
+    rows = [f"{k},{wrench},,,,,,," if k % 2 else f"{k},,,,,,,{pose}" for k in range(20)]
+    return "\n".join([JOINED, *rows])
+
+
+def test_topics_that_plotjuggler_joined_are_streams_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text(joined_rows())
+    wrench, pose = read_recording(tmp_path / "data.csv").streams
+    assert set(wrench.channels) == {"force", "torque"}
+    assert set(pose.channels) == {"position", "rotation"}
+    assert len(wrench) == len(pose) == 10
+    assert wrench.channels["force"].tolist() == [W[:3]] * 10
+
+
+def test_joined_topics_said_to_be_one_stream_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text(joined_rows())
+    names = JOINED.split(",")
+    (tmp_path / "log.toml").write_text(
+        f"""[[stream]]
+path     = "data.csv"
+time     = {{ columns = ["__time"] }}
+force    = {{ columns = {names[1:4]} }}
+torque   = {{ columns = {names[4:7]} }}
+rotation = {{ columns = {names[10:]}, form = "quaternion-xyzw" }}
+"""
+    )
+    with pytest.raises(BadValue) as caught:
+        read_recording(tmp_path / "log.toml")
+    assert str(caught.value) == (
+        'log.toml, [[stream]] 1 ("data.csv"): force and rotation stand in different rows, as where topics are joined by time. '
+        "Describe each topic as a [[stream]] of its own, with the same path."
+    )

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
 from steelyard.io.channels import channel_with_gaps
 from steelyard.io.description import Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
+from steelyard.io.missing_rows import stand_apart
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.table_header import Header
 from steelyard.io.tables import Table
@@ -34,7 +35,7 @@ _STEMS: dict[str, tuple[str, ...]] = {
     "torque": ("t", "torque", "tau", "moment", "m"),
     "specific_force": ("a", "acc", "accel", "acceleration", "specific_force", "linear_acceleration"),
     "gravity": ("g", "gravity"),
-    "position": ("", "p", "pos", "position"),
+    "position": ("", "p", "pos", "position", "translation"),
     "angular_velocity": ("w", "omega", "angular_velocity"),
     "angular_acceleration": ("alpha", "angular_acceleration"),
 }
@@ -95,7 +96,23 @@ def describe(table: Table) -> tuple[Description, Cells]:
     where = table.path.name
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
     time = time and replace(time, where=f"{where}, time")
-    return Description((StreamSpec(where, tuple(located), where, time, poses),), gravity, notes=notes), cells
+    streams = [StreamSpec(where, topic, where, time, poses) for topic in _topics(located, cells, time)]
+    return Description(tuple(streams), gravity, notes=notes), cells
+
+
+def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
+    """Return the quantities of each stream: all in one, or those of each topic where topics were joined by time."""
+    if time is None:
+        return [tuple(specs)]
+    topics: list[tuple[Mask, list[QuantitySpec]]] = []
+    for spec in specs:
+        held = np.logical_and.reduce([~np.isnan(cells[int(n)]) for n in spec.columns])
+        mine = next((group for rows, group in topics if not stand_apart(rows, held)), None)
+        if mine is None:
+            topics.append((held, [spec]))
+        else:
+            mine.append(spec)
+    return [tuple(group) for _, group in topics]
 
 
 def _simplified(table: Table) -> _Names:
