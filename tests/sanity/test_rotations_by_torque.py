@@ -57,6 +57,18 @@ def test_torques_that_are_in_s_are_no_misread_rotations() -> None:
     assert "The torques are in the axes of S" in found.message
 
 
+def test_torques_that_would_fit_badly_in_s_are_only_named() -> None:
+    recording = recorded("paper", 0)
+    size = float(recording.streams[0].channels["torque"].std())
+    wave = 0.17 * size * np.sin(np.linspace(0, 20, len(recording.streams[0])))[:, None]
+    given = in_base(edited(recording, torque=lambda t: t + wave), "force")
+    read, (found, *_) = examine(given)
+    assert found.code == "wrench-unexplained"
+    assert "where the torques are in the axes of S: so read" in found.message
+    assert found.message.endswith("The answer does not assume this.")
+    assert read.streams[0].frames == given.streams[0].frames
+
+
 def test_readings_that_fit_alike_are_all_named_and_none_is_assumed(made: Recording) -> None:
     wrong = reread(made, lambda R: Rotation.from_rpy(R.rpy()[:, ::-1]))
     read, (found,) = examine(wrong)

@@ -23,6 +23,8 @@ from steelyard.sanity.units import scaled
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
 # second share, and fit well where they leave less than the third.
 FORCE, BAD, WELL = 0.1, 0.02, 0.1
+# Where force and torque both were said to be in W, a reading that leaves more than this share is told from no other.
+TOLD = 0.01
 # Another order must leave this share of what the order as given leaves.
 MUCH_BETTER = 0.1
 _FEWEST_ROWS = 6
@@ -97,11 +99,13 @@ def _elsewhere(
     axes = _in_other_axes(view, seen, turned, reading)
     rivals = [axes, *((r.left, r.words) for r in misread_rotations(recording, view, reading))]
     fitting = sorted(rival for rival in rivals if rival[0] <= MUCH_BETTER * share)
-    alike = [words for left, words in fitting if BESIDE * left < fitting[0][0]]
-    if len(alike) > 1:
+    least = fitting[0][0] if fitting else 0.0
+    doubtful = least > TOLD and view.world == {"torque", "force"}
+    alike = [words for left, words in fitting if BESIDE * left < least or doubtful]
+    if len(alike) > 1 or doubtful:
         text = (
-            f"The torques fit one body where {'; or where '.join(alike)}: so read, {_percent(fitting[0][0])} of their "
-            f"variance is left unexplained instead of {_percent(share)}. The answer assumes none of these."
+            f"The torques fit one body where {'; or where '.join(alike)}: so read, {_percent(least)} of their "
+            f"variance is left unexplained instead of {_percent(share)}. The answer does not assume this."
         )
         return recording, (Finding("wrench-unexplained", text, WHICH, left_in=True),)
     if fitting and fitting[0] == axes:
