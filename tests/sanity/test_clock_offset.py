@@ -33,6 +33,7 @@ def test_clocks_are_brought_together(late: float) -> None:
     assert found.findings[0].code == "stream-delayed"
     assert f"{'late' if late > 0 else 'early'} by {abs(late):.1f} s" in found.findings[0].message
     assert found.codes() == right.codes() | {"stream-delayed"}
+    assert found.delays_s["poses.csv"] == pytest.approx(late, abs=0.01)
     np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=2e-3, atol=1e-4)
 
 

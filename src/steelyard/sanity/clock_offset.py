@@ -43,7 +43,9 @@ def examine_offset(recording: Recording) -> tuple[Recording, tuple[Finding, ...]
     if abs(late) < LEAST_S or left > min(WELL, MUCH_BETTER * before):
         return recording, ()
     moved = tuple(
-        s if s.time is None or s.delay is not None or _file(s) == _file(felt) else replace(s, time=s.time - late)
+        s
+        if s.time is None or s.delay is not None or _file(s) == _file(felt)
+        else replace(s, time=s.time - late, moved=late)
         for s in recording.streams
     )
     text = (
