@@ -298,3 +298,60 @@ def test_a_rotation_that_is_read_is_not_asked_for_in_angles(tmp_path: Path) -> N
     names = ["fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz", "roll", "pitch", "yaw"]
     stream = bare(tmp_path, names, [*W, *Q, 1, 2, 3])
     assert "rotation" in stream.channels
+
+
+@pytest.mark.parametrize("name", ["", "Zeit", "Unnamed: 0"])
+def test_the_only_column_of_dates_is_the_clock(tmp_path: Path, name: str) -> None:
+    names = [name, "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz", "mode"]
+    numbers = ",".join(f"{value:g}" for value in [*W, *Q])
+    rows = [f"2026-01-01 12:00:00.{k:02d},{numbers},auto" for k in (0, 1)]
+    (tmp_path / "data.csv").write_text("\n".join([",".join(names), *rows]))
+    (stream,) = read_recording(tmp_path / "data.csv").streams
+    assert stream.time is not None
+    assert np.diff(stream.time) == pytest.approx(0.01)
+
+
+def test_an_index_in_brackets_is_no_unit(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text("time,O_T_EE[0],O_T_EE[1]\n0,1,2\n")
+    with pytest.raises(BadDescription, match="no force and no torque was recognised"):
+        read_recording(tmp_path / "data.csv")
+
+
+JOINED = "__time,/ft/force/x,/ft/force/y,/ft/force/z,/ft/torque/x,/ft/torque/y,/ft/torque/z,"
+JOINED += ",".join(f"/tf/base/tool0/{name}" for name in ("translation/x", "translation/y", "translation/z"))
+JOINED += "," + ",".join(f"/tf/base/tool0/rotation/{name}" for name in "xyzw")
+
+
+def joined_rows() -> str:
+    wrench, pose = ",".join(f"{v:g}" for v in W), ",".join(f"{v:g}" for v in [1, 2, 3, *Q])
+    rows = [f"{k},{wrench},,,,,,," if k % 2 else f"{k},,,,,,,{pose}" for k in range(20)]
+    return "\n".join([JOINED, *rows])
+
+
+def test_topics_that_plotjuggler_joined_are_streams_of_their_own(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text(joined_rows())
+    wrench, pose = read_recording(tmp_path / "data.csv").streams
+    assert set(wrench.channels) == {"force", "torque"}
+    assert set(pose.channels) == {"position", "rotation"}
+    assert len(wrench) == len(pose) == 10
+    assert wrench.channels["force"].tolist() == [W[:3]] * 10
+
+
+def test_joined_topics_said_to_be_one_stream_are_told_apart(tmp_path: Path) -> None:
+    (tmp_path / "data.csv").write_text(joined_rows())
+    names = JOINED.split(",")
+    (tmp_path / "log.toml").write_text(
+        f"""[[stream]]
+path     = "data.csv"
+time     = {{ columns = ["__time"] }}
+force    = {{ columns = {names[1:4]} }}
+torque   = {{ columns = {names[4:7]} }}
+rotation = {{ columns = {names[10:]}, form = "quaternion-xyzw" }}
+"""
+    )
+    with pytest.raises(BadValue) as caught:
+        read_recording(tmp_path / "log.toml")
+    assert str(caught.value) == (
+        'log.toml, [[stream]] 1 ("data.csv"): force and rotation stand in different rows, as where topics are joined by time. '
+        "Describe each topic as a [[stream]] of its own, with the same path."
+    )

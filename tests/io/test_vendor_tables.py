@@ -325,3 +325,75 @@ def test_the_documentation_names_the_columns_of_common_arms(tmp_path: Path, arm:
     stream = only(read_recording(tmp_path / "log.toml"))
     np.testing.assert_allclose(stream.channels["rotation"][0], turn, atol=1e-12)
     np.testing.assert_allclose(stream.channels["position"][0], place, atol=1e-12)
+
+
+# --- lines above the table --------------------
+
+
+ABOVE = [
+    'Start Time: 8/1/18 2:34 PM\nRDT Sample Rate: 100\n"NOTE: a, b, c"\nForce Units: N\n',
+    "Recorded by LabVIEW\nOperator,Bob\nDate,2026-01-01\n\n",
+]
+
+
+@pytest.mark.parametrize("above", ABOVE)
+@pytest.mark.parametrize("mark", [",", ";", "\t"])
+def test_lines_of_another_shape_above_the_header_are_passed_over(tmp_path: Path, above: str, mark: str) -> None:
+    same(only(read(tmp_path, above + "\n".join(lines(mark)) + "\n")))
+
+
+def test_columns_of_words_do_not_make_a_header_of_the_first_row(tmp_path: Path) -> None:
+    rows = [",".join(f"{value:.9g}" for value in row) for row in TABLE]
+    text = TOML.format("a.csv", "t")
+    for n, name in enumerate(NAMES):
+        text = text.replace(f'"{name}"', str(n))
+    (tmp_path / "a.csv").write_text("\n".join(f"{row},base_link" for row in rows))
+    (tmp_path / "log.toml").write_text(text)
+    same(only(read_recording(tmp_path / "log.toml")))
+
+
+# --- lists in cells --------------------
+
+
+def listed(value: np.ndarray) -> str:
+    return str(value.tolist())
+
+
+@pytest.mark.parametrize("inner", [", ", " ", ","])
+@pytest.mark.parametrize("mark", [",", ";"])
+def test_lists_in_cells_are_columns(tmp_path: Path, mark: str, inner: str) -> None:
+    rows = [
+        mark.join([f"{row[0]:.9g}", *(f'"{listed(v)}"' for v in (row[1:7], row[7:].reshape(2, 2)))]).replace(
+            ", ", inner
+        )
+        for row in TABLE
+    ]
+    force, torque = (", ".join(f'"wrench[{i}]"' for i in three) for three in ((0, 1, 2), (3, 4, 5)))
+    (tmp_path / "a.csv").write_text("\n".join([mark.join(["t", "wrench", "q"]), *rows]))
+    (tmp_path / "log.toml").write_text(
+        f"""[[stream]]
+path     = "a.csv"
+time     = {{ columns = ["t"] }}
+force    = {{ columns = [{force}] }}
+torque   = {{ columns = [{torque}] }}
+rotation = {{ columns = ["q"], form = "quaternion-wxyz" }}
+"""
+    )
+    same(only(read_recording(tmp_path / "log.toml")))
+
+
+def test_a_list_of_another_length_is_a_row_of_another_length(tmp_path: Path) -> None:
+    (tmp_path / "a.csv").write_text(
+        "t,f,m,q\n" + '0.01,"[1, 2, 3]","[1, 2, 3]","[1, 0, 0, 0]"\n' + '0.02,"[1, 2]","[1, 2, 3]","[1, 0, 0, 0]"\n'
+    )
+    (tmp_path / "log.toml").write_text(
+        """[[stream]]
+path     = "a.csv"
+time     = { columns = ["t"] }
+force    = { columns = ["f"] }
+torque   = { columns = ["m"] }
+rotation = { columns = ["q"], form = "quaternion-wxyz" }
+"""
+    )
+    with pytest.raises(BadFile, match="line 3 has 10 cells, the rows before it have 11"):
+        read_recording(tmp_path / "log.toml")

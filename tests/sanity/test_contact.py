@@ -95,8 +95,20 @@ def test_a_push_that_is_constant_in_the_sensor_says_that_it_could_be_either() ->
     mask, findings = untouched(log, True)
     assert [f.code for f in findings] == ["contact"]
     assert "either way" in findings[0].message
+    assert "tared" not in findings[0].message
     assert (mask & touched).sum() < 0.1 * mask.sum()
     assert NoiseAware().identify(log.rows(mask)).parameters.mass == pytest.approx(mass_of("hammer"), rel=0.04)
+
+
+@pytest.mark.parametrize("first", [True, False])
+def test_a_tare_in_between_is_thought_of(first: bool) -> None:
+    log = made("hammer", "stop_go", "moderate", 0)
+    before = (log.time < 4.0) if first else (log.time > 6.0)
+    log = replace(log, wrench=log.wrench + before[:, None] * [0.3, 0.5, 0.0, 3.0, -5.0, 2.0])
+    mask, (finding,) = untouched(log, True)
+    assert finding.code == "contact"
+    assert finding.message.endswith("It reaches an end of the log, as where the sensor was tared in between.")
+    assert NoiseAware().identify(log.rows(mask)).parameters.mass == pytest.approx(mass_of("hammer"), rel=0.01)
 
 
 def test_the_message_has_time_share_and_size() -> None:

@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
 from steelyard.io.channels import channel_with_gaps
 from steelyard.io.description import Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
+from steelyard.io.missing_rows import stand_apart
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.table_header import Header
 from steelyard.io.tables import Table
@@ -34,7 +35,7 @@ _STEMS: dict[str, tuple[str, ...]] = {
     "torque": ("t", "torque", "tau", "moment", "m"),
     "specific_force": ("a", "acc", "accel", "acceleration", "specific_force", "linear_acceleration"),
     "gravity": ("g", "gravity"),
-    "position": ("", "p", "pos", "position"),
+    "position": ("", "p", "pos", "position", "translation"),
     "angular_velocity": ("w", "omega", "angular_velocity"),
     "angular_acceleration": ("alpha", "angular_acceleration"),
 }
@@ -45,7 +46,7 @@ _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
 _TIMES = ("t", "time", "timestamp", "stamp")
 _SECONDS = ("secs", "seconds")  # the whole stamp, unless its nanoseconds stand beside it
 _SPLIT = (("sec", "nanosec"), ("secs", "nsecs"))  # ROS; "header.stamp." may stand in front
-_UNIT = re.compile(r"[\[(]\s*([^\])]*?)\s*[\])]\s*$")
+_UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
 _SEPARATOR = re.compile(r"[^a-z0-9]+")
 
 _EPOCH = (1e9, 1e10)  # [s] stamps since 1970 lie here from 2001 to 2286
@@ -58,10 +59,11 @@ _NEW_POSE = float(np.cos(np.radians(5)))
 
 @dataclass(frozen=True)
 class _Names:
-    """Column numbers by simplified name, and units by column number."""
+    """Column numbers by simplified name, units by column number, and the numbers of columns that hold dates."""
 
     plain: dict[str, int]
     units: dict[int, str]
+    dates: tuple[int, ...] = ()
 
     def find(self, name: str, alone: bool) -> int | None:
         """Return the column called `name`, or, unless `alone`, the only one ending in it after a prefix."""
@@ -94,7 +96,23 @@ def describe(table: Table) -> tuple[Description, Cells]:
     where = table.path.name
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
     time = time and replace(time, where=f"{where}, time")
-    return Description((StreamSpec(where, tuple(located), where, time, poses),), gravity, notes=notes), cells
+    streams = [StreamSpec(where, topic, where, time, poses) for topic in _topics(located, cells, time)]
+    return Description(tuple(streams), gravity, notes=notes), cells
+
+
+def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
+    """Return the quantities of each stream: all in one, or those of each topic where topics were joined by time."""
+    if time is None:
+        return [tuple(specs)]
+    topics: list[tuple[Mask, list[QuantitySpec]]] = []
+    for spec in specs:
+        held = np.logical_and.reduce([~np.isnan(cells[int(n)]) for n in spec.columns])
+        mine = next((group for rows, group in topics if not stand_apart(rows, held)), None)
+        if mine is None:
+            topics.append((held, [spec]))
+        else:
+            mine.append(spec)
+    return [tuple(group) for _, group in topics]
 
 
 def _simplified(table: Table) -> _Names:
@@ -110,9 +128,10 @@ def _simplified(table: Table) -> _Names:
             units[number] = unit.group(1)
         simple = _simple(name[: unit.start()] if unit else name)
         if simple in plain:
-            raise _cannot_tell(table, f'two columns are called "{simple}"', _own_lines(table, _Names(plain, units)))
+            known = _Names(plain, units, header.dates)
+            raise _cannot_tell(table, f'two columns are called "{simple}"', _own_lines(table, known))
         plain[simple] = number
-    return _Names({**plain, **_array_names(header)}, units)
+    return _Names({**plain, **_array_names(header)}, units, header.dates)
 
 
 def _simple(name: str) -> str:
@@ -151,10 +170,15 @@ def _rotation(names: _Names) -> QuantitySpec | None:
 
 
 def _time_columns(names: _Names) -> Iterator[tuple[int, ...]]:
-    """Yield the columns that may be the clock, the likeliest first: one, or seconds and nanoseconds."""
+    """Yield the columns that may be the clock, the likeliest first: one, or seconds and nanoseconds.
+
+    The only column of dates is the clock whatever its name, as the index of pandas, which has none.
+    """
     yield from _whole_stamps(names, _TIMES)
     yield from (found for pair in _SPLIT if (found := names.all_of(pair, False)))
     yield from _whole_stamps(names, _SECONDS)
+    if len(names.dates) == 1:
+        yield names.dates
 
 
 def _whole_stamps(names: _Names, stems: Sequence[str]) -> Iterator[tuple[int, ...]]:

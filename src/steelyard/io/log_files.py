@@ -42,7 +42,10 @@ def _read(path: Path, data: Path | None) -> Recording:
     if path.suffix.lower() != ".toml":
         table = open_table(path)
         description, cells = guess.describe(table)
-        return replace(_recording(description, [table], [cells], path), described=False)
+        joined = [table] * len(description.streams)
+        own = [cells] if len(joined) == 1 else read_cells(description.streams, joined)
+        rows = own_rows(description.streams, joined, own)
+        return replace(_recording(description, joined, rows, path), described=False)
     description = read_description(path)
     tables = open_tables(description.streams, path.parent, data)
     rows = own_rows(description.streams, tables, read_cells(description.streams, tables))

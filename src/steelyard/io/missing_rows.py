@@ -53,11 +53,30 @@ def _whole(stream: Stream) -> Mask:
 
 def _require_most(spec: StreamSpec, stream: Stream, rows: Mask) -> None:
     """Raise BadValue at the first quantity that misses too many rows, then where all of them together do."""
+    _refuse_joined(spec, stream)
     for quantity in spec.quantities:
         _refuse_many(known_rows(stream.channels[quantity.name]), quantity.where)
     if spec.time is not None and stream.time is not None:
         _refuse_many(known_rows(stream.time), spec.time.where)
     _refuse_many(rows, spec.where)
+
+
+def _refuse_joined(spec: StreamSpec, stream: Stream) -> None:
+    """Raise BadValue where quantities stand in rows of their own: topics that were joined by time in one table."""
+    known = {q.name: known_rows(stream.channels[q.name]) for q in spec.quantities}
+    first = next(iter(known), "")
+    for name, rows in known.items():
+        if stream.time is not None and stand_apart(rows, known[first]):
+            raise BadValue(
+                f"{spec.where}: {first} and {name} stand in different rows, as where topics are joined by time. "
+                "Describe each topic as a [[stream]] of its own, with the same path."
+            )
+
+
+def stand_apart(one: Mask, other: Mask) -> bool:
+    """Tell whether two quantities, known in rows (N,), are of topics joined by time: each is often there alone."""
+    alone = min(np.count_nonzero(one & ~other), np.count_nonzero(other & ~one))
+    return bool(alone > MOST_MISSING * len(one))
 
 
 def _refuse_many(known: Mask, where: str) -> None:

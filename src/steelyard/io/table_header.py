@@ -16,12 +16,14 @@ class Header:
 
     names   one per column; None where a text file has no header
     count   number of columns
-    groups  arrays with several columns (NPZ): name -> its column numbers
+    groups  arrays with several columns (NPZ, lists in cells): name -> its column numbers
+    dates   numbers of the columns of a text that hold dates
     """
 
     names: tuple[str, ...] | None
     count: int
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    dates: tuple[int, ...] = ()
 
     def shown(self) -> list[str]:
         """Return the names to list in a message: arrays with several columns appear once."""

@@ -1,7 +1,8 @@
 """CSV, TSV and other text tables (also gzipped), read in blocks by numpy's C reader.
 
-The head decides: it must be text with line ends, its delimiter is found, and its header is the first line or
-the last comment line above the numbers. A file that is not text is refused there, however large it is.
+The head decides: it must be text with line ends, its delimiter is found, and its header is the first line, the last
+comment line above the numbers, or the first line of words as wide as the rows, where others stand above (a preamble).
+A file that is not text is refused there, however large it is.
 """
 
 from __future__ import annotations
@@ -18,6 +19,7 @@ import numpy as np
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.bounds import require_bounded
+from steelyard.io.list_cells import spread, spread_names
 from steelyard.io.table_header import Columns, Header
 from steelyard.io.text_blocks import blocks, decoded, head_lines
 from steelyard.io.text_cells import (
@@ -56,13 +58,17 @@ class _Reading:
 
 @dataclass(frozen=True)
 class TextTable:
-    """A text table: `delimiter` (None = whitespace), and `skip` lines above the first row of numbers."""
+    """A text table: `delimiter` (None = whitespace), and `skip` lines above the first row of numbers.
+
+    `lists` says that cells hold lists of numbers; `header` and `first` have their items apart.
+    """
 
     path: Path
     header: Header
     delimiter: str | None
     skip: int
     first: tuple[str, ...]
+    lists: bool = False
 
     @classmethod
     def open(cls, path: Path) -> TextTable:
@@ -71,9 +77,11 @@ class TextTable:
         rows = [i for i, line in enumerate(lines) if holds_row(line)]
         if not rows:
             raise BadFile(f"{path}: the file has no rows, only blank lines or comments.")
+        rows = _below_preamble(lines, rows)
         delimiter = _delimiter(lines[rows[0]])
         cells = split(lines[rows[0]], delimiter)
-        if are_data(cells, delimiter) and not _counted(cells):
+        below = split(lines[rows[1]], delimiter) if len(rows) > 1 else ()
+        if (are_data(cells, delimiter) or _alike(cells, below)) and not _counted(cells):
             names = _comment_header(lines[: rows[0]], delimiter, len(cells))
             return cls(path, Header(names, len(cells), {}), delimiter, rows[0], cells)
         if len(rows) < 2:
@@ -86,7 +94,11 @@ class TextTable:
                 f"{path}: the header has {len(cells)} names, but its rows have {len(first)} cells. "
                 "Write one name per column, or a description with column numbers and no header."
             )
-        return cls(path, Header(cells, len(cells), {}), delimiter, skip, first)
+        names, groups = spread_names(cells, first) if len(first) == len(cells) else (cells, {})
+        if groups:
+            first = split(spread(lines[skip], delimiter), delimiter)
+        dates = tuple(n for n, cell in enumerate(first) if is_stamp(cell))
+        return cls(path, Header(names, len(names), groups, dates), delimiter, skip, first, bool(groups))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
         """Return columns by number; raises BadFile at a cell that is not a number, with its line and text."""
@@ -94,6 +106,7 @@ class TextTable:
         parts: list[Columns] = []
         line, size = self.skip + 1, 0
         for block in blocks(self.path, self.skip):
+            block = spread(block, self.delimiter) if self.lists else block
             whole = block if block.endswith("\n") else completed(block, self.delimiter, self.first)
             part = self._parse(with_points(whole) if how.commas else whole, how, line)
             if part:
@@ -181,6 +194,28 @@ class TextTable:
         elif is_other_date(cell):
             hint = "Write the time in seconds, or as 2024-05-01T12:00:00.123."
         return BadFile(f"{self.path}: line {line}, column {name} holds {shown}. {hint}")
+
+
+def _below_preamble(lines: list[str], rows: list[int]) -> list[int]:
+    """Return the rows (numbers of lines) from the header on, without lines of another shape that loggers write above.
+
+    That is the first line of words with as many cells as the last whole line, where no row of numbers stands above.
+    """
+    last = lines[rows[-2 if len(rows) > 2 else -1]]  # the last one may be cut off
+    delimiter = _delimiter(last)
+    width = len(split(last, delimiter))
+    for k, row in enumerate(rows):
+        cells = split(lines[row], delimiter)
+        if len(cells) == width:
+            return rows[k:] if k and are_words(cells, delimiter) else rows
+    return rows
+
+
+def _alike(cells: Sequence[str], below: Sequence[str]) -> bool:
+    """Whether a line with words and mostly numbers is a row, not a header: the next has them in the same places."""
+    numbers = [is_number(cell) for cell in cells]
+    mostly = 2 * sum(numbers) > len(cells) and numbers == [is_number(cell) for cell in below]
+    return mostly and not _counted([cell for cell in cells if is_number(cell)])
 
 
 def _delimiter(line: str) -> str | None:

@@ -57,6 +57,7 @@ class Stream:
     mount     pose of the stream's own frame in S; None = S itself (for an accelerometer: to be estimated)
     poses     a table of still poses without time: rows of such streams belong together
     said      the unit that its stamps were said to be in, before they were read as seconds
+    moved     [s] its stamps were late by this much beside the wrench's clock, and `time` is already without it
     """
 
     name: str
@@ -67,6 +68,7 @@ class Stream:
     mount: Mount | None = None
     poses: bool = False
     said: str = "s"
+    moved: float = 0.0
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))

@@ -62,7 +62,9 @@ def identify(
         estimate = looked_at(estimate, parts, shape, load.shape is not None)
         if load.shape and not any(recording.object_pose_std or ()):
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
-    estimate = replace(remedied(estimate, rows), delays_s=dict(rows.aligned.delays_s))
+    moved = {stream.name: stream.moved for stream in recording.streams}
+    delays_s = {name: late + moved.get(name, 0.0) for name, late in rows.aligned.delays_s.items()}
+    estimate = replace(remedied(estimate, rows), delays_s=delays_s)
     aligning = () if rows.unmeasured else rows.aligned.notes
     return _with_bias_as(estimate.noted(*recording.notes, *aligning, *uncalibrated(estimate)), recording)
 

@@ -7,6 +7,7 @@ from dataclasses import replace
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
+from steelyard.sanity.clock_offset import examine_offset
 from steelyard.sanity.clock_unit import examine_clock
 from steelyard.sanity.conventions import examine_conventions, examine_turns
 from steelyard.sanity.leaps import examine_sparse
@@ -32,12 +33,13 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     recording, rows = examine_rows(recording)
     recording = replace(recording, dead=dead_channels(recording))
     recording, units = examine_units(recording)
+    recording, offset = examine_offset(recording)
     recording, turns = examine_turns(recording)
     recording, conventions = examine_conventions(examine_memory(recording))
     conventions = (*turns, *conventions)
     # Misread rotations leave a channel unexplained, too.
     recording, silent = (recording, ()) if conventions else without_silent(recording)
-    return recording, (*read, *clock, *rows, *units, *conventions, *silent)
+    return recording, (*read, *clock, *rows, *units, *offset, *conventions, *silent)
 
 
 def _require_rows(recording: Recording) -> None:

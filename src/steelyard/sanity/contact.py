@@ -273,6 +273,8 @@ def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: M
             " A constant wrench fits as well, so it may be these times that were free and the others that were touched;"
             " mass and centre of mass are the same either way, the bias is not."
         )
+        if len(touches) == 1 and (touches[0].first == 0 or touches[0].last == len(slices.y)):
+            text += " It reaches an end of the log, as where the sensor was tared in between."
     finding = Finding.of("contact", text)
     return replace(finding, remedy=ALL_ELSE) if unlike_hands else finding
 

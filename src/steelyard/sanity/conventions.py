@@ -55,7 +55,7 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     recording = flipped
     found.extend(findings)
     if not found:
-        recording, findings = examine_torques(recording, view, recording.gravity, reading.rotation)
+        recording, findings = examine_torques(recording, view, reading)
     if found or not findings:
         recording, findings = _lengths(recording, reading.fit)
     found.extend(findings)

@@ -5,6 +5,9 @@ A rival is claimed only where it
 * leaves less than a quarter of the force variance that the log as given leaves, and no more of the torque's;
 * explains at least half of the force variance, by a mass of the right sign beyond five jackknife standard deviations;
 * leaves less than half of what a freely tilted gravity would leave.
+
+Forces in the axes of W point down however the rotations are read, so that beside them torques decide: a rival way to
+read the rotations leaves a tenth of the torque variance, and half of what any other, or other axes, would leave.
 """
 
 from __future__ import annotations
@@ -27,6 +30,9 @@ MUCH_BETTER = 0.25
 # A reading that leaves less than the first share of the force variance has rotation and gravity right but for a tilt;
 # one that leaves less than the second has the tilt right, too: two degrees leave more.
 GOOD, LEVEL = 0.03, 2e-4
+# By torques alone a rival leaves less than the first share of what is left as given, and less than the second of what
+# any other leaves, torques in other axes too.
+BY_TORQUE, BESIDE = 0.1, 0.5
 # Constant forces seem to turn with the sensor where a bias lies along gravity; torques then do not.
 TORQUES_TOO = 0.3
 # Beyond this no base is crooked [rad].
@@ -37,7 +43,8 @@ STEEP = np.radians(60.0)
 class Reading:
     """One way to read the recording: words for what would be wrong, gravity, rotations, its fit, how they were misread.
 
-    `misread` is None where the rotations are as given; `view` is what is seen where the wrench is in other axes.
+    `misread` is None where the rotations are as given; `view` is what is seen where the wrench is in other axes;
+    `by_torque` says that torques alone tell it from the reading as given.
     """
 
     words: str
@@ -46,6 +53,12 @@ class Reading:
     fit: StaticFit
     misread: Misread | None = None
     view: Glance | None = None
+    by_torque: bool = False
+
+    @property
+    def left(self) -> float:
+        """Share of the variance that is left unexplained of the part of the wrench that tells."""
+        return self.fit.torque_share if self.by_torque else self.fit.force_share
 
 
 def reading_of(
@@ -61,7 +74,14 @@ def reading_of(
 
 def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | None:
     """Return the rival that beats the reading as given, if there is one."""
-    if view.rotation is None or given.fit.force_share < GOOD:
+    if view.rotation is None:
+        return None
+    return _best_by_force(recording, view, given) or _best_by_torque(recording, view, given)
+
+
+def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Reading | None:
+    """Return the rival whose forces turn with gravity as those of the reading as given do not."""
+    if given.fit.force_share < GOOD:
         return None
     free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
     bar = MUCH_BETTER * given.fit.force_share
@@ -78,6 +98,28 @@ def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | 
     # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
     best = min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
     return best if best is not None and not _outdone(best, view, given.gravity) else None
+
+
+def _best_by_torque(recording: Recording, view: Glance, given: Reading) -> Reading | None:
+    """Return the rotations with which torques in W belong to forces in W, which as given they do not."""
+    if any(view.dead) or given.fit.torque_share < GOOD:
+        return None
+    rivals = sorted(misread_rotations(recording, view, given), key=lambda r: r.left)
+    if not rivals or rivals[0].left > BY_TORQUE * given.fit.torque_share:
+        return None
+    in_sensor = reading_of(replace(view, world=frozenset({"force"})), "", given.gravity, view.rotation)
+    others = (in_sensor.fit.torque_share, *(rival.left for rival in rivals[1:]))
+    return rivals[0] if rivals[0].left < BESIDE * min(others) else None
+
+
+def misread_rotations(recording: Recording, view: Glance, given: Reading) -> Iterator[Reading]:
+    """Yield the other ways to read rotations that explain forces in W as well, with torques in W, too; else none."""
+    if view.world != {"torque", "force"}:
+        return
+    for rival in _rivals(recording, view, given.gravity):
+        as_well = rival.fit.force_share < 1.2 * given.fit.force_share + 1e-3 and rival.fit.sign == given.fit.sign
+        if rival.misread is not None and as_well:
+            yield replace(rival, by_torque=True)
 
 
 def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Reading]:
@@ -142,9 +184,10 @@ def _varies(view: Glance, reading: Reading) -> bool:
 
 def rival_finding(best: Reading, given: Reading) -> Finding:
     """Return what is said of the rival that is taken instead of the reading as given."""
+    part, instead = ("torque", given.fit.torque_share) if best.by_torque else ("force", given.fit.force_share)
     message = (
-        f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.fit.force_share)} of the force variance is "
-        f"left unexplained instead of {percent(given.fit.force_share)}. The answer assumes this."
+        f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.left)} of the {part} variance is "
+        f"left unexplained instead of {percent(instead)}. The answer assumes this."
     )
     if best.view is not None:
         axes = "W" if "force" in best.view.world else "S"

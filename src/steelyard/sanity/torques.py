@@ -16,12 +16,15 @@ from steelyard.findings import Finding
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording
 from steelyard.sanity.glance import Glance, Seen, in_other_axes
 from steelyard.sanity.mirrored import REFLECTIONS, in_words
+from steelyard.sanity.readings import BESIDE, Reading, misread_rotations
 from steelyard.sanity.static_fit import columns, solve
 from steelyard.sanity.units import scaled
 
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
 # second share, and fit well where they leave less than the third.
 FORCE, BAD, WELL = 0.1, 0.02, 0.1
+# Where force and torque both were said to be in W, a reading that leaves more than this share is told from no other.
+TOLD = 0.01
 # Another order must leave this share of what the order as given leaves.
 MUCH_BETTER = 0.1
 _FEWEST_ROWS = 6
@@ -41,12 +44,11 @@ UNITS = (
     (0.01, "torques in N*cm are read as N*m"),
 )
 REMEDY = "Check order and signs of the torque columns in the description."
+WHICH = "Check order, form, unit and sense of the rotation, and the frame of the torque."
 ABOUT_S = "Take position x force away from the torques, all in the axes of W, or log the wrench at the sensor."
 
 
-def examine_torques(
-    recording: Recording, view: Glance, gravity: Array, rotation: Array | None
-) -> tuple[Recording, tuple[Finding, ...]]:
+def examine_torques(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return a finding where torques, read otherwise, belong to the forces, and as given do not.
 
     Torques in other axes than they are said to be in, or a thousand times too small, leave no doubt: the recording is
@@ -54,7 +56,7 @@ def examine_torques(
     """
     if any(view.dead) or len(view) < _FEWEST_ROWS:
         return recording, ()
-    seen = view.seen(gravity, rotation)
+    seen = view.seen(reading.gravity, reading.rotation)
     turned, forced = columns(seen)
     force, force_std, force_share = solve(forced, seen.wrench[:, 3:], view.block)
     moment, _, share = solve(turned, seen.wrench[:, :3], view.block)
@@ -62,7 +64,7 @@ def examine_torques(
         return recording, ()
     felt = force[1:4] if seen.lever is not None else np.zeros(3)
     if share > BAD:
-        otherwise, findings = _elsewhere(recording, view, seen, turned, share, rotation)
+        otherwise, findings = _elsewhere(recording, view, seen, turned, share, reading)
         findings = findings or _ordered(view, seen, turned, share, felt)
         if findings:
             return otherwise, findings
@@ -88,20 +90,30 @@ def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[R
 
 
 def _elsewhere(
-    recording: Recording, view: Glance, seen: Seen, turned: Array, share: float, rotation: Array | None
+    recording: Recording, view: Glance, seen: Seen, turned: Array, share: float, reading: Reading
 ) -> tuple[Recording, tuple[Finding, ...]]:
     """Return what is said of torques in other axes, or about the origin of W, with the axes put right."""
+    rotation = reading.rotation
     if rotation is None:
         return recording, ()
-    other = replace(view, world=view.world ^ {"torque"})
-    left = solve(turned, other.seen(np.zeros(3), rotation).wrench[:, :3], view.block)[2]
-    if left <= MUCH_BETTER * share:
-        named = "W (the base)" if "torque" in other.world else "S"
+    axes = _in_other_axes(view, seen, turned, reading)
+    rivals = [axes, *((r.left, r.words) for r in misread_rotations(recording, view, reading))]
+    fitting = sorted(rival for rival in rivals if rival[0] <= MUCH_BETTER * share)
+    least = fitting[0][0] if fitting else 0.0
+    doubtful = least > TOLD and view.world == {"torque", "force"}
+    alike = [words for left, words in fitting if BESIDE * left < least or doubtful]
+    if len(alike) > 1 or doubtful:
         text = (
-            f"The torques are in the axes of {named}: so read, {_percent(left)} of their variance is left unexplained "
+            f"The torques fit one body where {'; or where '.join(alike)}: so read, {_percent(least)} of their "
+            f"variance is left unexplained instead of {_percent(share)}. The answer does not assume this."
+        )
+        return recording, (Finding("wrench-unexplained", text, WHICH, left_in=True),)
+    if fitting and fitting[0] == axes:
+        text = (
+            f"T{axes[1][1:]}: so read, {_percent(axes[0])} of their variance is left unexplained "
             f"instead of {_percent(share)}. The answer assumes this."
         )
-        remedy = f'Set frame = "{named[0]}" in the torque of this stream.'
+        remedy = f'Set frame = "{"S" if "torque" in view.world else "W"}" in the torque of this stream.'
         return in_other_axes(recording, ("torque",)), (Finding("gravity-frame", text, remedy),)
     if view.position is None:
         return recording, ()
@@ -114,6 +126,13 @@ def _elsewhere(
         f"unexplained instead of {_percent(share)}; the answer does not assume this."
     )
     return recording, (Finding("wrench-unexplained", text, ABOUT_S, left_in=True),)
+
+
+def _in_other_axes(view: Glance, seen: Seen, turned: Array, reading: Reading) -> tuple[float, str]:
+    """Return what torques in the other axes leave, S for W or W for S, and the words for it."""
+    other = replace(view, world=view.world ^ {"torque"})
+    left = solve(turned, other.seen(np.zeros(3), reading.rotation).wrench[:, :3], view.block)[2]
+    return left, f"the torques are in the axes of {'W (the base)' if 'torque' in other.world else 'S'}"
 
 
 def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array) -> tuple[Finding, ...]:

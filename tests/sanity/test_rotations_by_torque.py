@@ -1,0 +1,78 @@
+"""Forces in the axes of W point down however the rotations are read: only the torques show how they are meant."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from sanity.held_poses import recorded
+from sanity.traps import edited, reread
+from steelyard.logs.recording import Recording
+from steelyard.pipelines.held_object import identify
+from steelyard.sanity import examine
+from steelyard.spatial import Rotation
+
+MISREADINGS: dict[str, Callable[[Rotation], Rotation]] = {
+    "turns W into S": lambda R: R.inverse(),
+    "w first where it is last": lambda R: Rotation.from_quaternion_wxyz(np.roll(R.quaternion_wxyz(), 1, -1)),
+    "moving axes": lambda R: Rotation.from_rpy(-R.inverse().rpy()),
+    "a rotation vector, not roll": lambda R: Rotation.from_rpy(R.log()),
+}
+
+
+def in_base(recording: Recording, *parts: str) -> Recording:
+    """Return the recording with `parts` of its wrench in the axes of W, where all of it is said to be."""
+    (stream,) = recording.streams
+    R = stream.channels["rotation"]
+    turned = {part: np.einsum("nij,nj->ni", R, stream.channels[part]) for part in parts}
+    said = replace(stream, channels={**stream.channels, **turned}, frames={"force": "W", "torque": "W"})
+    return replace(recording, streams=(said,))
+
+
+@pytest.fixture(scope="module", params=[0, 1])
+def made(request: pytest.FixtureRequest) -> Recording:
+    return in_base(recorded("paper", request.param), "force", "torque")
+
+
+@pytest.mark.parametrize("words", MISREADINGS)
+def test_misread_rotations_are_put_right(made: Recording, words: str) -> None:
+    wrong = reread(made, MISREADINGS[words])
+    found, right = identify(wrong), identify(made)
+    assert found.codes() == right.codes() | {found.findings[0].code}
+    assert words in found.findings[0].message
+    assert "of the torque variance" in found.findings[0].message
+    np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=1e-5, atol=1e-6)
+
+
+def test_rotations_as_given_are_silent(made: Recording) -> None:
+    assert examine(made)[1] == ()
+    assert examine(edited(made, force=lambda f: f + np.array([2.0, -1.0, 3.0])))[1] == ()
+
+
+def test_torques_that_are_in_s_are_no_misread_rotations() -> None:
+    (found,) = examine(in_base(recorded("paper", 0), "force"))[1]
+    assert "The torques are in the axes of S" in found.message
+
+
+def test_torques_that_would_fit_badly_in_s_are_only_named() -> None:
+    recording = recorded("paper", 0)
+    size = float(recording.streams[0].channels["torque"].std())
+    wave = 0.17 * size * np.sin(np.linspace(0, 20, len(recording.streams[0])))[:, None]
+    given = in_base(edited(recording, torque=lambda t: t + wave), "force")
+    read, (found, *_) = examine(given)
+    assert found.code == "wrench-unexplained"
+    assert "where the torques are in the axes of S: so read" in found.message
+    assert found.message.endswith("The answer does not assume this.")
+    assert read.streams[0].frames == given.streams[0].frames
+
+
+def test_readings_that_fit_alike_are_all_named_and_none_is_assumed(made: Recording) -> None:
+    wrong = reread(made, lambda R: Rotation.from_rpy(R.rpy()[:, ::-1]))
+    read, (found,) = examine(wrong)
+    assert found.code == "wrench-unexplained"
+    assert "as KUKA's A, B, C" in found.message
+    assert "; or where " in found.message
+    np.testing.assert_array_equal(read.streams[0].channels["rotation"], wrong.streams[0].channels["rotation"])
