@@ -24,7 +24,7 @@ REMEDIES: dict[str, str] = {
     "gains-differ": "Calibrate the sensor, or weigh a known mass in several poses.",
     "base-tilted": "Level the base, or correct [log] gravity to the direction found. If it is level, look for what "
     "pulls one way in the room, as a hose or a spring does: it counts as weight.",
-    "stream-delayed": "Give delay = { value = .., unit = 'ms' } for this stream so that it is not estimated anew.",
+    "stream-delayed": "Give this stream the delay that the message says, so that it is not estimated anew.",
     "imu-rotated": "Give mount = { rotation = .. } for this stream so that it is not estimated anew.",
     "clock-missing": "Record a time column, or give time = { rate = .. }, so that delay and noise can be judged.",
     "rows-duplicated": "Log each sensor sample once; repeated rows were left out.",

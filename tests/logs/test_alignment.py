@@ -30,6 +30,8 @@ def test_three_clocks_and_an_accelerometer_that_is_turned_off_centre_and_late(se
     assert np.degrees((mount.rotation.inverse() @ TURN).angle()) < 0.1
     assert np.allclose(mount.position, ARM, atol=2e-3)
     assert codes(aligned) == {"stream-delayed", "imu-rotated"}
+    remedies = " ".join(f.remedy for f in aligned.findings if f.code == "stream-delayed")
+    assert f"delay = {{ value = {1e3 * aligned.delays_s['imu.csv']:.2f}, unit = 'ms' }}" in remedies
     x = fitted(aligned.log)
     assert x[0] == pytest.approx(float(BODY.mass), rel=6e-3)
     assert np.allclose(x[1:4] / x[0], BODY.com, atol=3e-4)

@@ -106,7 +106,7 @@ def _align_timed(given: Prepared, rates: bool = False) -> Aligned:
         raise CannotAnswer(f"only {counted(int(kept.sum()), 'row')} left after alignment; record a longer stretch.")
     log, motion = _log(given, time[kept], felt.rows(kept), clocks)
     findings = (
-        *say.delay_findings(clocks, delayed, given.felt.stream),
+        *say.delay_findings(clocks, delayed, given.felt.stream, given.recording.streams),
         *say.mount_findings(given.imu, clocks.mounting),
         *say.planar_finding(log.gravity),
         *say.tap_findings(taps, float(given.clock[0]), int(touched.sum()), len(time)),

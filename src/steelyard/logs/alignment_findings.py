@@ -20,9 +20,12 @@ _LOOSE_M, _LOOSE_RAD = 0.1, 0.1
 _THIRD = 0.1  # of its size: below this, gravity hardly sweeps a third direction
 
 
-def delay_findings(clocks: Clocks, names: tuple[str, ...], wrench: str) -> tuple[Finding, ...]:
+def delay_findings(
+    clocks: Clocks, names: tuple[str, ...], wrench: str, streams: Sequence[Stream]
+) -> tuple[Finding, ...]:
     """Return `stream-delayed` for each of the named streams; `wrench` is the one that holds the wrench."""
-    return tuple(_delayed(n, clocks.delays_s[n], clocks.delays_std_s[n], n == wrench) for n in names)
+    moved = {stream.name: stream.moved for stream in streams}
+    return tuple(_delayed(n, clocks.delays_s[n], clocks.delays_std_s[n], n == wrench, moved.get(n, 0.0)) for n in names)
 
 
 def rate_findings(rates: Mapping[str, ClockRate]) -> tuple[Finding, ...]:
@@ -43,15 +46,15 @@ def _parts(share: float) -> str:
     return f"{100 * share:.3g} %" if share >= 1e-3 else f"{1e6 * share:.3g} ppm"
 
 
-def _delayed(name: str, delay: float, std: float, own: bool) -> Finding:
+def _delayed(name: str, delay: float, std: float, own: bool, moved: float) -> Finding:
     size = f"{abs(delay) * 1e3:.2f} ± {std * 1e3:.2f} ms"
+    given = f"delay = {{ value = {1e3 * (delay + moved):.2f}, unit = 'ms' }}"
     if not own:
         side = "late" if delay > 0 else "early"
         text = f"The stamps of '{name}' are {side} by {size} against the wrench (corrected here)."
-        return Finding.of("stream-delayed", text)
+        return Finding("stream-delayed", text, f"Give this stream {given}, so that it is not estimated anew.")
     late, early = ("motion", "wrench") if delay > 0 else ("wrench", "motion")
     text = f"In the rows of '{name}' the {late} is {size} later than the {early} (corrected here)."
-    given = f"delay = {{ value = {1e3 * delay:.2f}, unit = 'ms' }}"
     remedy = f"Describe the motion as a second [[stream]] of this file, with {given}."
     return Finding("stream-delayed", text, remedy)
 
