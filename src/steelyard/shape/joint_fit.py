@@ -17,6 +17,7 @@ from steelyard.check import Array
 from steelyard.shape.depth_images import FACING, pixel_of
 
 _ALIKE = 50.0  # neighbours on the surface whose errors are one: an edge that blurs does so on its whole length
+_PAIRS = 90_000  # of a point and a view that are looked at, about: of many views a share of the points is enough
 _FLOOR = 1e-4  # of the surface: it is known no better [m]
 
 
@@ -31,8 +32,9 @@ def steps_together(
     noise   standard deviation of depth at 1 m
     loose   standard deviations of the poses, [m] and [rad]: how freely a view may leave its pose
     """
-    H, g = _normal_equations(depth, unit, camera, R, p, xyz, normal, xyz.mean(0), window, noise)
-    H, g = H / _ALIKE, g / _ALIKE
+    step = -(-len(xyz) * len(R) // _PAIRS)
+    H, g = _normal_equations(depth, unit, camera, R, p, xyz[::step], normal[::step], xyz.mean(0), window, noise)
+    H, g = H * (step / _ALIKE), g * (step / _ALIKE)
     H[np.diag_indices(len(H))] += np.tile(1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2, len(R))
     steps = np.linalg.solve(H, -g).reshape(-1, 6)
     # All together are free to go anywhere: they stay.
