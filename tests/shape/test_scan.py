@@ -310,3 +310,18 @@ def test_of_skin_on_which_nothing_was_measured_only_what_views_ought_to_see_is_a
     solid = enclose(scan.cloud)
     assert carved(solid, scan.empty, scan.unseen, lambda *_: 0.3).volume_std > 0.3
     assert not carved(solid, scan.empty, scan.unseen, scan.guessed).findings
+
+
+def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
+    """Folds of 3 mm where the table is seen, and none on the box."""
+    views, noisy = box.views, []
+    for k in range(len(views)):
+        v, u = np.mgrid[: SMALL.height, : SMALL.width]
+        z = views.depth[k] * views.depth_unit
+        ray = np.stack([(u - SMALL.cx) / SMALL.fx * z, (v - SMALL.cy) / SMALL.fy * z, z], axis=-1)
+        x, y, h = np.moveaxis(views.X_WC[k].apply(ray.reshape(-1, 3)).reshape(ray.shape), -1, 0)
+        fold = np.where(h < 0.003, 0.003 * np.sin(90 * x) * np.sin(70 * y), 0)
+        noisy.append(np.round((z + fold) / views.depth_unit) * (z > 0))
+    scan = fuse(replace(views, depth=np.array(noisy, np.uint16)))
+    assert "table-uneven" in {finding.code for finding in scan.findings}
+    assert "table-uneven" not in {finding.code for finding in fuse(views).findings}

@@ -38,6 +38,7 @@ _OFF_TABLE = 4.0  # times the depth noise: what is lower may not be told from th
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
+_UNEVEN = 0.7  # times the depth noise: views that spread less have a table that is rougher than their noise
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _TABLE_OFF = 0.003  # of the table in the views, rms [m], from which on poses or camera are said to be wrong
 _STILL = 1e-9  # move of a camera that is none [m]
@@ -290,6 +291,8 @@ def _findings(
         )
     if far or level.lens or (placed and placed.at_wrist):
         found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
+    if disagree < _UNEVEN:
+        found.append(_rough_table(scene, disagree))
     if cut := cut_off(scene, surface.xyz, surface.normal):
         found.append(cut)
     # What is cut off has no surface for that reason.
@@ -303,6 +306,15 @@ def _findings(
             )
         )
     return tuple(found)
+
+
+def _rough_table(scene: Scene, disagree: float) -> Finding:
+    rough, noise = 1e3 * scene.sigma, 1e3 * scene.sigma * disagree
+    text = (
+        f"The table is not flat: views leave {rough:.2g} mm (rms) about its plane, but spread {noise:.2g} mm about the "
+        "object. The underside is closed on that plane, some of the roughness too high or too low."
+    )
+    return Finding.of("table-uneven", text)
 
 
 def _few_seen(share: float, views: int) -> tuple[Finding, ...]:
