@@ -51,6 +51,7 @@ REMEDIES: dict[str, str] = {
     "cloud-thinned": "Nothing to do; give fewer points if you want to choose them yourself.",
     "cloud-noisy": "Nothing to do; points with less noise show thinner walls.",
     "table-in-cloud": "Cut the table's points away, or give the views to `steelyard scan`, which finds the table.",
+    "table-uneven": "Scan on a flat, hard surface, without a cloth: gaps over its folds count as solid.",
     "normals-flipped": "Turn the normals outward, or leave them out so that they are found.",
     "parts-overlap": "Cut one part out of the other, so that they only touch and no volume counts twice.",
     "part-unseen": "Nothing to do if the part is hidden inside; give its shape, since no scan can see it.",

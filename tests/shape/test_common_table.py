@@ -127,5 +127,5 @@ def test_a_scan_with_a_wrong_hand_eye_pose_keeps_its_volume() -> None:
     assert found.moved_m is not None
     assert found.disagree < 1.6
     assert [finding.code for finding in found.findings] == ["views-disagree"]
-    assert "A camera that sits 4.8 mm and 1 degrees from where its pose at the wrist says" in found.findings[0].message
+    assert "A camera that sits 4.7 mm and 1 degrees from where its pose at the wrist says" in found.findings[0].message
     assert volume(found) == pytest.approx(volume(fuse(pliers().views)), rel=0.1)

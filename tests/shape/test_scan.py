@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.shape.carving import carved
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import fuse
@@ -280,3 +281,47 @@ def test_impossible_views(change: dict[str, object], message: str) -> None:
 def test_impossible_lenses(wrong: dict[str, float]) -> None:
     with pytest.raises(BadValue, match="the camera's"):
         replace(SMALL, **wrong)
+
+
+def test_a_tunnel_that_too_few_views_look_into_is_named_and_its_volume_is_unsure() -> None:
+    long, half, wall = 0.075, 0.025, 0.006
+    across, high = (-half, half), (0, 2 * half)
+    tunnel = mesh_of(
+        block((-long, long), across, (0, wall)),
+        block((-long, long), across, (2 * half - wall, 2 * half)),
+        block((-long, long), (-half, wall - half), high),
+        block((-long, long), (half - wall, half), high),
+    )
+    true = 2 * long * ((2 * half) ** 2 - (2 * half - 2 * wall) ** 2)
+    solid = shape_of(fuse(scan_mesh(tunnel, 1, count=24, intrinsics=SMALL, X_WO=LIES).views)).solid
+    assert solid.mesh.volume > 1.2 * true
+    assert solid.mesh.volume * (1 - 2.5 * solid.volume_std) < true
+    said = [finding.message for finding in solid.findings if finding.code == "surface-open"]
+    assert len(said) == 1
+    assert "no view measured a surface" in said[0]
+
+
+def test_of_skin_on_which_nothing_was_measured_only_what_views_ought_to_see_is_a_guess(box: Scanned) -> None:
+    scan = fuse(box.views)
+    middles = np.array([[0, 0, 0.03], [0, 0, 0.06], [0, 0, 0.0], [0, 0, 0.06]])
+    areas = 1e-4 * np.array([[0, 0, 3.0], [0, 0, 1.0], [0, 0, 9.0], [0, 0, -9.0]])
+    assert scan.guessed(middles, areas) == pytest.approx(0.25)
+    assert scan.guessed(middles[2:], areas[2:]) == 0.0
+    solid = enclose(scan.cloud)
+    assert carved(solid, scan.empty, scan.unseen, lambda *_: 0.3).volume_std > 0.3
+    assert not carved(solid, scan.empty, scan.unseen, scan.guessed).findings
+
+
+def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
+    """Folds of 3 mm where the table is seen, and none on the box."""
+    views, noisy = box.views, []
+    for k in range(len(views)):
+        v, u = np.mgrid[: SMALL.height, : SMALL.width]
+        z = views.depth[k] * views.depth_unit
+        ray = np.stack([(u - SMALL.cx) / SMALL.fx * z, (v - SMALL.cy) / SMALL.fy * z, z], axis=-1)
+        x, y, h = np.moveaxis(views.X_WC[k].apply(ray.reshape(-1, 3)).reshape(ray.shape), -1, 0)
+        fold = np.where(h < 0.003, 0.003 * np.sin(90 * x) * np.sin(70 * y), 0)
+        noisy.append(np.round((z + fold) / views.depth_unit) * (z > 0))
+    scan = fuse(replace(views, depth=np.array(noisy, np.uint16)))
+    assert "table-uneven" in {finding.code for finding in scan.findings}
+    assert "table-uneven" not in {finding.code for finding in fuse(views).findings}

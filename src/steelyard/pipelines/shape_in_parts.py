@@ -106,7 +106,7 @@ def shape_of(
     """
     if isinstance(seen, Views):
         seen = fuse(seen)
-    solid = carved(enclose(seen.cloud), seen.empty, seen.unseen) if isinstance(seen, Scan) else _enclosed(seen)
+    solid = _carved(seen) if isinstance(seen, Scan) else _enclosed(seen)
     if refill is not None:
         mesh = refill(solid.mesh)
         solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)), around=None, inside=None)
@@ -116,6 +116,10 @@ def shape_of(
     made = segment(cloud, solid, parts=parts)
     scan, given = (seen, seen.cloud) if isinstance(seen, Scan) else (None, seen)
     return Shape(solid, made, scan, parts is not None, _notes(given))
+
+
+def _carved(scan: Scan) -> Solid:
+    return carved(enclose(scan.cloud), scan.empty, scan.unseen, scan.guessed)
 
 
 def _enclosed(cloud: Cloud) -> Solid:

@@ -15,6 +15,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import slid
 from steelyard.shape.depth_images import FACING, pixel_of
+from steelyard.shape.joint_fit import steps_together
 from steelyard.shape.scene import (
     LEAST_VIEWS,
     WINDOW,
@@ -27,12 +28,14 @@ from steelyard.shape.scene import (
     surfels,
 )
 from steelyard.shape.thinning import spread_to
+from steelyard.spatial import Rotation
 
 _STEPS = 3
 _POSE_STD = (0.01, np.radians(2.0))  # how far reported poses may be off [m, rad]
 _APART = 0.8  # of the depth noise: views that one fit moves apart by less are left where they are, rms
 _NEARBY = 0.001  # views that one fit moves apart by less need no search [m], rms
-_FINE = (0.006, 0.006, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
+_FINE = (0.006, 0.006, 0.003, 0.003, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
+_TOGETHER = 0.003  # in rounds of that and less all views step at once: farther off, one side may pass for another [m]
 _WINDOWS = (0.012, 0.012, *_FINE)
 _FAR = (0.02, 0.02, 0.02, *_WINDOWS)
 _MODEL = 2500  # points that views are fitted to
@@ -169,9 +172,18 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
 def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
     """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
     for window in windows:
-        scene.R, scene.p, *_ = _fit(scene, seen, window)
+        scene.R, scene.p, xyz, normal = _fit(scene, seen, window)
+        if window <= _TOGETHER:
+            steps = steps_together(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+            scene.R, scene.p = _stepped(scene.R, scene.p, xyz.mean(0), steps)
         seen = Seen.by(scene)
     return seen
+
+
+def _stepped(R: Array, p: Array, middle: Array, steps: Array) -> tuple[Array, Array]:
+    """Return poses (V, 3, 3), (V, 3) after steps (V, 6), turns [rad] about `middle` (3,) and shifts [m]."""
+    turn = np.asarray(Rotation.exp(steps[:, :3]).matrix)
+    return turn @ R, middle + np.einsum("vij,vj->vi", turn, p - middle) + steps[:, 3:]
 
 
 def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array, Array]:

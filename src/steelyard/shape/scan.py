@@ -25,7 +25,7 @@ from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, followed, lost_share, scene_of, surface_of, surfels
 from steelyard.shape.spacing import Neighbours
 from steelyard.shape.thinning import in_cubes, spread, spread_to
-from steelyard.shape.underside import Underside, closed_below
+from steelyard.shape.underside import DOWNWARD, Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.shape.working_cloud import in_small_pieces
@@ -34,9 +34,11 @@ from steelyard.spatial import Pose, Rotation
 POINTS = 3000  # of the cloud, about
 _CELLS = 8000  # of the grid under the object, about
 _CLEAR = 3.0  # times the depth noise: what is measured higher than this above the table is not the table
+_OFF_TABLE = 4.0  # times the depth noise: what is lower may not be told from the table
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
+_UNEVEN = 0.7  # times the depth noise: views that spread less have a table that is rougher than their noise
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _TABLE_OFF = 0.003  # of the table in the views, rms [m], from which on poses or camera are said to be wrong
 _STILL = 1e-9  # move of a camera that is none [m]
@@ -60,6 +62,8 @@ class Scan:
     findings   what you must know
     stages     CPU time of each step [s]
     empty      whether points (N, 3) of W are known to be outside the object
+    guessed    share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles in W, on which no view measured
+               a surface; of what stands clear of the table and does not face it
     """
 
     cloud: Cloud
@@ -74,6 +78,7 @@ class Scan:
     findings: tuple[Finding, ...]
     stages: dict[str, float]
     empty: Callable[[Array], Any] = field(repr=False)
+    guessed: Callable[[Array, Array], float] = field(repr=False)
 
     @property
     def unseen(self) -> float:
@@ -112,7 +117,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
-        empty=_empty(scene, bottom),
+        empty=_empty(scene, bottom), guessed=_guessed(scene),
     )  # fmt: skip
 
 
@@ -248,6 +253,20 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
     return empty
 
 
+def _guessed(scene: Scene) -> Callable[[Array, Array], float]:
+    back = scene.X_WT.inverse()
+
+    def guessed(middles: Array, areas: Array) -> float:
+        at, size = back.apply(middles), np.linalg.norm(areas, axis=1)
+        clear = at[:, 2] > _OFF_TABLE * scene.sigma
+        clear &= back.rotation.apply(areas)[:, 2] > DOWNWARD * size
+        at, size = at[clear], size[clear]
+        bare = sight_lines.sights(*scene.images(), at, scene.noise)[:, 1] < 1
+        return float(size[bare].sum() / size.sum()) if len(at) else 0.0
+
+    return guessed
+
+
 def _findings(
     scene: Scene, surface: _Surface, level: _Level, placed: Placement | None, mistake: Callable[[], str]
 ) -> tuple[Finding, ...]:
@@ -272,6 +291,8 @@ def _findings(
         )
     if far or level.lens or (placed and placed.at_wrist):
         found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
+    if disagree < _UNEVEN:
+        found.append(_rough_table(scene, disagree))
     if cut := cut_off(scene, surface.xyz, surface.normal):
         found.append(cut)
     # What is cut off has no surface for that reason.
@@ -285,6 +306,15 @@ def _findings(
             )
         )
     return tuple(found)
+
+
+def _rough_table(scene: Scene, disagree: float) -> Finding:
+    rough, noise = 1e3 * scene.sigma, 1e3 * scene.sigma * disagree
+    text = (
+        f"The table is not flat: views leave {rough:.2g} mm (rms) about its plane, but spread {noise:.2g} mm about the "
+        "object. The underside is closed on that plane, some of the roughness too high or too low."
+    )
+    return Finding.of("table-uneven", text)
 
 
 def _few_seen(share: float, views: int) -> tuple[Finding, ...]:

@@ -24,7 +24,7 @@ from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene
 
 _WALL = 0.5  # a normal less upright than this belongs to a wall
 _FOOT, _HIGHEST_FOOT = 0.0005, 0.008  # steps in which the end of a wall is sought, and how far up [m]
-_DOWNWARD = -0.35  # a normal that points down by more than this belongs to an underside that was seen
+DOWNWARD = -0.35  # a normal that points down by more than this belongs to an underside that was seen
 _TAUT = 1e-3  # weight of the underside's slope beside its bending
 _STEEPER = 1.3  # than the lowest sight line: a slope that is the object's own, not the edge of what was seen
 
@@ -151,7 +151,7 @@ def underside(
     """
     under = np.isfinite(empty_to) & (empty_to < top)
     cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
-    down = cell[normal[:, 2] < _DOWNWARD]
+    down = cell[normal[:, 2] < DOWNWARD]
     seen = np.zeros(under.shape, np.bool_)
     down = down[((down >= 0) & (down < under.shape)).all(1)]
     seen[down[:, 0], down[:, 1]] = True

@@ -1,0 +1,46 @@
+"""Views fitted to each other all at once: what they have wrong alike is found too."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from steelyard.shape.common_table import levelled
+from steelyard.shape.joint_fit import steps_together
+from steelyard.shape.registration import Seen, agreed
+from steelyard.shape.scene import Scene, scene_of
+from steelyard.simulate.scanning import scan_mesh
+from steelyard.spatial import Pose, Rotation
+from steelyard.workshop.catalogue import build
+from steelyard.workshop.finish import painted
+
+
+def apart(scene: Scene, true: Pose) -> float:
+    """Return how far the views have what lies under the cameras apart, rms [m]."""
+    error = Pose(Rotation.nearest(scene.R), scene.p) @ (scene.X_WT.inverse() @ true).inverse()
+    return float(np.sqrt(error.apply(np.zeros(3)).var(0).sum()))
+
+
+@pytest.mark.parametrize("tool", ["box-wrench", "hammer"])
+def test_a_camera_askew_at_the_wrist_no_longer_swells_what_it_sees(tool: str) -> None:
+    """All views have the object too near by as much: one by one they went a third of the way in four rounds."""
+    views = scan_mesh(painted(build(tool)), 0, count=36).views
+    askew = Pose(Rotation.exp(np.array([0.004, 0.002, 0.0])), np.array([0.0, 0.0, 0.002]))
+    scene = scene_of(views.posed(views.X_WC @ askew))
+    off = levelled(scene) or 0.0
+    assert apart(scene, views.X_WC) > 1.2e-3
+    agreed(scene, Seen.by(scene), off)
+    assert apart(scene, views.X_WC) < 0.3e-3
+
+
+def test_views_that_agree_stay_and_two_that_do_not_meet_in_the_middle() -> None:
+    depth = np.full((2, 40, 40), 500, np.uint16)
+    lens = np.array([40.0, 40.0, 19.5, 19.5])
+    down = np.tile(np.diag([1.0, -1.0, -1.0]), (2, 1, 1))
+    x, y = (0.02 * (np.mgrid[:20, :20] - 9.5)).reshape(2, -1)
+    xyz, normal = np.stack([x, y, 0 * x], axis=1), np.tile([0.0, 0.0, 1.0], (400, 1))
+    for apart_m in (0.0, 0.002):
+        p = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5 + apart_m]])
+        steps = steps_together(depth, 1e-3, lens, down, p, xyz, normal, 0.01, 1e-3, (0.01, 0.03))
+        assert steps[:, 5] == pytest.approx([apart_m / 2, -apart_m / 2], abs=5e-5)
+        assert np.abs(np.delete(steps, 5, axis=1)).max() < 1e-4
