@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from steelyard.shape.common_table import levelled
-from steelyard.shape.joint_fit import steps_together
+from steelyard.shape.joint_registration import steps_together
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import Scene, scene_of
 from steelyard.simulate.scanning import scan_mesh

@@ -15,7 +15,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import slid
 from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.joint_fit import steps_together
+from steelyard.shape.joint_registration import steps_together
 from steelyard.shape.scene import (
     LEAST_VIEWS,
     WINDOW,
