@@ -116,6 +116,41 @@ def test_columns_without_their_names_stand_in_order(tmp_path: Path) -> None:
     np.testing.assert_array_equal(found["rotation"], expected["rotation"])
 
 
+def test_names_may_have_a_prefix_or_stand_in_a_path(tmp_path: Path) -> None:
+    expected = read_recording(write(tmp_path)).streams[1].channels
+    for named in ("left_{}", "/joint_states/{}/position"):
+        toml = TOML
+        for name in JOINTS:
+            toml = toml.replace(f'"{name}"', f'"{named.format(name)}"')
+        path = write(tmp_path, toml)
+        header, _, rows = (tmp_path / "log.csv").read_text().partition("\n")
+        header = ",".join(named.format(c) if c in JOINTS else c for c in header.split(","))
+        (tmp_path / "log.csv").write_text(f"{header}\n{rows}")
+        found = read_recording(path).streams[1].channels
+        np.testing.assert_array_equal(found["rotation"], expected["rotation"])
+
+
+def test_a_name_that_is_misspelt_is_not_taken_by_its_place(tmp_path: Path) -> None:
+    path = write(tmp_path, TOML.replace('"elbow"', '"elbw"'))
+    (tmp_path / "log.csv").write_text((tmp_path / "log.csv").read_text().replace("elbow", "elbw"))
+    assert "columns are named after joints, but not one after each of the arm's" in message(path)
+
+
+def test_a_urdf_that_xacro_wrote(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    (tmp_path / "arm.urdf").write_text(urdf().replace("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" '))
+    assert len(read_recording(path).streams) == 2
+
+
+def test_a_sliding_joint_is_in_metres_whatever_the_unit_of_angles(tmp_path: Path) -> None:
+    path = write(tmp_path, TOML.replace('"tool0"', '"tip"\nbase_link = "tool0"').replace(f"[{ALL}]", '["finger"]'))
+    header, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    rows = [f"{row},{k / 100}" for k, row in enumerate(rows)]
+    (tmp_path / "log.csv").write_text("\n".join([f"{header},finger", *rows]) + "\n")
+    found = read_recording(path).streams[1].channels["position"][:, 2]
+    np.testing.assert_allclose(found, 0.1 + 0.01 * np.arange(len(rows)), atol=1e-12)
+
+
 def test_the_mass_of_a_log_of_joints(tmp_path: Path) -> None:
     estimate = sy.identify(write(tmp_path))
     assert abs(estimate.mass - MASS) < 0.01
@@ -127,7 +162,8 @@ ALL = ", ".join(f'"{name}"' for name in ("wrist_1", "wrist_2", "wrist_3", "shoul
 LINKS = "Links here: a, b, base, c, d, e, f, tip, tool0, world."
 WRONG = {
     "radians": ('unit = "deg" }', 'unit = "rad" }', f'{STREAM}, joint_position: joints turn by up to LARGEST rad, more than two turns. They are probably in degrees: set unit = "deg".'),
-    "one too few": (f"[{ALL}]", '["wrist_1"]', f"{STREAM}, joint_position: the arm has 6 joints from base to sensor ({', '.join(JOINTS)}); 1 columns are given. Give theirs in this order, or columns with their names."),
+    "one too few": (f"[{ALL}]", '["wrist_1"]', f"{STREAM}, joint_position: columns are named after joints, but not one after each of the arm's: {', '.join(JOINTS)}. Named are wrist_1."),
+    "others, too few": (f"[{ALL}]", '["fx", "fy"]', f"{STREAM}, joint_position: the arm has 6 joints from base to sensor ({', '.join(JOINTS)}); 2 columns are given. Give theirs in this order, or columns with their names."),
     "no arm": ('[robot]\nurdf = "arm.urdf"\nsensor_link = "tool0"\n', "", f'{STREAM}: "joint_position" needs the arm. Add [robot] with urdf = "arm.urdf" and sensor_link = ".."; or give the orientation of the sensor, as rotation = {{ columns = [..], form = .. }}.'),
     "no link": ('sensor_link = "tool0"\n', "", 'log.toml, [robot]: "sensor_link" is missing. Example: sensor_link = "tool0"'),
     "other link": ('"tool0"', '"tool"', f'DIR/arm.urdf: there is no link "tool". Did you mean "tool0"? {LINKS}'),
@@ -153,13 +189,14 @@ def test_wrong_descriptions(tmp_path: Path, old: str, new: str, said: str) -> No
 
 FILES = {
     "no XML": ("<robot", "<<robot", "DIR/arm.urdf: expected a URDF; this is not valid XML (not well-formed (invalid token): line 2, column 1)."),
-    "xacro": ("<robot ", '<robot xmlns:xacro="http://ros.org/wiki/xacro" ', "DIR/arm.urdf: this is a xacro, not a URDF yet. Write it out first: xacro arm.urdf > arm.urdf"),
+    "xacro": ("<robot ", '<xacro:property name="a" value="b"/><robot ', "DIR/arm.urdf: this is a xacro, not a URDF yet. Write it out first: xacro arm.urdf > arm.urdf"),
     "entities": ("<robot ", '<!DOCTYPE r [<!ENTITY a "b">]>\n<robot ', "DIR/arm.urdf: defines entities, which no URDF needs and which may unpack to any size. Remove them."),
     "SDF": ("robot", "sdf", "DIR/arm.urdf: expected a URDF, whose root is <robot>; found <sdf>."),
     "two numbers": ('xyz="0.0 0 0.8"', 'xyz="0.0 0.8"', 'DIR/arm.urdf: joint "stand" needs three numbers as xyz; got "0.0 0.8".'),
-    "planar joint": ('"stand" type="fixed"', '"stand" type="planar"', 'DIR/arm.urdf: joint "stand" is of type "planar". Read are revolute, continuous, prismatic, fixed.'),
+    "planar joint": ('"stand" type="fixed"', '"stand" type="planar"', 'DIR/arm.urdf: joint "stand" is of type "planar". Read are revolute, continuous, prismatic, fixed; name a base_link behind it.'),
     "no axis": ('<axis xyz="0 0 2"/><limit', '<axis xyz="0 0 0"/><limit', 'DIR/arm.urdf: joint "wrist_3" has an axis of length zero.'),
     "circle": ('<parent link="world"/>', '<parent link="f"/>', 'DIR/arm.urdf: the joints before link "tool0" go round in a circle.'),
+    "carried twice": ('<child link="tip"/>', '<child link="tool0"/>', 'DIR/arm.urdf: joints "flange" and "finger" both carry "tool0".'),
     "no child": ('<child link="tool0"/>', "", 'DIR/arm.urdf: joint "flange" names no child link.'),
 }  # fmt: skip
 

@@ -10,14 +10,16 @@ import numpy as np
 import pytest
 from rosbags import rosbag1, rosbag2
 from rosbags.rosbag2.enums import StoragePlugin
-from rosbags.typesys import Stores, get_typestore
+from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
 import steelyard as sy
 from steelyard.errors import BadInput, MissingDependency
 from steelyard.io.log_files import read_recording
+from steelyard.io.tables import open_table
 from steelyard.spatial import Pose, Rotation
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
+WRENCH, POSE, TF = "geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"
 START = 1_700_000_000_000_000_000  # ns since 1970
 Message = tuple[str, str, int, Any]  # topic, type, time of receipt, message
 
@@ -48,13 +50,13 @@ class Maker:
         place = kind(self.vector(pose.position, "Point"), self.quaternion(pose.rotation))
         return self.types["geometry_msgs/msg/PoseStamped"](self.header(stamp, "base"), place)
 
-    def transforms(self, stamp: int, poses: dict[tuple[str, str], Pose]) -> Any:
+    def transforms(self, stamp: int, poses: dict[tuple[str, str], Pose], named: str = TF) -> Any:
         kind, transform = self.types["geometry_msgs/msg/TransformStamped"], self.types["geometry_msgs/msg/Transform"]
         each = [
             kind(self.header(stamp, parent), child, transform(self.vector(p.position), self.quaternion(p.rotation)))
             for (parent, child), p in poses.items()
         ]
-        return self.types["tf2_msgs/msg/TFMessage"](each)
+        return self.types[named](each)
 
 
 def write_bag(path: Path, messages: Sequence[Message], plugin: StoragePlugin = StoragePlugin.MCAP) -> Path:
@@ -71,7 +73,6 @@ def write_bag(path: Path, messages: Sequence[Message], plugin: StoragePlugin = S
     return path
 
 
-WRENCH, POSE, TF = "geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"
 MASS, COM = 1.2, np.array([0.01, -0.02, 0.09])
 
 
@@ -179,43 +180,100 @@ def test_a_pose_out_of_transforms(tmp_path: Path) -> None:
 
 
 def _table(path: Path, frames: tuple[str, str]) -> Any:
-    from steelyard.io.tables import open_table
-
     return open_table(path, "/tf", frames)
 
 
-def test_lists_are_called_by_the_names_that_messages_give(tmp_path: Path) -> None:
-    from steelyard.io.tables import open_table
+def joints(stamp: int, names: Sequence[str], numbers: Sequence[float]) -> Message:
+    kind, own = "sensor_msgs/msg/JointState", Maker(ROS2).header(stamp, "")
+    values = np.array(numbers, np.float64)
+    return "/joints", kind, START + stamp, ROS2.types[kind](own, list(names), values, np.zeros(0), -values)
 
-    maker, kind = Maker(ROS2), "sensor_msgs/msg/JointState"
-    out: list[Message] = [
-        (
-            "/joints",
-            kind,
-            START + n,
-            ROS2.types[kind](maker.header(n, ""), ["a", "b"], *(np.array([n, -n], np.float64),) * 3),
-        )
-        for n in range(1, 4)
-    ]
-    write_bag(tmp_path / "run", out)
+
+def test_lists_are_called_by_the_names_that_messages_give(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", [joints(n, ("a", "b"), (n, 2 * n)) for n in range(1, 4)])
     table = open_table(tmp_path / "run", "/joints")
     names = table.header.names or ()
-    assert names[:4] == ("stamp", "received", "position[a]", "position[b]")
-    assert table.header.groups["effort"] == (6, 7)
-    read = table.read([0, 1, 3, 6], (0, 1))
-    assert [read[n].tolist() for n in (0, 1, 3, 6)] == [
-        [1, 2, 3],
-        [START + n for n in (1, 2, 3)],
-        [-1, -2, -3],
-        [1, 2, 3],
+    assert names == ("stamp", "received", "position[a]", "position[b]", "effort[a]", "effort[b]")
+    assert table.header.groups == {"position": (2, 3), "effort": (4, 5)}
+    read = table.read([0, 1, 3, 4], (0, 1))
+    assert [read[n].tolist() for n in (0, 1)] == [[1, 2, 3], [START + n for n in (1, 2, 3)]]
+    assert [read[n].tolist() for n in (3, 4)] == [[2, 4, 6], [-1, -2, -3]]
+
+
+def test_publishers_take_turns_on_a_topic(tmp_path: Path) -> None:
+    """A gripper between messages of the arm, names in another order, and nothing at first."""
+    out = [joints(1, (), ()), joints(2, ("a", "b"), (1, 2)), joints(3, ("grip",), (9,)), joints(4, ("b", "a"), (4, 3))]
+    write_bag(tmp_path / "run", out)
+    table = open_table(tmp_path / "run", "/joints")
+    place = {name: n for n, name in enumerate(table.header.names or ())}
+    read = table.read([0, place["position[a]"], place["position[b]"]], (0,))
+    assert [column.tolist() for column in read.values()] == [[2, 4], [1, 3], [2, 4]]
+    assert table.read([place["position[grip]"]])[place["position[grip]"]].tolist() == [9]
+
+
+def test_without_stamps_the_time_of_receipt_counts(tmp_path: Path) -> None:
+    maker = Maker(ROS2)
+    out: list[Message] = [("/ft", WRENCH, START + n, maker.wrench(0, (n, 0, 0), (0, 0, 0))) for n in range(3)]
+    out += [
+        ("/tf", TF, START + n, maker.transforms(0, {("base", "tool"): Pose(Rotation.identity(), np.full(3, n))}))
+        for n in range(3)
     ]
+    write_bag(tmp_path / "run", out)
+    for table in (open_table(tmp_path / "run", "/ft"), _table(tmp_path / "run", ("base", "tool"))):
+        assert table.read([0], (0,))[0].tolist() == [START, START + 1, START + 2]
+
+
+def test_a_stamp_of_zero_among_others_is_one(tmp_path: Path) -> None:
+    out: list[Message] = [("/ft", WRENCH, START + n, Maker(ROS2).wrench(n, (n, 0, 0), (0, 0, 0))) for n in range(3)]
+    write_bag(tmp_path / "run", out)
+    assert open_table(tmp_path / "run", "/ft").read([0], (0,))[0].tolist() == [0, 1, 2]
+
+
+@pytest.mark.parametrize("kind", ["tf2_msgs/msg/TFMessage", "tf/msg/tfMessage"])
+def test_transforms_of_ros_1(tmp_path: Path, kind: str) -> None:
+    if kind not in ROS1.fielddefs:
+        ROS1.register(get_types_from_msg("geometry_msgs/TransformStamped[] transforms", kind))
+    out: list[Message] = []
+    for n in range(3):
+        pose = Pose(Rotation.exp([0.0, 0.0, 0.1 * n]), np.array([0.0, 0.0, n]))
+        told = Maker(ROS1).transforms(START + n, {("/base", "/tool"): pose}, kind)
+        out.append(("/tf", kind, START + n, told))
+    write_bag(tmp_path / "run.bag", out)
+    assert _table(tmp_path / "run.bag", ("base", "tool")).read([3])[3].tolist() == [0, 1, 2]
+
+
+def test_frames_beside_the_way_do_not_matter(tmp_path: Path) -> None:
+    """A camera with two parents, and the fixed copy of a frame that moves."""
+    maker = Maker(ROS2)
+    bad = Pose(Rotation.identity(), np.array([9.0, 9.0, 9.0]))
+    out: list[Message] = [("/tf_static", TF, START, maker.transforms(0, {("base", "tool"): bad}))]
+    for n in range(3):
+        pose = Pose(Rotation.identity(), np.array([0.0, 0.0, n]))
+        told = {("base", "tool"): pose, ("tool", "camera"): bad, ("base", "camera"): bad}
+        out.append(("/tf", TF, START + n, maker.transforms(START + n, told)))
+    write_bag(tmp_path / "run", out)
+    assert _table(tmp_path / "run", ("base", "tool")).read([3])[3].tolist() == [0, 1, 2]
+    with pytest.raises(BadInput, match='frame "camera" has two parents, "tool" and "base"'):
+        _table(tmp_path / "run", ("base", "camera")).read([3])
+
+
+def test_a_folder_without_its_metadata(tmp_path: Path) -> None:
+    write_bag(tmp_path / "run", log_of(Maker(ROS2), 20)[0])
+    (tmp_path / "run" / "metadata.yaml").unlink()
+    said = "DIR/run: the folder of a bag, without its metadata.yaml. Name the file in it: run.mcap"
+    assert message(describe(tmp_path, "run")) == said
+
+
+def test_the_example_of_a_bag_with_joints_alone(tmp_path: Path) -> None:
+    out = [m for m in log_of(Maker(ROS2), 20)[0] if m[0] == "/ft"]
+    write_bag(tmp_path / "run", [*out, joints(1, ("a",), (1,))])
+    said = message(tmp_path / "run")
+    assert 'topic    = "/joints"\njoint_position = { columns = ["position"], unit = "rad" }\n' in said
+    assert said.endswith('[robot]\nurdf        = "arm.urdf"   # put the file of your arm here\nsensor_link = "ft"\n')
 
 
 STREAM = 'log.toml, [[stream]] 1 ("run")'
-TOPICS = (
-    "Topics here: /ft (geometry_msgs/msg/WrenchStamped, 20 messages), "
-    "/pose (geometry_msgs/msg/PoseStamped, 20 messages)."
-)
+TOPICS = "Topics here: /ft (20 WrenchStamped), /pose (20 PoseStamped)."
 EXAMPLE = """\
 [log]
 gravity = [0, 0, -9.81]      # in the world frame W, m/s^2
@@ -239,7 +297,8 @@ WRONG = {
     "no topic": (
         'topic = "/ft"\n',
         "",
-        f"DIR/run: a bag needs a description that says which topic is what. {TOPICS} For example:\n{EXAMPLE}",
+        f"DIR/run: a bag needs a description that says which topic is what. {TOPICS} "
+        f"Write one beside the bag, for example:\n{EXAMPLE}",
     ),
     "other field": (
         '"wrench.force"',
@@ -289,7 +348,7 @@ def test_garbage_is_no_bag(tmp_path: Path) -> None:
         (tmp_path / name).write_bytes(b"\x89MCAP0\r\n" + bytes(99))
         said = message(describe(tmp_path, name))
         assert said.startswith(f"DIR/{name}: cannot be read as a bag (")
-        assert said.endswith("). Record or convert it again.")
+        assert "). What a recorder that was killed leaves, `ros2 bag reindex`, " in said
 
 
 def test_a_bag_that_ends_early_is_named(tmp_path: Path) -> None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -13,53 +14,75 @@ from steelyard.errors import BadDescription, BadValue
 from steelyard.io.entries import listed
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
 from steelyard.io.tables import Table, choose_columns
+from steelyard.io.units import ANGLE
 from steelyard.logs.recording import Stream
 from steelyard.robots.serial import SerialArm
 
-_TURNS = 4 * np.pi  # [rad] two turns: more than joints of an arm make, less than degrees of a log for identification
+_TURNS = 4 * np.pi  # [rad] two turns: more than joints of an arm make, less than degrees of such a log are
 _IN_BRACKETS = re.compile(r"\[([^\]]+)\]$")
 
 
-def posed(spec: StreamSpec, table: Table, stream: Stream, arm: SerialArm) -> Stream:
-    """Return the stream with its joint positions (N, k) as `rotation` and `position` of the sensor in the base.
+def with_joints_in_order(spec: StreamSpec, table: Table, arm: SerialArm) -> StreamSpec:
+    """Return the stream with one column per joint of the arm, from base to sensor; raises BadDescription."""
+    quantities = tuple(
+        replace(q, columns=_columns(q, table, arm)) if q.name == "joint_position" else q for q in spec.quantities
+    )
+    return replace(spec, quantities=quantities)
 
-    Raises BadDescription where the columns are not those of the arm, BadValue where their unit is another.
+
+def posed(spec: StreamSpec, stream: Stream, arm: SerialArm) -> Stream:
+    """Return the stream with the positions (N, n) of the arm's joints as `rotation` and `position` of the sensor in W.
+
+    Raises BadValue where their unit is another.
     """
     quantity = next((q for q in spec.quantities if q.name == "joint_position"), None)
     if quantity is None:
         return stream
-    positions = stream.channels["joint_position"][:, _places(quantity, table, arm)]
-    _require_likely(quantity, positions, arm)
+    sliding = np.array([joint.kind == "prismatic" for joint in arm.moving])
+    positions = stream.channels["joint_position"] / np.where(sliding, ANGLE[quantity.unit], 1.0)
+    _require_likely(quantity, positions[:, ~sliding])
     pose = arm.pose(positions)
     kept = {name: values for name, values in stream.channels.items() if name != "joint_position"}
     found = {"rotation": pose.rotation.matrix, "position": pose.position}
     return replace(stream, channels=kept | {name: check.frozen(values) for name, values in found.items()})
 
 
-def _places(spec: QuantitySpec, table: Table, arm: SerialArm) -> list[int]:
-    """Return which of the columns holds each joint: by its name where all are named, else as they stand."""
+def _columns(spec: QuantitySpec, table: Table, arm: SerialArm) -> tuple[int, ...]:
+    """Return the column of each joint: by its name where columns have names of joints, else as they stand."""
     numbers = choose_columns(table.header, spec.columns, None, spec.where)
-    names = [_joint_name(table.header.names[n]) for n in numbers] if table.header.names else []
+    names = table.header.names
+    labels = [_label(names[n]) for n in numbers] if names else []
     joints = [joint.name for joint in arm.moving]
-    if set(joints) <= set(names):
-        return [names.index(joint) for joint in joints]
+    found = [_places(joint, labels) for joint in joints]
+    if all(len(places) == 1 for places in found) and len({places[0] for places in found}) == len(joints):
+        return tuple(numbers[places[0]] for places in found)
+    if any(found) or (names and any(label != names[n] for label, n in zip(labels, numbers, strict=True))):
+        raise BadDescription(
+            f"{spec.where}: columns are named after joints, but not one after each of the arm's: {listed(joints)}. "
+            f"Named are {listed(labels)}."
+        )
     if len(numbers) != len(joints):
         raise BadDescription(
             f"{spec.where}: the arm has {len(joints)} joints from base to sensor ({listed(joints)}); {len(numbers)} "
             "columns are given. Give theirs in this order, or columns with their names."
         )
-    return list(range(len(joints)))
+    return numbers
 
 
-def _joint_name(column: str) -> str:
-    """Return the joint that a column is called by: "position[elbow]" and "elbow" are those of the elbow."""
+def _label(column: str) -> str:
+    """Return what a column is called by: "position[elbow]" by "elbow", "q[0]" as it stands."""
     inside = _IN_BRACKETS.search(column)
-    return inside.group(1) if inside else column
+    return inside.group(1) if inside and not inside.group(1).isdigit() else column
 
 
-def _require_likely(spec: QuantitySpec, positions: Array, arm: SerialArm) -> None:
-    turning = [k for k, joint in enumerate(arm.moving) if joint.kind == "revolute"]
-    largest = float(np.abs(positions[:, turning]).max(initial=0.0))
+def _places(joint: str, labels: Sequence[str]) -> list[int]:
+    """Return which labels are a joint's name; if none is, which hold it beside a prefix or within a path."""
+    exact = [k for k, label in enumerate(labels) if label == joint]
+    return exact or [k for k, label in enumerate(labels) if joint in label]
+
+
+def _require_likely(spec: QuantitySpec, angles: Array) -> None:
+    largest = float(np.abs(angles).max(initial=0.0))
     if largest > _TURNS:
         raise BadValue(
             f"{spec.where}: joints turn by up to {largest:.4g} rad, more than two turns. They are probably in degrees: "

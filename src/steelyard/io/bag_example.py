@@ -19,13 +19,16 @@ _POSE = {
     "geometry_msgs/msg/TransformStamped": ("transform.rotation", "transform.translation"),
     "geometry_msgs/msg/Pose": ("orientation", "position"),
 }
+_JOINTS = {"joint_position": '{ columns = ["position"], unit = "rad" }'}
+_ROBOT = 'urdf        = "arm.urdf"   # put the file of your arm here\n'
 _WIDTH = 8
 
 
 def bag_example(path: str, topics: Sequence[Topic], sensor: str) -> str:
-    """Return a description of the bag `path`: its first wrench, and its first pose, that of the frame `sensor`."""
+    """Return a description of the bag `path`: its first wrench and its first pose, or joints, to the frame `sensor`."""
     wrench = first_wrench(topics) or Topic("/wrench", "geometry_msgs/msg/WrenchStamped", 0)
-    posed = [t for t in topics if t.kind in _POSE and t.name != "/tf_static"]
+    posed = [t for t in topics if t.kind in _POSE and not t.name.endswith("/tf_static")]
+    joints = next((t for t in topics if t.kind == "sensor_msgs/msg/JointState"), None)
     pose = next((t for kind in _POSE for t in posed if t.kind == kind), Topic("/tf", "tf2_msgs/msg/TFMessage", 0))
     force, torque = _WRENCH[wrench.kind]
     turn, place = _POSE[pose.kind]
@@ -39,7 +42,10 @@ def bag_example(path: str, topics: Sequence[Topic], sensor: str) -> str:
         "rotation": f'{{ columns = ["{turn}"], form = "quaternion-xyzw" }}   # S to W',
         "position": f'{{ columns = ["{place}"], unit = "m" }}',
     }
-    return HEAD + _stream(path, wrench, felt) + "\n[[stream]]\n" + _stream(path, pose, seen)
+    first = HEAD + _stream(path, wrench, felt) + "\n[[stream]]\n"
+    if joints is None or posed:
+        return first + _stream(path, pose, seen)
+    return first + _stream(path, joints, _JOINTS) + f"\n[robot]\n{_ROBOT}sensor_link = {toml_string(sensor)}\n"
 
 
 def first_wrench(topics: Sequence[Topic]) -> Topic | None:

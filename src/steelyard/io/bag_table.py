@@ -1,76 +1,72 @@
 """A topic of a bag as a table: one row per message, one column per number in it.
 
-`stamp` is the stamp of the message's header, the time of receipt where it has none; `received` the time of receipt;
-both in ns since 1970. The others are called as the fields of the message: "wrench.force.x", and "wrench.force" for the
-three. Numbers of a list are called by number, "position[0]", or by the names that the message gives them,
-"position[elbow]".
+`stamp` is the stamp of the message's header, the time of receipt in topics that have none; `received` the time of
+receipt; both in ns since 1970. The others are called as the fields of the message: "wrench.force.x", and "wrench.force"
+for the three. Numbers of a list are called by number, "position[0]", or, where the message names them as the state of
+joints does, by name, "position[elbow]": then messages of several publishers may hold some of them each.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, fields, is_dataclass
+from itertools import islice
 from operator import attrgetter
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.bag_example import bag_example, first_wrench
-from steelyard.io.bags import Bag, open_bag
+from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.bounds import require_bounded
 from steelyard.io.table_header import Columns, Header
 
 STAMP, RECEIVED = "stamp", "received"
-TRANSFORMS = "tf2_msgs/msg/TFMessage"
+_LOOKED_AT = 500  # messages from the first on that tell what a topic holds: its publishers take turns
+
+Values = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)
 class Field:
-    """A field of a message: its dotted name, and how many numbers it lists; 0 where it is one number."""
+    """A field of numbers in a message: its dotted name, and what its numbers are called; nothing where it is one."""
 
     name: str
-    width: int = 0
+    labels: tuple[str, ...] = ()
+    named: bool = False
 
-    def getter(self) -> Callable[[int, Any], Any]:
-        """Return what takes the field from the time of receipt and the message."""
-        if self.name == RECEIVED:
-            return lambda received, message: received
-        if self.name == STAMP:
-            return lambda received, message: stamp_of(message) or received
-        get = attrgetter(self.name)
-        return lambda received, message: get(message)
+    @property
+    def columns(self) -> tuple[str, ...]:
+        """The columns that hold it."""
+        return tuple(f"{self.name}[{label}]" for label in self.labels) or (self.name,)
 
 
 @dataclass(frozen=True, eq=False)
 class BagTable:
-    """One topic of a bag.
-
-    fields  those that hold numbers
-    labels  what the message calls the numbers of its lists; none where it does not
-    """
+    """One topic of a bag, with the fields that hold numbers."""
 
     path: Path
     topic: str
     fields: tuple[Field, ...]
-    labels: tuple[str, ...]
 
     @classmethod
     def open(cls, path: Path, topic: str | None) -> BagTable:
-        """Look at the first message of a topic; raises BadFile, BadDescription or MissingDependency."""
+        """Look at the first messages of a topic; raises BadFile, BadDescription or MissingDependency."""
         with open_bag(path) as bag:
             if topic is None:
                 raise _which_topic(bag)
-            if bag.topic(topic).kind == TRANSFORMS:
+            if bag.topic(topic).kind in TRANSFORMS:
                 raise BadDescription(
                     f'{path}: topic "{topic}" holds transforms. Say which pose is meant, that of the second frame '
                     'in the first: frames = ["base_link", "tool0"]'
                 )
-            first = next(bag.messages(topic), None)
-        if first is None:
+            first = [message for _, message in islice(bag.messages(topic), _LOOKED_AT)]
+        if not first:
             raise BadFile(f'{path}: topic "{topic}" holds no messages. Record again.')
-        return cls(path, topic, (Field(STAMP), Field(RECEIVED), *_fields(first[1])), _labels(first[1]))
+        return cls(path, topic, (Field(STAMP), Field(RECEIVED), *_fields_of(first)))
 
     @property
     def header(self) -> Header:
@@ -78,51 +74,67 @@ class BagTable:
         names: list[str] = []
         groups: dict[str, tuple[int, ...]] = {}
         for field in self.fields:
-            vector = field.name.rpartition(".")[0]
-            start = len(names)
-            names += [f"{field.name}[{label}]" for label in self._labels_of(field)] if field.width else [field.name]
-            if field.width:
+            start, vector = len(names), field.name.rpartition(".")[0]
+            names += field.columns
+            if field.labels:
                 groups[field.name] = tuple(range(start, len(names)))
             elif vector:
                 groups[vector] = (*groups.get(vector, ()), start)
         return Header(tuple(names), len(names), groups)
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
-        """Return columns by number, float64; those in `exact` stay int64. Raises BadFile where messages differ."""
-        places = [(field, inner) for field in self.fields for inner in range(max(field.width, 1))]
+        """Return columns by number, float64; those in `exact` stay int64. Raises BadFile where messages differ.
+
+        Messages that name none of the numbers asked for are left out; numbers that others do not name are NaN.
+        """
+        places = [(field, inner) for field in self.fields for inner in range(len(field.columns))]
         wanted = list(dict.fromkeys(places[n][0] for n in columns))
         with open_bag(self.path) as bag:
-            require_bounded(self.path, 8 * sum(max(f.width, 1) for f in wanted) * bag.topic(self.topic).count)
-            arrays = self._arrays(bag, wanted)
-        out: Columns = {}
-        for n in columns:
-            column = arrays[places[n][0]][:, places[n][1]]
-            out[n] = column.astype(np.int64 if n in exact and column.dtype.kind in "iu" else np.float64)
-        return out
+            require_bounded(self.path, 8 * sum(len(f.columns) for f in wanted) * bag.topic(self.topic).count)
+            values = self._values(bag, wanted)
+        out = {n: values[places[n][0]][:, places[n][1]] for n in columns}
+        named = [np.isnan(out[n]) for n in columns if places[n][0].named]
+        kept = ~np.logical_and.reduce(named) if named else slice(None)
+        return {
+            n: column[kept].astype(np.int64 if n in exact and column.dtype.kind in "iu" else np.float64)
+            for n, column in out.items()
+        }
 
-    def _arrays(self, bag: Bag, wanted: Sequence[Field]) -> dict[Field, np.ndarray[Any, np.dtype[Any]]]:
-        """Return the values (N, width) of fields, one row per message."""
-        getters = [field.getter() for field in wanted]
-        listed_too = any(field.width for field in wanted)
+    def _values(self, bag: Bag, wanted: Sequence[Field]) -> dict[Field, Values]:
+        """Return the numbers (N, k) of each field, one row per message."""
         rows: list[list[Any]] = [[] for _ in wanted]
-        for number, (received, message) in enumerate(bag.messages(self.topic)):
-            if listed_too and _labels(message) != self.labels:
-                raise self._unlike(number)
-            for row, get in zip(rows, getters, strict=True):
-                row.append(get(received, message))
-        for field, row in zip(wanted, rows, strict=True):
-            if field.width and (other := [n for n, value in enumerate(row) if len(value) != field.width]):
-                raise self._unlike(other[0])
-        return {f: np.array(row).reshape(len(row), max(f.width, 1)) for f, row in zip(wanted, rows, strict=True)}
+        takers = [(row, _taker(field)) for row, field in zip(rows, wanted, strict=True)]
+        for received, message in bag.messages(self.topic):
+            for row, take in takers:
+                row.append(take(received, message))
+        return {field: self._numbers(field, row) for field, row in zip(wanted, rows, strict=True)}
 
-    def _labels_of(self, field: Field) -> Sequence[object]:
-        return self.labels if len(self.labels) == field.width else range(field.width)
+    def _numbers(self, field: Field, rows: Sequence[Any]) -> Values:
+        if field.name == STAMP:
+            return stamps_of(np.array(rows, np.int64))
+        if field.named:
+            return _by_name(rows, field.labels)
+        if field.labels and (other := [n for n, row in enumerate(rows, 1) if len(row) != len(field.labels)]):
+            raise BadFile(
+                f'{self.path}: message {other[0]} of topic "{self.topic}" lists {len(rows[other[0] - 1])} numbers in '
+                f'"{field.name}", others {len(field.labels)}. Record one publisher alone, or export the topic to CSV.'
+            )
+        return np.array(rows).reshape(len(rows), len(field.columns))
 
-    def _unlike(self, number: int) -> BadFile:
-        return BadFile(
-            f'{self.path}: message {number} of topic "{self.topic}" does not list what the first does. '
-            "Record one publisher alone, or export the topic to CSV."
-        )
+
+def _taker(field: Field) -> Callable[[int, Any], Any]:
+    """Return what takes a field from the time of receipt and the message."""
+    if field.name == RECEIVED:
+        return lambda received, message: received
+    if field.name == STAMP:
+        return lambda received, message: (stamp_of(message), received)
+    get = attrgetter(field.name)
+    return (lambda received, message: (_labels(message), get(message))) if field.named else lambda _, m: get(m)
+
+
+def stamps_of(both: Values) -> Values:
+    """Return stamps (N, 1) from those of headers and receipts (N, 2): the latter where no header has one."""
+    return both[:, :1] if both[:, 0].any() else both[:, 1:]
 
 
 def stamp_of(message: Any) -> int:
@@ -131,18 +143,47 @@ def stamp_of(message: Any) -> int:
     return 0 if header is None else int(header.stamp.sec) * 10**9 + int(header.stamp.nanosec)
 
 
-def _fields(message: Any, before: str = "") -> Iterator[Field]:
-    """Yield the fields of a message that hold numbers, those of messages within it included; headers left out."""
+def _by_name(rows: Sequence[tuple[tuple[str, ...], Any]], labels: Sequence[str]) -> Array:
+    """Return numbers (N, k) in the order of `labels`, from what each message calls its own; NaN where it has none."""
+    out = np.full((len(rows), len(labels)), np.nan)
+    place = {label: k for k, label in enumerate(labels)}
+    known: dict[tuple[str, ...], tuple[list[int], list[int]]] = {}
+    for n, (names, values) in enumerate(rows):
+        if len(values) != len(names):
+            continue
+        if names not in known:
+            own = [k for k, name in enumerate(names) if name in place]
+            known[names] = own, [place[names[k]] for k in own]
+        own, theirs = known[names]
+        out[n, theirs] = np.asarray(values)[own]
+    return out
+
+
+def _fields_of(messages: Sequence[Any]) -> list[Field]:
+    """Return the fields of numbers that messages hold, with all names that any of them gives."""
+    names = tuple(dict.fromkeys(name for message in messages for name in _labels(message)))
+    found: dict[str, Field] = {}
+    for message in messages:
+        own = _labels(message)
+        for name, width in _numbers_in(message):
+            named = bool(own) and width == len(own)
+            labels = names if named else tuple(map(str, range(width)))
+            found.setdefault(name, Field(name, labels, named))
+    return list(found.values())
+
+
+def _numbers_in(message: Any, before: str = "") -> Iterator[tuple[str, int]]:
+    """Yield dotted names of the fields that hold numbers, and how many they list (0: one number); headers left out."""
     for each in fields(message):
         value, name = getattr(message, each.name), before + each.name
         if each.name == "header":
             continue
         if is_dataclass(value):
-            yield from _fields(value, f"{name}.")
+            yield from _numbers_in(value, f"{name}.")
         elif isinstance(value, np.ndarray) and value.ndim == 1 and len(value):
-            yield Field(name, len(value))
+            yield name, len(value)
         elif isinstance(value, int | float):
-            yield Field(name)
+            yield name, 0
 
 
 def _labels(message: Any) -> tuple[str, ...]:
@@ -157,5 +198,5 @@ def _which_topic(bag: Bag) -> BadDescription:
     sensor = getattr(getattr(felt and felt[1], "header", None), "frame_id", "") or "tool0"
     return BadDescription(
         f"{bag.path}: a bag needs a description that says which topic is what. {bag.told()} "
-        f"For example:\n{bag_example(bag.path.name, bag.topics, sensor)}"
+        f"Write one beside the bag, for example:\n{bag_example(bag.path.name, bag.topics, sensor)}"
     )

@@ -14,10 +14,12 @@ from typing import Any
 
 from steelyard.errors import BadFile, MissingDependency, SteelyardError
 from steelyard.io.bounds import read_whole
-from steelyard.io.entries import close_match, listed
+from steelyard.io.entries import close_match
 
 SUFFIXES = (".mcap", ".bag", ".db3")
+TRANSFORMS = ("tf2_msgs/msg/TFMessage", "tf/msg/tfMessage")
 _METADATA = "metadata.yaml"
+_MOST_LISTED = 60
 _PACKED_WHOLE = re.compile(rb"compression_mode:\s*[\"']?file", re.IGNORECASE)
 
 
@@ -49,7 +51,8 @@ class Bag:
 
     def told(self) -> str:
         """Return the topics for a message."""
-        return f"Topics here: {listed([f'{t.name} ({t.kind}, {t.count} messages)' for t in self.topics])}."
+        shown = ", ".join(f"{t.name} ({t.count} {t.kind.rpartition('/')[2]})" for t in self.topics[:_MOST_LISTED])
+        return f"Topics here: {shown}{', ..' if len(self.topics) > _MOST_LISTED else '.'}"
 
     def messages(self, name: str) -> Iterator[tuple[int, Any]]:
         """Yield time of receipt [ns since 1970] and message of a topic, as recorded; raises BadFile."""
@@ -66,6 +69,11 @@ class Bag:
             yield received, decode(raw, connection.msgtype)
 
 
+def bag_in(folder: Path) -> Path | None:
+    """Return a file of a bag in a folder that is none for want of its metadata, None where there is none."""
+    return next((each for each in sorted(folder.iterdir()) if each.suffix.lower() in SUFFIXES), None)
+
+
 def is_bag(path: Path) -> bool:
     """Return whether a path is a bag: a file of one of its kinds, or a folder that a recorder wrote."""
     return path.suffix.lower() in SUFFIXES or (path / _METADATA).exists()
@@ -79,6 +87,9 @@ def open_bag(path: Path) -> Iterator[Bag]:
     ros1 = path.suffix.lower() == ".bag"
     try:
         types = typesys.get_typestore(typesys.Stores.ROS1_NOETIC if ros1 else typesys.Stores.LATEST)
+        for kind in TRANSFORMS:  # those of ROS 1 are not among what rosbags brings along
+            if kind not in types.fielddefs:
+                types.register(typesys.get_types_from_msg("geometry_msgs/TransformStamped[] transforms", kind))
         with (rosbag1 if ros1 else rosbag2).Reader(path) as reader:
             topics = tuple(Topic(name, str(i.msgtype), int(i.msgcount)) for name, i in sorted(reader.topics.items()))
             yield Bag(path, topics, reader, types)
@@ -86,7 +97,10 @@ def open_bag(path: Path) -> Iterator[Bag]:
         raise
     except Exception as error:  # what a damaged bag raises is as manifold as its damage
         said = f"{type(error).__name__}: {error}" if str(error) else type(error).__name__
-        raise BadFile(f"{path}: cannot be read as a bag ({said}). Record or convert it again.") from None
+        raise BadFile(
+            f"{path}: cannot be read as a bag ({said}). What a recorder that was killed leaves, `ros2 bag reindex`, "
+            "`mcap recover` or `rosbag reindex` mend; where messages are packed, name the folder, not the file in it."
+        ) from None
 
 
 def _rosbags() -> tuple[Any, Any, Any]:

@@ -9,7 +9,7 @@ from pathlib import Path
 from steelyard import check
 from steelyard.errors import BadFile
 from steelyard.io import guess
-from steelyard.io.arm_joints import posed
+from steelyard.io.arm_joints import posed, with_joints_in_order
 from steelyard.io.description import ArmSpec, Description, read_description
 from steelyard.io.joined_tables import own_rows
 from steelyard.io.missing_rows import without_missing
@@ -48,8 +48,12 @@ def _read(path: Path, data: Path | None) -> Recording:
         return replace(_recording(description, joined, rows, path), described=False)
     description = read_description(path)
     tables = open_tables(description.streams, path.parent, data)
+    arm = None if description.arm is None else _arm(description.arm, path, data)
+    if arm is not None:
+        streams = [with_joints_in_order(*each, arm) for each in zip(description.streams, tables, strict=True)]
+        description = replace(description, streams=tuple(streams))
     rows = own_rows(description.streams, tables, read_cells(description.streams, tables))
-    return _recording(description, tables, rows, path, data)
+    return _recording(description, tables, rows, path, data, arm)
 
 
 def _recording(
@@ -58,6 +62,7 @@ def _recording(
     cells: Sequence[Cells],
     path: Path,
     data: Path | None = None,
+    arm: SerialArm | None = None,
 ) -> Recording:
     specs = description.streams
     require_answerable(specs, path.name)
@@ -79,9 +84,8 @@ def _recording(
     )
     require_matched_rows(streams, path.name)
     streams, findings = without_missing(specs, streams)
-    if description.arm is not None:
-        arm = _arm(description.arm, path, data)
-        streams = tuple(posed(*each, arm) for each in zip(specs, tables, streams, strict=True))
+    if arm is not None:
+        streams = tuple(posed(*each, arm) for each in zip(specs, streams, strict=True))
     tool = description.tool
     tool = None if tool is None else str(find_file(tool, path.parent, data, f"{path.name}, [log], tool"))
     placed = description.placed

@@ -45,6 +45,8 @@ def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | N
         if topic is not None and frames is not None:
             return transform_table.TransformTable.open(path, topic, frames)
         return bag_table.BagTable.open(path, topic)
+    if path.is_dir() and (inside := bags.bag_in(path)):
+        raise BadFile(f"{path}: the folder of a bag, without its metadata.yaml. Name the file in it: {inside.name}")
     if topic is not None:
         raise BadDescription(f'{path}: "topic" belongs to a bag ({", ".join(bags.SUFFIXES)}, or the folder of one).')
     if path.is_dir():

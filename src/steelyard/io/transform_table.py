@@ -2,23 +2,26 @@
 
 Its columns are `stamp` [ns since 1970], "position" in three and "rotation" in four, a quaternion xyzw. Where several
 transforms lie between the frames, rows are those of the one that comes most often; others are interpolated to it.
+Where no transform of a topic has a stamp, its time of receipt is taken.
 """
 
 from __future__ import annotations
 
+from array import array
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import reduce
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Integers
 from steelyard.errors import BadDescription, BadFile, BadValue
-from steelyard.io.bag_table import STAMP, TRANSFORMS
-from steelyard.io.bags import Bag, open_bag
+from steelyard.io.bag_table import STAMP, stamps_of
+from steelyard.io.bags import TRANSFORMS, Bag, open_bag
+from steelyard.io.bounds import require_bounded
 from steelyard.io.entries import listed
 from steelyard.io.rotations import rotation_of
 from steelyard.io.table_header import Columns, Header
@@ -49,6 +52,32 @@ class Link:
 
 
 @dataclass(frozen=True, eq=False)
+class Heard:
+    """What a topic says of one frame in one parent, message by message: stamps and receipts, positions and turns."""
+
+    times: array[int] = field(default_factory=lambda: array("q"))
+    poses: array[float] = field(default_factory=lambda: array("d"))
+
+    def add(self, each: Any, received: int) -> None:
+        """Note one transform."""
+        stamp, place, turn = each.header.stamp, each.transform.translation, each.transform.rotation
+        self.times.extend((stamp.sec * 10**9 + stamp.nanosec, received))
+        self.poses.extend((place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
+
+    def link(self, parent: str, fixed: bool) -> Link:
+        """Return the link in the order of time: of transforms with one stamp the first, of fixed ones the last."""
+        values = np.array(self.poses).reshape(-1, 7)
+        stamps, index = np.unique(stamps_of(np.array(self.times).reshape(-1, 2))[:, 0], return_index=True)
+        values = values[-1:] if fixed else values[index]
+        return Link(parent, stamps, Pose(rotation_of(values[:, 3:], "quaternion-xyzw"), values[:, :3]), fixed)
+
+
+Transforms = Mapping[
+    str, Mapping[str, tuple[Heard, bool]]
+]  # frame -> parent -> what was heard, and whether it is fixed
+
+
+@dataclass(frozen=True, eq=False)
 class TransformTable:
     """The pose of the second of two `frames` in the first, from a topic of transforms."""
 
@@ -61,34 +90,47 @@ class TransformTable:
     def open(cls, path: Path, topic: str, frames: tuple[str, str]) -> TransformTable:
         """Look for the topic; raises BadFile, BadDescription or MissingDependency."""
         with open_bag(path) as bag:
-            kind = bag.topic(topic).kind
-        if kind != TRANSFORMS:
-            raise BadDescription(f'{path}: "frames" belongs to transforms; topic "{topic}" holds {kind}.')
+            told = bag.topic(topic)
+        if told.kind not in TRANSFORMS:
+            raise BadDescription(f'{path}: "frames" belongs to transforms; topic "{topic}" holds {told.kind}.')
+        if not told.count:
+            raise BadFile(f'{path}: topic "{topic}" holds no messages. Record again.')
         return cls(path, topic, frames)
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
         """Return columns by number; raises BadFile where no transforms lead from one frame to the other."""
         with open_bag(self.path) as bag:
-            links = _links(bag, self.topic)
-        down, up = self._ways(links)
-        stamps = self._stamps([links[frame] for frame in (*down, *up)])
+            heard = _heard(bag, self.topic)
+        down, up = self._ways(heard)
+        links = {frame: self._link(heard, frame) for frame in (*down, *up)}
+        stamps = self._stamps(list(links.values()))
         pose = _along(links, up, stamps).inverse() @ _along(links, down, stamps)
         quaternion = np.roll(pose.rotation.quaternion_wxyz(), -1, -1)
         out: Columns = {0: stamps if 0 in exact else stamps.astype(np.float64)}
         out |= dict(enumerate(np.concatenate([pose.position, quaternion], 1).T, 1))
         return {n: out[n] for n in columns}
 
-    def _ways(self, links: Mapping[str, Link]) -> tuple[list[str], list[str]]:
+    def _ways(self, heard: Transforms) -> tuple[list[str], list[str]]:
         """Return the frames whose links lead down to the second frame, and to the first, from what both hang on."""
-        first, second = (_line(links, frame) for frame in self.frames)
+        first, second = (_line(heard, frame) for frame in self.frames)
         shared = next((frame for frame in second if frame in first), None)
         if shared is None:
-            known = sorted({*links, *(link.parent for link in links.values())})
+            for frame in (*second, *first):
+                if len(parents := list(heard.get(frame, ()))) > 1:
+                    raise BadFile(f'{self.path}: frame "{frame}" has two parents, "{parents[0]}" and "{parents[1]}".')
+            known = sorted({*heard, *(parent for parents in heard.values() for parent in parents)})
             raise BadFile(
                 f'{self.path}: no transforms lead from "{self.frames[0]}" to "{self.frames[1]}". '
                 f"Frames here: {listed(known)}."
             )
         return second[: second.index(shared)][::-1], first[: first.index(shared)][::-1]
+
+    def _link(self, heard: Transforms, frame: str) -> Link:
+        ((parent, (told, fixed)),) = heard[frame].items()
+        try:
+            return told.link(parent, fixed)
+        except BadValue as error:
+            raise BadFile(f'{self.path}: transforms of "{frame}" in "{parent}": {error}') from None
 
     def _stamps(self, links: Sequence[Link]) -> Integers:
         """Return the stamps (N,) at which all links along the way are known."""
@@ -108,11 +150,11 @@ class TransformTable:
         return inside
 
 
-def _line(links: Mapping[str, Link], frame: str) -> list[str]:
-    """Return a frame, its parent, the parent of that, and so on."""
+def _line(heard: Transforms, frame: str) -> list[str]:
+    """Return a frame, its parent, the parent of that, and so on, up to one that has none or several."""
     line = [frame]
-    while line[-1] in links and links[line[-1]].parent not in line:
-        line.append(links[line[-1]].parent)
+    while len(parents := list(heard.get(line[-1], ()))) == 1 and parents[0] not in line:
+        line.append(parents[0])
     return line
 
 
@@ -121,37 +163,17 @@ def _along(links: Mapping[str, Link], frames: Sequence[str], stamps: Integers) -
     return reduce(lambda pose, frame: pose @ links[frame].at(stamps), frames, Pose.identity(len(stamps)))
 
 
-def _links(bag: Bag, topic: str) -> dict[str, Link]:
-    """Return frame -> its link, from a topic of transforms and the one beside it for those that are fixed."""
+def _heard(bag: Bag, topic: str) -> Transforms:
+    """Return what a topic of transforms says, and the one beside it of those that are fixed."""
     names = [each.name for each in bag.topics]
     beside = f"{topic}_static" if f"{topic}_static" in names else "/tf_static"
-    links = _links_of(bag, topic, fixed=topic.endswith("_static"))
-    return links | _links_of(bag, beside, fixed=True) if beside in names and beside != topic else links
-
-
-def _links_of(bag: Bag, topic: str, fixed: bool) -> dict[str, Link]:
-    rows: defaultdict[tuple[str, str], list[tuple[float, ...]]] = defaultdict(list)
-    stamps: defaultdict[tuple[str, str], list[int]] = defaultdict(list)
-    for _, message in bag.messages(topic):
-        for each in message.transforms:
-            frames = each.child_frame_id.lstrip("/"), each.header.frame_id.lstrip("/")
-            place, turn = each.transform.translation, each.transform.rotation
-            stamps[frames].append(each.header.stamp.sec * 10**9 + each.header.stamp.nanosec)
-            rows[frames].append((place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
-    children = [child for child, _ in rows]
-    if twice := [child for child in children if children.count(child) > 1]:
-        raise BadFile(f'{bag.path}: frame "{twice[0]}" has two parents in topic "{topic}". Record one of them.')
-    return {
-        child: _link(bag, child, parent, stamps[child, parent], rows[child, parent], fixed) for child, parent in rows
-    }
-
-
-def _link(bag: Bag, child: str, parent: str, stamps: Sequence[int], rows: Sequence[Any], fixed: bool) -> Link:
-    """Return a link in the order of time; of transforms with one stamp the first counts, of fixed ones the last."""
-    values: Array = np.array(rows, np.float64)
-    kept, index = np.unique(np.array(stamps, np.int64), return_index=True)
-    values = values[-1:] if fixed else values[index]
-    try:
-        return Link(parent, kept, Pose(rotation_of(values[:, 3:], "quaternion-xyzw"), values[:, :3]), fixed)
-    except BadValue as error:
-        raise BadFile(f'{bag.path}: transforms of "{child}" in "{parent}": {error}') from None
+    out: dict[str, dict[str, tuple[Heard, bool]]] = {}
+    for name in (beside, topic) if beside in names and beside != topic else (topic,):
+        require_bounded(bag.path, 128 * bag.topic(name).count)
+        own: defaultdict[tuple[str, str], Heard] = defaultdict(Heard)
+        for received, message in bag.messages(name):
+            for each in message.transforms:
+                own[each.child_frame_id.lstrip("/"), each.header.frame_id.lstrip("/")].add(each, received)
+        for (child, parent), told in own.items():
+            out.setdefault(child, {})[parent] = told, name.endswith("_static")
+    return out

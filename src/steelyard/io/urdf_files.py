@@ -54,7 +54,7 @@ def _before(path: Path) -> Mapping[str, ElementTree.Element]:
         raise BadFile(f"{path}: expected a URDF, a text in UTF-8; found a binary file.") from None
     if "<!DOCTYPE" in text or "<!ENTITY" in text:
         raise BadFile(f"{path}: defines entities, which no URDF needs and which may unpack to any size. Remove them.")
-    if "xmlns:xacro" in text:
+    if "<xacro:" in text:
         raise BadFile(f"{path}: this is a xacro, not a URDF yet. Write it out first: xacro {path.name} > arm.urdf")
     try:
         root = ElementTree.fromstring(text)
@@ -62,7 +62,13 @@ def _before(path: Path) -> Mapping[str, ElementTree.Element]:
         raise BadFile(f"{path}: expected a URDF; this is not valid XML ({error}).") from None
     if root.tag != "robot":
         raise BadFile(f"{path}: expected a URDF, whose root is <robot>; found <{root.tag}>.")
-    return {_link(path, joint, "child"): joint for joint in root.findall("joint")}
+    out: dict[str, ElementTree.Element] = {}
+    for joint in root.findall("joint"):
+        child = _link(path, joint, "child")
+        if child in out:
+            raise BadFile(f'{path}: joints "{out[child].get("name")}" and "{joint.get("name")}" both carry "{child}".')
+        out[child] = joint
+    return out
 
 
 def _link(path: Path, joint: ElementTree.Element, side: str) -> str:
@@ -76,7 +82,9 @@ def _link(path: Path, joint: ElementTree.Element, side: str) -> str:
 def _joint(path: Path, joint: ElementTree.Element) -> Joint:
     name, kind = joint.get("name", ""), joint.get("type", "")
     if kind not in _KINDS:
-        raise BadFile(f'{path}: joint "{name}" is of type "{kind}". Read are {listed(list(_KINDS))}.')
+        raise BadFile(
+            f'{path}: joint "{name}" is of type "{kind}". Read are {listed(list(_KINDS))}; name a base_link behind it.'
+        )
     if joint.find("mimic") is not None:
         raise BadFile(f'{path}: joint "{name}" mimics another. Name a link before it as the sensor\'s.')
     origin = joint.find("origin")
