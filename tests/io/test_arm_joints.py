@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -10,8 +11,11 @@ import pytest
 
 import steelyard as sy
 from steelyard.errors import BadInput
+from steelyard.io import read_team, write_team
 from steelyard.io.log_files import read_recording
 from steelyard.io.urdf_files import read_arm
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.spatial import Pose, Rotation
 
 # UR5e by its published Denavit-Hartenberg numbers: a [m], alpha [rad], d [m] of each joint.
@@ -231,3 +235,43 @@ def test_a_prismatic_joint_slides_along_its_axis() -> None:
     turned = Pose(Rotation.exp([0.0, np.pi / 2, 0.0]), np.array([0.1, 0.0, 0.0]))
     arm = SerialArm((Joint("slide", "prismatic", turned, np.array([0.0, 0.0, 1.0])),))
     np.testing.assert_allclose(arm.pose([[0.5]]).position, [[0.6, 0.0, 0.0]], atol=1e-12)
+
+
+GANTRY = ("slide_x", "slide_y", "slide_z", "yaw", "pitch", "roll")
+AXES = ("1 0 0", "0 1 0", "0 0 1", "0 0 1", "0 1 0", "1 0 0")
+
+
+def gantry() -> str:
+    rows = [
+        f'<joint name="{name}" type="{"prismatic" if k < 3 else "continuous"}"><parent link="l{k}"/>'
+        f'<child link="l{k + 1}"/><axis xyz="{axis}"/></joint>'
+        for k, (name, axis) in enumerate(zip(GANTRY, AXES, strict=True))
+    ]
+    return f'<robot name="gantry">{"".join(rows)}</robot>'
+
+
+def test_a_team_of_arms_says_where_it_holds_by_its_joints(tmp_path: Path) -> None:
+    """Each robot is a gantry with three turns: its joints are the position and roll, pitch, yaw of its grasp."""
+    scene = TeamScene(CASES["B"], grasp_samples=60, motion_samples=60, still_samples=10)
+    path = write_team(simulate_team(scene, 3).log, tmp_path / "team.toml")
+    expected = read_team(path)
+    (tmp_path / "gantry.urdf").write_text(gantry())
+    for table in (tmp_path / "team").glob("*.csv"):
+        header = table.read_text().splitlines()[0].split(",")
+        rows = np.loadtxt(table, delimiter=",", skiprows=1)
+        q = rows[:, [header.index(name) for name in ("qw", "qx", "qy", "qz")]]
+        p = rows[:, [header.index(name) for name in "xyz"]]
+        turns = Rotation.from_quaternion_wxyz(q / np.linalg.norm(q, axis=1, keepdims=True)).rpy()[:, ::-1]
+        both = np.column_stack([rows, p, np.rad2deg(turns)])
+        np.savetxt(table, both, "%.12g", ",", header=",".join([*header, *GANTRY]), comments="")
+    text = path.read_text()
+    names = ", ".join(f'"{name}"' for name in reversed(GANTRY))
+    text = re.sub(r"rotation = \{.*\}\n", f'joint_position = {{ columns = [{names}], unit = "deg" }}\n', text)
+    text = re.sub(r" {4}position = \{.*\}\n", "", text)
+    path.write_text(re.sub(r'(name = "robot\d"\n)', r'\1urdf = "gantry.urdf"\nsensor_link = "l6"\n', text))
+    found = read_team(path)
+    for before, after in zip(expected.recordings, found.recordings, strict=True):
+        for name, track in before.tracks.items():
+            for channel in ("rotation", "position", "force"):
+                there = after.tracks[name].channels[channel]
+                np.testing.assert_allclose(there, track.channels[channel], atol=1e-7, err_msg=f"{name} {channel}")

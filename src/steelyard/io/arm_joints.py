@@ -5,21 +5,29 @@ from __future__ import annotations
 import re
 from collections.abc import Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
+from steelyard.io.description import ArmSpec
 from steelyard.io.entries import listed
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
-from steelyard.io.tables import Table, choose_columns
+from steelyard.io.tables import Table, choose_columns, find_file
 from steelyard.io.units import ANGLE
+from steelyard.io.urdf_files import read_arm
 from steelyard.logs.recording import Stream
 from steelyard.robots.serial import SerialArm
 
 _TURNS = 4 * np.pi  # [rad] two turns: more than joints of an arm make, less than degrees of such a log are
 _IN_BRACKETS = re.compile(r"\[([^\]]+)\]$")
+
+
+def arm_of(said: ArmSpec, path: Path, data: Path | None) -> SerialArm:
+    """Return the arm that the description at `path` names, its URDF sought as data files are; raises BadFile."""
+    return read_arm(find_file(said.urdf, path.parent, data, f"{said.where}, urdf"), said.sensor_link, said.base_link)
 
 
 def with_joints_in_order(spec: StreamSpec, table: Table, arm: SerialArm) -> StreamSpec:
@@ -33,17 +41,19 @@ def with_joints_in_order(spec: StreamSpec, table: Table, arm: SerialArm) -> Stre
 def posed(spec: StreamSpec, stream: Stream, arm: SerialArm) -> Stream:
     """Return the stream with the positions (N, n) of the arm's joints as `rotation` and `position` of the sensor in W.
 
-    Raises BadValue where their unit is another.
+    Rows that hold no number hold none afterwards. Raises BadValue where the unit of angles is another.
     """
     quantity = next((q for q in spec.quantities if q.name == "joint_position"), None)
     if quantity is None:
         return stream
     sliding = np.array([joint.kind == "prismatic" for joint in arm.moving])
     positions = stream.channels["joint_position"] / np.where(sliding, ANGLE[quantity.unit], 1.0)
-    _require_likely(quantity, positions[:, ~sliding])
-    pose = arm.pose(positions)
+    good: Mask = np.asarray(np.isfinite(positions).all(1))
+    _require_likely(quantity, positions[good][:, ~sliding])
+    pose = arm.pose(positions[good])
+    found = {"rotation": np.full((len(good), 3, 3), np.nan), "position": np.full((len(good), 3), np.nan)}
+    found["rotation"][good], found["position"][good] = pose.rotation.matrix, pose.position
     kept = {name: values for name, values in stream.channels.items() if name != "joint_position"}
-    found = {"rotation": pose.rotation.matrix, "position": pose.position}
     return replace(stream, channels=kept | {name: check.frozen(values) for name, values in found.items()})
 
 

@@ -22,6 +22,7 @@ from steelyard.logs.recording import STANDARD_GRAVITY
 _WEAKEST, _STRONGEST = 0.1, 100.0
 _LOUDEST = 1e6
 NOISE = ("force", "torque", "acceleration", "angular_acceleration")  # whose standard deviation can be told
+ARM = ("urdf", "sensor_link", "base_link")  # keys that describe an arm
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
 
 LEVEL_BASE = f"[log] gives no gravity: {STANDARD_GRAVITY} m/s² along -z of W, a level base, was assumed"
@@ -119,7 +120,12 @@ def _arm(top: Entry) -> ArmSpec:
     entry = top.section("robot")
     if "model" in entry:
         raise entry.error('"model" is for teams. Give an arm\'s urdf = "arm.urdf" and sensor_link = "..".')
-    entry.only("urdf", "sensor_link", "base_link")
+    entry.only(*ARM)
+    return parse_arm(entry)
+
+
+def parse_arm(entry: Entry) -> ArmSpec:
+    """Return what `entry` says of an arm under the keys ARM; raises BadDescription."""
     for key, example in (("urdf", 'urdf = "arm.urdf"'), ("sensor_link", 'sensor_link = "tool0"')):
         entry.require(key, example)
     return ArmSpec(str(entry.text("urdf")), str(entry.text("sensor_link")), entry.text("base_link"), entry.where)

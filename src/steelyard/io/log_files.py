@@ -9,14 +9,13 @@ from pathlib import Path
 from steelyard import check
 from steelyard.errors import BadFile
 from steelyard.io import guess
-from steelyard.io.arm_joints import posed, with_joints_in_order
-from steelyard.io.description import ArmSpec, Description, read_description
+from steelyard.io.arm_joints import arm_of, posed, with_joints_in_order
+from steelyard.io.description import Description, read_description
 from steelyard.io.joined_tables import own_rows
 from steelyard.io.missing_rows import without_missing
 from steelyard.io.requirements import require_answerable, require_matched_rows
 from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
 from steelyard.io.tables import Table, find_file, open_table
-from steelyard.io.urdf_files import read_arm
 from steelyard.logs.recording import Recording, Stream
 from steelyard.robots.serial import SerialArm
 
@@ -48,7 +47,7 @@ def _read(path: Path, data: Path | None) -> Recording:
         return replace(_recording(description, joined, rows, path), described=False)
     description = read_description(path)
     tables = open_tables(description.streams, path.parent, data)
-    arm = None if description.arm is None else _arm(description.arm, path, data)
+    arm = None if description.arm is None else arm_of(description.arm, path, data)
     if arm is not None:
         streams = [with_joints_in_order(*each, arm) for each in zip(description.streams, tables, strict=True)]
         description = replace(description, streams=tuple(streams))
@@ -101,7 +100,3 @@ def _recording(
         findings=findings,
         notes=description.notes,
     )
-
-
-def _arm(said: ArmSpec, path: Path, data: Path | None) -> SerialArm:
-    return read_arm(find_file(said.urdf, path.parent, data, f"{said.where}, urdf"), said.sensor_link, said.base_link)

@@ -94,8 +94,11 @@ class StreamSpec:
         return self.path, self.topic, self.frames
 
 
-def parse_stream(entry: Entry, robot: bool = False) -> StreamSpec:
-    """Check one [[stream]] table, which in a team's `robot` may also hold what ROBOT names; raises BadDescription."""
+def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamSpec:
+    """Check one [[stream]] table, which in a team's `robot` may also hold what ROBOT names; raises BadDescription.
+
+    arm  joints are those of an arm, of any number, and not an Omnid's
+    """
     entry.only(*_KEYS, *(ROBOT if robot else _JOINT))
     entry.require("path", 'path = "log.csv"')
     path = str(entry.text("path"))
@@ -104,7 +107,7 @@ def parse_stream(entry: Entry, robot: bool = False) -> StreamSpec:
         raise entry.error('"joint_torque" is of use for an Omnid of a team only. Leave it out: the sensor measures.')
     zero = entry.values.get("torque") == "zero"
     quantities = tuple(
-        _quantity(entry, name, robot)
+        _quantity(entry, name, arm)
         for name in (*QUANTITIES, *ROBOT)
         if name in entry and not (zero and name == "torque")
     )
@@ -148,7 +151,7 @@ def _frames(stream: Entry) -> tuple[str, str] | None:
     return value[0].lstrip("/"), value[1].lstrip("/")
 
 
-def _quantity(stream: Entry, name: str, robot: bool) -> QuantitySpec:
+def _quantity(stream: Entry, name: str, arm: bool) -> QuantitySpec:
     entry = stream.table(name)
     if name == "rotation":
         return _rotation(entry)
@@ -160,7 +163,7 @@ def _quantity(stream: Entry, name: str, robot: bool) -> QuantitySpec:
         entry = Entry({**entry.values, "unit": spelled(name, said)}, entry.where)
     unit = entry.choice("unit", units, units[0])
     frame = entry.choice("frame", ("S", "W"), "S") if framed else "W" if name == "position" else "S"
-    of_arm = name == "joint_position" and not robot
+    of_arm = name == "joint_position" and arm
     columns = _columns(entry, None if of_arm else (QUANTITIES | ROBOT)[name])
     return QuantitySpec(name, columns, unit, entry.where, frame=frame, open_count=of_arm)
 

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any, get_args
 
 from steelyard.check import Array
-from steelyard.io.description import default_gravity, parse_gravity
+from steelyard.io.description import ARM, ArmSpec, default_gravity, parse_arm, parse_gravity
 from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.stream_entries import StreamSpec, parse_stream
@@ -46,13 +46,17 @@ class RecordingSpec:
 
 @dataclass(frozen=True, eq=False)
 class RobotSpec:
-    """One [[robot]]; gravity (3,) [m/s^2] in its home frame, None where it is to be estimated."""
+    """One [[robot]]; gravity (3,) [m/s^2] in its home frame, None where it is to be estimated.
+
+    omnid, arm  whose joints its streams may tell
+    """
 
     name: str
     gravity: Array | None
     base: Base
     wrench_sign: int
     omnid: bool
+    arm: ArmSpec | None
     recordings: tuple[RecordingSpec, ...]
 
 
@@ -97,15 +101,19 @@ def _robot(entry: Entry, team: Entry) -> RobotSpec:
     entry.require("name", 'name = "left"')
     name = str(entry.text("name"))
     entry = Entry(entry.values, f'{entry.where} ("{name}")')
-    entry.only("name", "model", "base", "gravity", "wrench", "recording")
+    entry.only("name", "model", *ARM, "base", "gravity", "wrench", "recording")
     omnid = "model" in entry and bool(entry.choice("model", ("omnid",), ""))
+    if omnid and "urdf" in entry:
+        raise entry.error('"model" and "urdf" say the same. Give one of them.')
+    arm = parse_arm(entry) if set(ARM) & set(entry.values) else None
     base: Any = entry.choice("base", get_args(Base), "still")
     sign = _SIGNS[entry.choice("wrench", list(_SIGNS), team.choice("wrench", list(_SIGNS), "on-object"))]
     rows = _tables(entry, "recording", "[[robot.recording]]")
     if not rows:
         raise entry.error(f"no [[robot.recording]] is given. A robot looks like this:\n{EXAMPLE}")
-    recordings = tuple(_recording(Entry(row, f"{entry.where}, recording {k}"), omnid) for k, row in enumerate(rows, 1))
-    return RobotSpec(name, _gravity(entry, team), base, sign, omnid, recordings)
+    known = ("joint_position", "joint_torque") if omnid else ("joint_position",) if arm else ()
+    recordings = tuple(_recording(Entry(row, f"{entry.where}, recording {k}"), known) for k, row in enumerate(rows, 1))
+    return RobotSpec(name, _gravity(entry, team), base, sign, omnid, arm, recordings)
 
 
 def _gravity(entry: Entry, team: Entry) -> Array | None:
@@ -118,7 +126,8 @@ def _gravity(entry: Entry, team: Entry) -> Array | None:
     return default_gravity()
 
 
-def _recording(entry: Entry, omnid: bool) -> RecordingSpec:
+def _recording(entry: Entry, known: Sequence[str]) -> RecordingSpec:
+    """Check one recording of a robot whose joints are `known` by these quantities."""
     entry.only("kind", "name", "away", "stream")
     entry.require("kind", f'kind = "motion"; one of {", ".join(KINDS)}')
     kind: Any = entry.choice("kind", KINDS, "")
@@ -132,25 +141,29 @@ def _recording(entry: Entry, omnid: bool) -> RecordingSpec:
         raise entry.error(
             "no [[robot.recording.stream]] is given. Give one, or away = true where the robot holds nothing."
         )
-    streams = tuple(parse_stream(Entry(row, f"{entry.where}, stream {k}"), robot=True) for k, row in enumerate(rows, 1))
+    streams = tuple(
+        parse_stream(Entry(row, f"{entry.where}, stream {k}"), robot=True, arm="joint_torque" not in known)
+        for k, row in enumerate(rows, 1)
+    )
     for stream in streams:
-        _check(Entry({}, stream.where), stream, omnid)
+        _check(Entry({}, stream.where), stream, known)
     _refuse_twice(entry, streams)
     return RecordingSpec(kind, streams, entry.where, entry.text("name"), away)
 
 
-def _check(place: Entry, stream: StreamSpec, omnid: bool) -> None:
+def _check(place: Entry, stream: StreamSpec, known: Sequence[str]) -> None:
     """Refuse what cannot be used in a team."""
     if stream.poses or stream.time is None:
         raise place.error(
             "the streams of a team need time: robots are brought together by their clocks. Give "
             'time = { columns = ["t"], unit = "s" }, or time = { rate = 100, unit = "Hz" } where all start together.'
         )
-    joints = sorted(stream.names & {"joint_position", "joint_torque"})
-    if joints and not omnid:
+    joints = sorted((stream.names & {"joint_position", "joint_torque"}) - set(known))
+    if joints:
         raise place.error(
-            f'"{joints[0]}" needs the kinematics of the robot. Write model = "omnid" in its [[robot]], or give the '
-            "pose and the wrench of the grasp instead."
+            f'"{joints[0]}" needs the kinematics of the robot. Write model = "omnid" in its [[robot]], or, for the '
+            'pose of an arm, urdf = "arm.urdf" and sensor_link = ".."; or give the pose and the wrench of the grasp '
+            "instead."
         )
     if stream.mount is not None and stream.mount.position is not None and "specific_force" in stream.names:
         raise place.error(

@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
+from steelyard.io.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.description import default_gravity
 from steelyard.io.joint_angles import require_likely
 from steelyard.io.stream_entries import StreamSpec
@@ -23,6 +24,7 @@ from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRob
 from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
 from steelyard.logs.team_track import Track
 from steelyard.robots.omnid import Omnid
+from steelyard.robots.serial import SerialArm
 
 _FEWEST = 50  # rows in which a torque shows
 
@@ -55,9 +57,15 @@ def _team(said: TeamDescription, path: Path, data: Path | None) -> TeamLog:
     with_streams = [(robot, own) for meeting in meetings for robot, own in meeting.members if not own.away]
     specs = [stream for _, own in with_streams for stream in own.streams]
     tables = open_tables(specs, path.parent, data)
-    opened = {s.where: (t, c) for s, t, c in zip(specs, tables, read_cells(specs, tables), strict=True)}
+    arms = {robot.name: arm_of(robot.arm, path, data) for robot in said.robots if robot.arm is not None}
+    owners = [robot.name for robot, own in with_streams for _ in own.streams]
+    specs = [
+        with_joints_in_order(spec, table, arms[owner]) if owner in arms else spec
+        for spec, table, owner in zip(specs, tables, owners, strict=True)
+    ]
+    opened = {s.where: (s, t, c) for s, t, c in zip(specs, tables, read_cells(specs, tables), strict=True)}
     robots = [TeamRobot(robot.name, robot.gravity, robot.base) for robot in said.robots]
-    recordings = [_recording(meeting, opened, path.name) for meeting in meetings]
+    recordings = [_recording(meeting, opened, arms, path.name) for meeting in meetings]
     with _at(path.name):
         return TeamLog(tuple(robots), tuple(recordings), said.reference)
 
@@ -124,10 +132,16 @@ def _require_equal_counts(said: TeamDescription, where: str) -> None:
             )
 
 
-def _recording(meeting: _Meeting, opened: Mapping[str, tuple[Table, Cells]], where: str) -> TeamRecording:
+def _recording(
+    meeting: _Meeting,
+    opened: Mapping[str, tuple[StreamSpec, Table, Cells]],
+    arms: Mapping[str, SerialArm],
+    where: str,
+) -> TeamRecording:
     """Return what all robots measured at one time, each on its own clock, all from one origin."""
-    specs = [spec for _, own in meeting.members for spec in own.streams]
-    tables, cells = [opened[spec.where][0] for spec in specs], [opened[spec.where][1] for spec in specs]
+    owners = [robot.name for robot, own in meeting.members for _ in own.streams]
+    found = [opened[spec.where] for _, own in meeting.members for spec in own.streams]
+    specs, tables, cells = [each[0] for each in found], [each[1] for each in found], [each[2] for each in found]
     gravity = [robot.gravity for robot, own in meeting.members for _ in own.streams]
     channels = [
         channels_of(spec, table, mine, default_gravity() if down is None else down, gaps=True)
@@ -136,6 +150,9 @@ def _recording(meeting: _Meeting, opened: Mapping[str, tuple[Table, Cells]], whe
     seconds = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels])
     named = zip(stream_names(specs), specs, channels, seconds, strict=True)
     streams = {spec.where: _stream(name, spec, values, time) for name, spec, values, time in named}
+    for spec, owner in zip(specs, owners, strict=True):
+        if owner in arms:
+            streams[spec.where] = posed(spec, streams[spec.where], arms[owner])
     tracks = {
         robot.name: _track(robot, own, [streams[spec.where] for spec in own.streams])
         for robot, own in meeting.members
