@@ -240,6 +240,7 @@ def test_transforms_of_ros_1(tmp_path: Path, kind: str) -> None:
         out.append(("/tf", kind, START + n, told))
     write_bag(tmp_path / "run.bag", out)
     assert _table(tmp_path / "run.bag", ("base", "tool")).read([3])[3].tolist() == [0, 1, 2]
+    assert 'topic    = "/tf"\nframes   = ["base_link", "tool0"]' in message(tmp_path / "run.bag")
 
 
 def test_frames_beside_the_way_do_not_matter(tmp_path: Path) -> None:

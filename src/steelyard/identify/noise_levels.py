@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.identify.linear import inverse_scaled, loosest, normal_equations, reweighted
 from steelyard.identify.noise_cost import residual_map_of, weights_at
 from steelyard.identify.regressor import design
-from steelyard.identify.rest import RIPPLE
+from steelyard.identify.rest import RIPPLE, without_acceleration
 from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 from steelyard.logs.noise import robust_std, rounding
@@ -70,18 +70,7 @@ def _resting(log: MotionLog) -> tuple[MotionLog, list[int]]:
     numbers = [
         c for c in range(len(log.noise or ())) if (log.noise_class == c).any() and log.still[log.noise_class == c].all()
     ]
-    rows = np.isin(log.noise_class, numbers)[:, None]
-    noise = tuple(
-        replace(n, acceleration=np.minimum(n.acceleration, RIPPLE)) if c in numbers else n
-        for c, n in enumerate(log.noise or ())
-    )
-    quiet = replace(
-        log,
-        angular_acceleration=np.where(rows, 0.0, log.angular_acceleration),
-        acceleration=np.where(rows, 0.0, log.acceleration),
-        noise=noise,
-    )
-    return quiet, numbers
+    return without_acceleration(log, numbers), numbers
 
 
 def _no_more_than_rest_shows(log: MotionLog, number: int, noise: Noise) -> Noise:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -46,8 +47,8 @@ def at_rest(log: MotionLog, phi: Array, bias: Array) -> MotionLog:
 def without_noise_of_rest(log: MotionLog) -> MotionLog:
     """Return a log that is at rest throughout without its accelerations, which are noise; any other as it is.
 
-    A free body's inertia takes up what such noise seems to say. That of given parts hangs on their masses, so that it
-    would move them. Readings well above their noise are of rows that move all the same, and stay.
+    What such noise seems to say of the inertia would move the masses of given parts, which it hangs on. Readings well
+    above their noise are of rows that move all the same, and stay.
     """
     if log.noise is None or not log.still.all():
         return log
@@ -55,9 +56,22 @@ def without_noise_of_rest(log: MotionLog) -> MotionLog:
     readings = np.concatenate([log.angular_acceleration, log.acceleration], 1)
     if ((readings**2).mean(0) > MOVING * variance.mean(0)).any():
         return log
-    noise = tuple(replace(n, acceleration=np.minimum(n.acceleration, RIPPLE)) for n in log.noise)
-    nothing = np.zeros_like(log.acceleration)
-    return replace(log, angular_acceleration=nothing, acceleration=nothing, noise=noise)
+    return without_acceleration(log, range(len(log.noise)))
+
+
+def without_acceleration(log: MotionLog, classes: Sequence[int]) -> MotionLog:
+    """Return the log with zero acceleration in the rows of noise `classes` at rest, which know it to RIPPLE at most."""
+    rows = np.isin(log.noise_class, classes)[:, None]
+    noise = tuple(
+        replace(n, acceleration=np.minimum(n.acceleration, RIPPLE)) if c in classes else n
+        for c, n in enumerate(log.noise or ())
+    )
+    return replace(
+        log,
+        angular_acceleration=np.where(rows, 0.0, log.angular_acceleration),
+        acceleration=np.where(rows, 0.0, log.acceleration),
+        noise=noise,
+    )
 
 
 def _settled(log: MotionLog, quiet: MotionLog, resting: Mask) -> MotionLog:

@@ -14,6 +14,7 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
 from steelyard.io.description import ArmSpec
 from steelyard.io.entries import listed
+from steelyard.io.rotations import TURNS
 from steelyard.io.stream_entries import QuantitySpec, StreamSpec
 from steelyard.io.tables import Table, choose_columns, find_file
 from steelyard.io.units import ANGLE
@@ -21,7 +22,6 @@ from steelyard.io.urdf_files import read_arm
 from steelyard.logs.recording import Stream
 from steelyard.robots.serial import SerialArm
 
-_TURNS = 4 * np.pi  # [rad] two turns: more than joints of an arm make, less than degrees of such a log are
 _IN_BRACKETS = re.compile(r"\[([^\]]+)\]$")
 
 
@@ -93,7 +93,7 @@ def _places(joint: str, labels: Sequence[str]) -> list[int]:
 
 def _require_likely(spec: QuantitySpec, angles: Array) -> None:
     largest = float(np.abs(angles).max(initial=0.0))
-    if largest > _TURNS:
+    if largest > TURNS:
         raise BadValue(
             f"{spec.where}: joints turn by up to {largest:.4g} rad, more than two turns. They are probably in degrees: "
             'set unit = "deg".'

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-from steelyard.io.bags import Topic
+from steelyard.io.bags import TRANSFORMS, Topic
 from steelyard.io.example import HEAD
 from steelyard.io.toml_string import toml_string
 
@@ -14,7 +14,7 @@ _WRENCH = {
     "geometry_msgs/msg/Wrench": ("force", "torque"),
 }
 _POSE = {
-    "tf2_msgs/msg/TFMessage": ("rotation", "position"),
+    **dict.fromkeys(TRANSFORMS, ("rotation", "position")),
     "geometry_msgs/msg/PoseStamped": ("pose.orientation", "pose.position"),
     "geometry_msgs/msg/TransformStamped": ("transform.rotation", "transform.translation"),
     "geometry_msgs/msg/Pose": ("orientation", "position"),
@@ -29,14 +29,14 @@ def bag_example(path: str, topics: Sequence[Topic], sensor: str) -> str:
     wrench = first_wrench(topics) or Topic("/wrench", "geometry_msgs/msg/WrenchStamped", 0)
     posed = [t for t in topics if t.kind in _POSE and not t.name.endswith("/tf_static")]
     joints = next((t for t in topics if t.kind == "sensor_msgs/msg/JointState"), None)
-    pose = next((t for kind in _POSE for t in posed if t.kind == kind), Topic("/tf", "tf2_msgs/msg/TFMessage", 0))
+    pose = next((t for kind in _POSE for t in posed if t.kind == kind), Topic("/tf", TRANSFORMS[0], 0))
     force, torque = _WRENCH[wrench.kind]
     turn, place = _POSE[pose.kind]
     felt = {
         "force": f'{{ columns = ["{force}"], unit = "N" }}',
         "torque": f'{{ columns = ["{torque}"], unit = "N*m" }}',
     }
-    frames = {"frames": _FRAMES.replace("FRAME", toml_string(sensor))} if pose.kind == "tf2_msgs/msg/TFMessage" else {}
+    frames = {"frames": _FRAMES.replace("FRAME", toml_string(sensor))} if pose.kind in TRANSFORMS else {}
     seen = {
         **frames,
         "rotation": f'{{ columns = ["{turn}"], form = "quaternion-xyzw" }}   # S to W',

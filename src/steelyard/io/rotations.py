@@ -16,7 +16,7 @@ ANGULAR = ("rpy", "rotation-vector")  # forms whose numbers have a unit
 ROUNDING = 5e-3  # how far R^T R may be from 1: a matrix written with three digits after the point
 NORM = 0.05  # how far the length of a quaternion may be from 1
 _ZERO = 1e-12
-_TURNS = 4 * np.pi  # [rad] two turns: more than a wrist makes, less than degrees of a log for identification are
+TURNS = 4 * np.pi  # [rad] two turns: more than a wrist makes, less than degrees of a log for identification are
 
 
 def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
@@ -77,7 +77,7 @@ def _check_norm(quaternion: Array) -> None:
 def _check_angles(angles: Array, form: str) -> None:
     """Raise BadValue where a wrist would have turned round more often than any does: degrees read as radians."""
     most = float(np.nanmax(np.abs(angles), initial=0.0))
-    if most > _TURNS:
+    if most > TURNS:
         what = "roll, pitch or yaw" if form == "rpy" else "the rotation vector"
         raise BadValue(
             f"{what} reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "

@@ -35,7 +35,6 @@ _HEADER = Header(_NAMES, len(_NAMES), {"position": (1, 2, 3), "rotation": (4, 5,
 class Link:
     """The poses (N,) of a frame in its parent at its stamps (N,), one alone where it is fixed."""
 
-    parent: str
     stamps: Integers
     poses: Pose
     fixed: bool
@@ -64,17 +63,16 @@ class Heard:
         self.times.extend((stamp.sec * 10**9 + stamp.nanosec, received))
         self.poses.extend((place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
 
-    def link(self, parent: str, fixed: bool) -> Link:
+    def link(self, fixed: bool) -> Link:
         """Return the link in the order of time: of transforms with one stamp the first, of fixed ones the last."""
         values = np.array(self.poses).reshape(-1, 7)
         stamps, index = np.unique(stamps_of(np.array(self.times).reshape(-1, 2))[:, 0], return_index=True)
         values = values[-1:] if fixed else values[index]
-        return Link(parent, stamps, Pose(rotation_of(values[:, 3:], "quaternion-xyzw"), values[:, :3]), fixed)
+        return Link(stamps, Pose(rotation_of(values[:, 3:], "quaternion-xyzw"), values[:, :3]), fixed)
 
 
-Transforms = Mapping[
-    str, Mapping[str, tuple[Heard, bool]]
-]  # frame -> parent -> what was heard, and whether it is fixed
+# Frame -> parent -> what was heard of the frame in it, and whether it is fixed.
+Transforms = Mapping[str, Mapping[str, tuple[Heard, bool]]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -128,7 +126,7 @@ class TransformTable:
     def _link(self, heard: Transforms, frame: str) -> Link:
         ((parent, (told, fixed)),) = heard[frame].items()
         try:
-            return told.link(parent, fixed)
+            return told.link(fixed)
         except BadValue as error:
             raise BadFile(f'{self.path}: transforms of "{frame}" in "{parent}": {error}') from None
 
