@@ -52,7 +52,7 @@ def only(recording: Recording) -> Stream:
 def test_defaults(tmp_path: Path) -> None:
     recording = read(tmp_path, STREAM + TIME + WRENCH + TURN)
     assert recording.gravity.tolist() == [0, 0, -STANDARD_GRAVITY]
-    assert recording.notes == ("[log] gives no gravity: 9.80665 m/s² along -z of W, a level base, was assumed",)
+    assert recording.notes == ("[log] gives no gravity: 9.80665 ± 0.015 m/s² along -z of W, a level base, was assumed",)
     assert recording.wrench_sign == 1
     assert recording.name == "log"
     assert not recording.noise

@@ -119,6 +119,26 @@ def test_torques_in_other_axes_than_forces_are_put_right(in_world: str, declared
     assert read.streams[0].frames["torque"] == frame
 
 
+@pytest.mark.parametrize(
+    ("in_world", "declared", "frames"),
+    [
+        ("force", "", {"force": "W", "torque": "S"}),
+        ("force", "torque", {"force": "W", "torque": "S"}),
+        ("torque", "force", {"force": "S", "torque": "W"}),
+    ],
+)
+def test_forces_in_other_axes_leave_torques_where_they_belong(
+    in_world: str, declared: str, frames: dict[str, str]
+) -> None:
+    """Torques that had gone along with the forces fitted no body, or another reading of the rotations."""
+    read, (found,) = examine(turned(in_world, declared))
+    assert found.code == "gravity-frame"
+    other = {"force": "torque", "torque": "force"}[in_world]
+    assert f"The {in_world}s are in the axes of W (the base), the {other}s in S; so read" in found.message
+    assert found.remedy.startswith(f'Set frame = "{frames["force"]}" in its force and frame = "{frames["torque"]}"')
+    assert read.streams[0].frames == frames
+
+
 def test_torques_about_the_origin_of_the_world_are_named() -> None:
     _, (found,) = examine(turned(about_world=True))
     assert found.code == "wrench-unexplained"

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.logs.misread import rolled
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.glance import in_other_axes
+from steelyard.sanity.glance import in_axes
 from steelyard.spatial import Rotation
 
 Edit = Callable[[Recording], Recording]
@@ -113,7 +113,7 @@ TRAPS: dict[str, tuple[Edit, str]] = {
         "gravity-frame",
     ),
     "wrench in W": (in_base_axes, "gravity-frame"),
-    "wrench said to be in W": (lambda r: in_other_axes(r), "gravity-frame"),
+    "wrench said to be in W": (lambda r: in_axes(r, ("force", "torque")), "gravity-frame"),
     "rotation vector as rpy": (lambda r: reread(r, lambda R: Rotation.from_rpy(R.log())), "gravity-frame"),
     "yaw, pitch, roll": (lambda r: reread(r, lambda R: Rotation.from_rpy(R.rpy()[..., ::-1])), "gravity-frame"),
     "moving axes": (lambda r: reread(r, lambda R: Rotation.from_rpy(-R.inverse().rpy())), "gravity-frame"),

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
-from typing import Any
+from typing import Any, Self
 
 import numpy as np
 
@@ -143,7 +143,7 @@ class Estimate:
         """Return the estimate with the remedies that `remedies` have for the codes of its findings."""
         return replace(self, findings=tuple(finding.instead(remedies) for finding in self.findings))
 
-    def noted(self, *notes: str) -> Estimate:
+    def noted(self, *notes: str) -> Self:
         """Return the estimate with more notes."""
         return replace(self, notes=(*self.notes, *notes))
 

@@ -16,7 +16,7 @@ from steelyard.io.entries import Entry
 from steelyard.io.example import EXAMPLE
 from steelyard.io.object_pose import ObjectPose, parse_object_pose
 from steelyard.io.stream_entries import StreamSpec, parse_stream
-from steelyard.logs.recording import STANDARD_GRAVITY
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD, STANDARD_GRAVITY
 
 # [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
 _WEAKEST, _STRONGEST = 0.1, 100.0
@@ -25,12 +25,19 @@ NOISE = ("force", "torque", "acceleration", "angular_acceleration")  # whose sta
 ARM = ("urdf", "sensor_link", "base_link")  # keys that describe an arm
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
 
-LEVEL_BASE = f"[log] gives no gravity: {STANDARD_GRAVITY} m/s² along -z of W, a level base, was assumed"
+# Gravity that nobody states, and how well it is known.
+ASSUMED = f"{STANDARD_GRAVITY} ± {STANDARD_GRAVITY * ASSUMED_GRAVITY_STD:.3f} m/s²"
+LEVEL_BASE = f"[log] gives no gravity: {ASSUMED} along -z of W, a level base, was assumed"
 
 
 def default_gravity() -> Array:
     """Return standard gravity in W, z up (3,) [m/s^2]: what holds where a description does not say."""
     return np.array([0.0, 0.0, -STANDARD_GRAVITY])
+
+
+def measures_gravity(streams: Sequence[StreamSpec]) -> bool:
+    """Return whether a stream measures gravity."""
+    return any(quantity.name == "gravity" for spec in streams for quantity in spec.quantities)
 
 
 @dataclass(frozen=True)
@@ -47,7 +54,7 @@ class ArmSpec:
 class Description:
     """What a description says.
 
-    gravity      (3,) [m/s^2] in W
+    gravity      (3,) [m/s^2] in W, and the relative standard deviation of its length
     wrench_sign  +1 on-object, -1 on-sensor
     noise        standard deviations, SI
     tool         path of a result, as written
@@ -64,6 +71,7 @@ class Description:
     placed: ObjectPose | None = None
     arm: ArmSpec | None = None
     notes: tuple[str, ...] = ()
+    gravity_std: float = 0.0
 
 
 def read_description(path: Path) -> Description:
@@ -84,7 +92,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     streams = _streams(top)
     arm = _arm(top) if "robot" in top else None
     _require_arm_for_joints(streams, arm)
-    told = "gravity" in log or any(quantity.name == "gravity" for spec in streams for quantity in spec.quantities)
+    told = "gravity" in log or measures_gravity(streams)
     return Description(
         streams=streams,
         gravity=gravity,
@@ -94,6 +102,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         placed=placed,
         arm=arm,
         notes=() if told else (LEVEL_BASE,),
+        gravity_std=0.0 if told else ASSUMED_GRAVITY_STD,
     )
 
 

@@ -16,7 +16,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
 from steelyard.io.channels import channel_with_gaps
-from steelyard.io.description import Description, default_gravity
+from steelyard.io.description import ASSUMED, Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
 from steelyard.io.missing_rows import stand_apart
@@ -24,7 +24,7 @@ from steelyard.io.stream_entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.table_header import Header
 from steelyard.io.tables import Table
 from steelyard.io.units import TIME, UNITS, spelled
-from steelyard.logs.recording import STANDARD_GRAVITY
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
@@ -97,7 +97,7 @@ def describe(table: Table) -> tuple[Description, Cells]:
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
     time = time and replace(time, where=f"{where}, time")
     streams = [StreamSpec(where, topic, where, time, poses) for topic in _topics(located, cells, time)]
-    return Description(tuple(streams), gravity, notes=notes), cells
+    return Description(tuple(streams), gravity, notes=notes, gravity_std=ASSUMED_GRAVITY_STD if notes else 0.0), cells
 
 
 def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
@@ -325,7 +325,7 @@ def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[
             return np.array([0.0, 0.0, -_size(values)]), ()
     way = " along -z of the world" if any(spec.name == "rotation" for spec in specs) else ""
     return default_gravity(), (
-        f"the file does not say gravity: {STANDARD_GRAVITY} m/s²{way} was assumed ([log] gravity of a description)",
+        f"the file does not say gravity: {ASSUMED}{way} was assumed ([log] gravity of a description)",
     )
 
 

@@ -99,4 +99,5 @@ def _recording(
         name=path.stem,
         findings=findings,
         notes=description.notes,
+        gravity_std=description.gravity_std,
     )

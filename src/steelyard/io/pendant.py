@@ -9,10 +9,10 @@ import numpy as np
 
 from steelyard import check
 from steelyard.errors import BadValue
-from steelyard.io.description import default_gravity
+from steelyard.io.description import ASSUMED, default_gravity
 from steelyard.io.rotations import rotation_of
 from steelyard.io.units import ANGLE
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream
 
 PENDANT_COLUMNS = "roll pitch yaw (deg, S to W), fx fy fz (N), tx ty tz (N*m)"
 
@@ -39,7 +39,15 @@ def read_pendant(lines: Iterable[str]) -> Recording:
         "torque": check.frozen(table[:, 6:]),
     }
     stream = Stream("pendant", channels, poses=True)
-    return Recording((stream,), default_gravity(), -1, name="pendant", described=False)
+    return Recording(
+        (stream,),
+        default_gravity(),
+        -1,
+        name="pendant",
+        notes=(f"typed poses do not say gravity: {ASSUMED} along -z of the world was assumed",),
+        described=False,
+        gravity_std=ASSUMED_GRAVITY_STD,
+    )
 
 
 def _words(line: str) -> list[str]:

@@ -9,12 +9,12 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.description import NOISE
+from steelyard.io.description import NOISE, default_gravity
 from steelyard.io.example import columns_text
 from steelyard.io.stream_entries import FRAMED
 from steelyard.io.tables import TEXT
 from steelyard.io.toml_string import toml_string
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream
 from steelyard.spatial import Pose, Rotation
 from steelyard.whole_files import whole_folder, write_text
 
@@ -85,10 +85,19 @@ def _log(recording: Recording) -> str:
             "write the recording as it was read, before its dead channels were found."
         )
     sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
-    lines = ["[log]", f"gravity = {_list(recording.gravity)}   # in the world frame W, m/s^2", f'wrench  = "{sign}"']
+    lines = ["[log]", *_gravity(recording), f'wrench  = "{sign}"']
     if recording.tool is not None:
         lines.append(f"tool    = {toml_string(str(Path(recording.tool).absolute()))}")
     return "\n".join(lines) + "\n"
+
+
+def _gravity(recording: Recording) -> list[str]:
+    """Return the line of gravity, none where it was assumed; raises BadValue where it is known to some other degree."""
+    if not recording.gravity_std:
+        return [f"gravity = {_list(recording.gravity)}   # in the world frame W, m/s^2"]
+    if recording.gravity_std == ASSUMED_GRAVITY_STD and np.array_equal(recording.gravity, default_gravity()):
+        return []
+    raise BadValue("a description has no words for how well gravity is known: set gravity_std of the recording to 0.")
 
 
 def _noise(noise: Mapping[str, float]) -> list[str]:

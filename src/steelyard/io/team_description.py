@@ -8,10 +8,11 @@ from pathlib import Path
 from typing import Any, get_args
 
 from steelyard.check import Array
-from steelyard.io.description import ARM, ArmSpec, default_gravity, parse_arm, parse_gravity
+from steelyard.io.description import ARM, ArmSpec, default_gravity, measures_gravity, parse_arm, parse_gravity
 from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.stream_entries import StreamSpec, parse_stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 from steelyard.logs.team_log import KINDS, Base, Kind
 
 EXAMPLE = """\
@@ -62,10 +63,11 @@ class RobotSpec:
 
 @dataclass(frozen=True, eq=False)
 class TeamDescription:
-    """What a team description says."""
+    """What a team description says; gravity_std as in TeamLog."""
 
     robots: tuple[RobotSpec, ...]
     reference: str
+    gravity_std: float = 0.0
 
 
 def read_team_description(path: Path) -> TeamDescription:
@@ -86,7 +88,11 @@ def parse_team_description(values: Mapping[str, Any], name: str) -> TeamDescript
         raise top.error(f"no [[robot]] is given, so there is no team. A description begins like this:\n{EXAMPLE}")
     robots = tuple(_robot(Entry(row, f"{name}, [[robot]] {k}"), team) for k, row in enumerate(rows, 1))
     reference = team.text("reference")
-    return TeamDescription(robots, robots[0].name if reference is None else reference)
+    measured = any(measures_gravity(own.streams) for robot in robots for own in robot.recordings)
+    told = measured or any(_states_gravity(place) for place in (team, *(Entry(row, name) for row in rows)))
+    return TeamDescription(
+        robots, robots[0].name if reference is None else reference, 0.0 if told else ASSUMED_GRAVITY_STD
+    )
 
 
 def _tables(entry: Entry, key: str, written: str) -> Sequence[Mapping[str, Any]]:
@@ -119,11 +125,15 @@ def _robot(entry: Entry, team: Entry) -> RobotSpec:
 def _gravity(entry: Entry, team: Entry) -> Array | None:
     """Return the robot's own gravity, else the team's, else the standard one of a level base."""
     for place in (entry, team):
-        if place.values.get("gravity") == "unknown":
-            return None
-        if "gravity" in place:
+        if _states_gravity(place):
             return parse_gravity(place)
+        if "gravity" in place:
+            return None
     return default_gravity()
+
+
+def _states_gravity(entry: Entry) -> bool:
+    return "gravity" in entry and entry.values["gravity"] != "unknown"
 
 
 def _recording(entry: Entry, known: Sequence[str]) -> RecordingSpec:

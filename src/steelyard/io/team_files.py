@@ -67,7 +67,7 @@ def _team(said: TeamDescription, path: Path, data: Path | None) -> TeamLog:
     robots = [TeamRobot(robot.name, robot.gravity, robot.base) for robot in said.robots]
     recordings = [_recording(meeting, opened, arms, path.name) for meeting in meetings]
     with _at(path.name):
-        return TeamLog(tuple(robots), tuple(recordings), said.reference)
+        return TeamLog(tuple(robots), tuple(recordings), said.reference, said.gravity_std)
 
 
 @contextmanager

@@ -14,6 +14,8 @@ from steelyard.spatial import Pose, Rotation
 
 # [m/s^2] Standard gravity, by which g and kgf are read.
 STANDARD_GRAVITY = 9.80665
+# Relative standard deviation of gravity where nobody states it: even between equator and pole, 9.780 and 9.832 m/s^2.
+ASSUMED_GRAVITY_STD = 0.0015
 # [N], [m] A pound of force and an inch.
 POUND_FORCE, INCH = 4.4482216152605, 0.0254
 # [m/s^2] Gravity as most descriptions round it: for thresholds, which a thousandth does not move.
@@ -89,6 +91,7 @@ class Recording:
     """Everything one description names.
 
     gravity       (3,) [m/s^2] in W
+    gravity_std   relative standard deviation of its length: bars of mass and first moment hold it
     wrench_sign   +1: the wrench is what the robot applies to the object; -1: the reaction (on-sensor)
     noise         declared standard deviations: force [N], torque [N m], acceleration [m/s^2],
                   angular_acceleration [rad/s^2]; missing ones are estimated
@@ -112,3 +115,4 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     described: bool = True
+    gravity_std: float = 0.0

@@ -98,6 +98,8 @@ class TeamRobot:
 class TeamLog:
     """Robots, their recordings and the reference whose grasp frame R the answer is given in.
 
+    gravity_std  relative standard deviation of the length of their gravity: bars of mass and first moment hold it
+
     Raises BadDescription or BadValue for fewer than two robots, a name used twice, a reference that is not there, a
     robot that measures no rotation, a track of an unknown robot, and where no robot has a wrench.
     """
@@ -105,6 +107,7 @@ class TeamLog:
     robots: tuple[TeamRobot, ...]
     recordings: tuple[TeamRecording, ...]
     reference: str
+    gravity_std: float = 0.0
 
     def __post_init__(self) -> None:
         object.__setattr__(self, "robots", tuple(self.robots))
@@ -201,13 +204,14 @@ class TeamLog:
         def new(name: str) -> str:
             return names.get(name, name)
 
-        return TeamLog(
-            tuple(replace(robot, name=new(robot.name)) for robot in self.robots),
-            tuple(
+        return replace(
+            self,
+            robots=tuple(replace(robot, name=new(robot.name)) for robot in self.robots),
+            recordings=tuple(
                 replace(r, tracks={new(n): t for n, t in r.tracks.items()}, away=frozenset(map(new, r.away)))
                 for r in self.recordings
             ),
-            new(self.reference),
+            reference=new(self.reference),
         )
 
     def with_homes(self, homes: Mapping[str, Pose]) -> TeamLog:
@@ -216,7 +220,7 @@ class TeamLog:
         recordings = tuple(
             replace(r, tracks={n: _moved(t, homes.get(n)) for n, t in r.tracks.items()}) for r in self.recordings
         )
-        return TeamLog(robots, recordings, self.reference)
+        return replace(self, robots=robots, recordings=recordings)
 
 
 def _rehomed(robot: TeamRobot, home: Pose | None) -> TeamRobot:

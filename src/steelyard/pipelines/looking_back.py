@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.scale import allow_scale
 from steelyard.logs.alignment import Aligned
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.load import Load
@@ -67,20 +66,15 @@ def of_sensor_and_body(
         if rows.aligned.acceleration_from in ENCODERS:
             estimate = allow_softness(load.log, estimate)
             estimate = allow_filter(load.log, estimate, rows.aligned.wrench_late_s)
-    return _with_gain(estimate, rows.aligned), found
+    return allow_scale(estimate, _scale_std(recording, rows.aligned), load.shape is not None), found
 
 
 def _has(findings: tuple[Finding, ...], code: str) -> bool:
     return any(finding.code == code for finding in findings)
 
 
-def _with_gain(estimate: Estimate, aligned: Aligned) -> Estimate:
-    """Return the estimate with the gain error of the accelerometer that alone measured a - g, where there was one.
-
-    f = m (a - g): a reading too small by a share makes mass and first moment too large by the same share.
-    """
-    if aligned.acceleration_from != "specific_force":
-        return estimate
-    share = max((m.scale_std for m in aligned.mounts.values()), default=0.0)
-    slope = np.concatenate([estimate.parameters.vector[:4], np.zeros(6)])
-    return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(slope, slope))
+def _scale_std(recording: Recording, aligned: Aligned) -> float:
+    """Return the relative standard deviation of a - g: of gravity, and of an accelerometer that alone tells it."""
+    alone = aligned.acceleration_from == "specific_force"
+    gain = max((m.scale_std for m in aligned.mounts.values()), default=0.0) if alone else 0.0
+    return float(np.hypot(recording.gravity_std, gain))

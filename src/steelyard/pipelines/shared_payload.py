@@ -20,6 +20,8 @@ from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.fit import within_numbers
+from steelyard.identify.scale import allow_scale
+from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
@@ -57,7 +59,17 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_own_numbers(log)
     found = ESTIMATORS[method].identify(log)
     before = (*stuck_forces(log), *_missing_rows(log), *_missing_wrenches(log, method))
-    return _weighed(replace(found, findings=(*before, *found.findings)))
+    return _weighed(_with_gravity(replace(found, findings=(*before, *found.findings)), log))
+
+
+def _with_gravity(found: TeamEstimate, log: TeamLog) -> TeamEstimate:
+    """Return the estimate with bars, and a note, for gravity that nobody stated."""
+    if not log.gravity_std:
+        return found
+    note = (
+        f"no robot gives gravity: {STANDARD_GRAVITY} m/s² along -z of level bases was assumed, ± {log.gravity_std:.2%}"
+    )
+    return allow_scale(found, log.gravity_std, whole=False).noted(note)
 
 
 def _weighed(found: TeamEstimate) -> TeamEstimate:

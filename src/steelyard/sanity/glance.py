@@ -6,7 +6,7 @@ low-passed alike, so that a body at rest or in slow motion obeys f = m (a - g), 
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -137,15 +137,14 @@ def glance(recording: Recording) -> Glance | None:
     return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
 
 
-def in_other_axes(recording: Recording, parts: tuple[str, ...] = _PARTS) -> Recording:
-    """Return the recording with parts of its wrench said to be in W where the last was in S, and in S where in W."""
+def in_axes(recording: Recording, world: Collection[str]) -> Recording:
+    """Return the recording with those of "torque" and "force" that `world` names said to be in W, the others in S."""
 
-    def turned(stream: Stream) -> Stream:
-        felt = set(parts) & set(stream.channels)
-        other = "S" if stream.frames.get(parts[-1], "S") == "W" else "W"
-        return replace(stream, frames={**stream.frames, **dict.fromkeys(felt, other)}) if felt else stream
+    def said(stream: Stream) -> Stream:
+        felt = {part: "W" if part in world else "S" for part in _PARTS if part in stream.channels}
+        return replace(stream, frames={**stream.frames, **felt}) if felt else stream
 
-    return replace(recording, streams=tuple(map(turned, recording.streams)))
+    return replace(recording, streams=tuple(map(said, recording.streams)))
 
 
 def channel(recording: Recording, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:

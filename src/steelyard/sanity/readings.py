@@ -21,7 +21,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding, percent
 from steelyard.logs.misread import MISREAD, Misread
 from steelyard.logs.recording import Recording
-from steelyard.sanity.glance import Glance, glance, in_other_axes
+from steelyard.sanity.glance import Glance, glance, in_axes
 from steelyard.sanity.static_fit import StaticFit, fit
 from steelyard.sanity.tilt import GlanceTilt, tilt_of, turned_sensor
 
@@ -87,7 +87,7 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
     bar = MUCH_BETTER * given.fit.force_share
     able = [
         r
-        for r in (*_rivals(recording, view, given.gravity), *_in_other_axes(recording, given))
+        for r in (*_rivals(recording, view, given.gravity), *_in_other_axes(recording, view, given))
         if r.fit.force_share < min(bar, 0.5)
         and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
         and r.fit.sign != 0
@@ -142,13 +142,29 @@ def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Read
                 yield reading_of(view, words, sign * size * np.eye(3)[axis], R)
 
 
-def _in_other_axes(recording: Recording, given: Reading) -> Iterator[Reading]:
-    """Yield the reading of the wrench in W where it was said to be in S, and in S where it was said to be in W."""
-    view = None if any(recording.dead) else glance(in_other_axes(recording))
-    if view is not None and given.rotation is not None:
-        axes = "W (the base), not of S" if "force" in view.world else "S, not of W (the base)"
-        words = f"the wrench is in the axes of {axes}"
-        yield replace(reading_of(view, words, given.gravity, given.rotation), view=view)
+def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterator[Reading]:
+    """Yield the reading of the wrench in W where it was said to be in S, and in S where it was said to be in W.
+
+    Torques go with the forces, unless they belong to them much better in the others' axes.
+    """
+    if any(recording.dead) or given.rotation is None:
+        return
+    both = frozenset(() if "force" in view.world else ("torque", "force"))
+    views = {world: glance(in_axes(recording, world)) for world in (both, both ^ {"torque"})}
+    found = [
+        replace(reading_of(other, _axes_in_words(world), given.gravity, given.rotation), view=other)
+        for world, other in views.items()
+        if other is not None
+    ]
+    yield from found[:1]
+    yield from (r for r in found[1:] if r.fit.torque_share < BESIDE * found[0].fit.torque_share)
+
+
+def _axes_in_words(world: frozenset[str]) -> str:
+    if len(world) == 1:
+        (turned,) = world
+        return f"the {turned}s are in the axes of W (the base), the {'torque' if turned == 'force' else 'force'}s in S"
+    return f"the wrench is in the axes of {'W (the base), not of S' if world else 'S, not of W (the base)'}"
 
 
 def _outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
@@ -190,16 +206,15 @@ def rival_finding(best: Reading, given: Reading) -> Finding:
         f"left unexplained instead of {percent(instead)}. The answer assumes this."
     )
     if best.view is not None:
-        axes = "W" if "force" in best.view.world else "S"
-        remedy = f'Set frame = "{axes}" in force and torque of this stream.'
-        return Finding("gravity-frame", message, remedy)
+        axes = [f'frame = "{"W" if part in best.view.world else "S"}" in its {part}' for part in ("force", "torque")]
+        return Finding("gravity-frame", message, f"Set {' and '.join(axes)} in the description of this stream.")
     return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
 
 
 def as_read(recording: Recording, best: Reading) -> Recording:
     """Return the recording with its rotations, gravity and axes of the wrench as the reading has them."""
     if best.view is not None:
-        return in_other_axes(recording)
+        return in_axes(recording, best.view.world)
     if best.misread is None:
         return replace(recording, gravity=best.gravity)
     return _put_right(recording, best.misread) or recording

@@ -14,7 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording
-from steelyard.sanity.glance import Glance, Seen, in_other_axes
+from steelyard.sanity.glance import Glance, Seen, in_axes
 from steelyard.sanity.mirrored import REFLECTIONS, in_words
 from steelyard.sanity.readings import BESIDE, Reading, misread_rotations
 from steelyard.sanity.static_fit import columns, solve
@@ -114,7 +114,7 @@ def _elsewhere(
             f"instead of {_percent(share)}. The answer assumes this."
         )
         remedy = f'Set frame = "{"S" if "torque" in view.world else "W"}" in the torque of this stream.'
-        return in_other_axes(recording, ("torque",)), (Finding("gravity-frame", text, remedy),)
+        return in_axes(recording, view.world ^ {"torque"}), (Finding("gravity-frame", text, remedy),)
     if view.position is None:
         return recording, ()
     arm = view.smooth(np.einsum("nji,nj->ni", rotation, view.position))
