@@ -191,6 +191,18 @@ def test_wrong_descriptions(tmp_path: Path, old: str, new: str, said: str) -> No
     assert message(path) == said.replace("LARGEST", f"{np.abs(largest).max():.4g}")
 
 
+def test_radians_declared_as_degrees(tmp_path: Path) -> None:
+    path = write(tmp_path)
+    header, *rows = (tmp_path / "log.csv").read_text().splitlines()
+    table = np.array([row.split(",") for row in rows], float)
+    table[:, 6:] = ANGLES
+    np.savetxt(tmp_path / "log.csv", table, "%.12g", ",", header=header, comments="")
+    largest = f"{np.abs(ANGLES).max():.4g}"
+    wanted = f'joint is ever beyond {largest} deg. They are probably in radians: set unit = "rad".'
+    assert message(path).startswith(f"{STREAM}, joint_position: ")
+    assert message(path).endswith(wanted)
+
+
 FILES = {
     "no XML": ("<robot", "<<robot", "DIR/arm.urdf: expected a URDF; this is not valid XML (not well-formed (invalid token): line 2, column 1)."),
     "xacro": ("<robot ", '<xacro:property name="a" value="b"/><robot ', "DIR/arm.urdf: this is a xacro, not a URDF yet. Write it out first: xacro arm.urdf > arm.urdf"),

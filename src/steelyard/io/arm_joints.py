@@ -22,6 +22,8 @@ from steelyard.io.urdf_files import read_arm
 from steelyard.logs.recording import Stream
 from steelyard.robots.serial import SerialArm
 
+# From so many turning joints on, an arm at work holds one of them beyond 6.3 degrees.
+_ARM = 3
 _IN_BRACKETS = re.compile(r"\[([^\]]+)\]$")
 
 
@@ -97,4 +99,9 @@ def _require_likely(spec: QuantitySpec, angles: Array) -> None:
         raise BadValue(
             f"{spec.where}: joints turn by up to {largest:.4g} rad, more than two turns. They are probably in degrees: "
             'set unit = "deg".'
+        )
+    if spec.unit == "deg" and len(angles) and angles.shape[1] >= _ARM and largest <= np.radians(2 * np.pi):
+        raise BadValue(
+            f"{spec.where}: no joint is ever beyond {np.degrees(largest):.4g} deg. They are probably in radians: "
+            'set unit = "rad".'
         )
