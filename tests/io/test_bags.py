@@ -258,6 +258,23 @@ def test_frames_beside_the_way_do_not_matter(tmp_path: Path) -> None:
         _table(tmp_path / "run", ("base", "camera")).read([3])
 
 
+@pytest.mark.parametrize("bad", [1, 5])
+def test_a_transform_without_a_turn_costs_itself_alone(tmp_path: Path, bad: int) -> None:
+    maker, out = Maker(ROS2), []
+    for n in range(20):
+        told = maker.transforms(START + n, {("base", "tool"): Pose(Rotation.identity(), np.array([0.0, 0.0, n]))})
+        if n in range(3, 3 + bad):
+            told.transforms[0].transform.rotation = maker.types["geometry_msgs/msg/Quaternion"](0.0, 0.0, 0.0, 0.0)
+        out.append(("/tf", TF, START + n, told))
+    write_bag(tmp_path / "run", out)
+    table = _table(tmp_path / "run", ("base", "tool"))
+    if bad == 1:
+        assert table.read([3])[3].tolist() == [0, 1, 2, *range(4, 20)]
+    else:
+        with pytest.raises(BadInput, match='transforms of "tool" in "base": the quaternion has norm zero'):
+            table.read([3])
+
+
 def test_a_folder_without_its_metadata(tmp_path: Path) -> None:
     write_bag(tmp_path / "run", log_of(Maker(ROS2), 20)[0])
     (tmp_path / "run" / "metadata.yaml").unlink()

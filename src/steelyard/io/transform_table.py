@@ -23,7 +23,8 @@ from steelyard.io.bag_table import STAMP, stamps_of
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.bounds import require_bounded
 from steelyard.io.entries import listed
-from steelyard.io.rotations import rotation_of
+from steelyard.io.missing_rows import MOST_MISSING
+from steelyard.io.rotations import NORM, rotation_of
 from steelyard.io.table_header import Columns, Header
 from steelyard.spatial import Pose, Rotation
 
@@ -64,9 +65,16 @@ class Heard:
         self.poses.extend((place.x, place.y, place.z, turn.x, turn.y, turn.z, turn.w))
 
     def link(self, fixed: bool) -> Link:
-        """Return the link in the order of time: of transforms with one stamp the first, of fixed ones the last."""
+        """Return the link in the order of time: of transforms with one stamp the first, of fixed ones the last.
+
+        Single transforms without a turn are left out, as tf2 does; where they are many, BadValue names one.
+        """
         values = np.array(self.poses).reshape(-1, 7)
-        stamps, index = np.unique(stamps_of(np.array(self.times).reshape(-1, 2))[:, 0], return_index=True)
+        times = np.array(self.times).reshape(-1, 2)
+        sound = np.isfinite(values).all(1) & (np.abs(np.linalg.norm(values[:, 3:], axis=1) - 1) <= NORM)
+        if sound.mean() >= 1 - MOST_MISSING:
+            values, times = values[sound], times[sound]
+        stamps, index = np.unique(stamps_of(times)[:, 0], return_index=True)
         values = values[-1:] if fixed else values[index]
         return Link(stamps, Pose(rotation_of(values[:, 3:], "quaternion-xyzw"), values[:, :3]), fixed)
 
