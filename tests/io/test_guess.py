@@ -206,6 +206,41 @@ def test_the_example_for_an_array_file_names_its_arrays(tmp_path: Path) -> None:
     assert 'force    = { columns = ["force_sensor"], unit = "N" }\n' in str(caught.value)
 
 
+def numbered(pattern: str, count: int) -> list[str]:
+    return [pattern.format(k) for k in range(count)]
+
+
+CONTROLLERS = {
+    "UR": (
+        ["timestamp", *numbered("actual_TCP_pose_{}", 6), *numbered("actual_TCP_force_{}", 6)],
+        [0.5, -0.2, 0.3, 0.1, -0.4, 0.2, *W],
+        Rotation.exp([0.1, -0.4, 0.2]),
+        "W",
+    ),
+    "Franka": (
+        ["time", *numbered("O_T_EE[{}]", 16), *numbered("K_F_ext_hat_K[{}]", 6)],
+        [0, 1, 0, 0, -1, 0, 0, 0, 0, 0, 1, 0, 0.5, -0.2, 0.3, 1, *W],
+        Rotation.exp([0, 0, np.pi / 2]),
+        "S",
+    ),
+}
+
+
+@pytest.mark.parametrize(("names", "row", "turn", "frame"), CONTROLLERS.values(), ids=CONTROLLERS.keys())
+def test_the_example_for_a_controller_says_what_its_columns_are(
+    tmp_path: Path, names: list[str], row: list[float], turn: Rotation, frame: str
+) -> None:
+    """What is told can be written as it stands, and reads as the controller means it."""
+    with pytest.raises(BadDescription) as caught:
+        bare(tmp_path, names, [0.0, *row], [0.002, *row])
+    (tmp_path / "log.toml").write_text("[log]\n[[stream]]\n" + stream_lines(str(caught.value)))
+    (stream,) = read_recording(tmp_path / "log.toml").streams
+    np.testing.assert_allclose(stream.channels["rotation"][0], turn.matrix, atol=1e-12)
+    assert stream.channels["position"][0].tolist() == [0.5, -0.2, 0.3]
+    assert [*stream.channels["force"][0], *stream.channels["torque"][0]] == W
+    assert {stream.frames.get(part, "S") for part in ("force", "torque")} == {frame}
+
+
 def test_the_example_for_a_file_without_header_counts_columns(tmp_path: Path) -> None:
     with pytest.raises(BadDescription) as caught:
         bare(tmp_path, ["0", *map(str, [*W, *Q])], [0.01, *W, *Q])

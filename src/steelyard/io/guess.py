@@ -16,6 +16,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
 from steelyard.io.channels import channel_with_gaps
+from steelyard.io.controllers import known_lines
 from steelyard.io.description import ASSUMED, Description, default_gravity
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
@@ -239,6 +240,8 @@ def _own_lines(table: Table, names: _Names) -> dict[str, str]:
     if turn := _rotation(names):
         numbers = [int(n) for n in turn.columns]
         lines["rotation"] = f'{{ columns = {_columns(table, numbers)}, form = "{turn.form}" }}   # S to W'
+    for quantity, columns, rest, remark in known_lines(names.plain):
+        lines[quantity] = f"{{ columns = {_columns(table, columns)}, {rest} }}   # {remark}"
     return lines
 
 
