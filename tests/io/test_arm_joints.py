@@ -8,9 +8,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refused import message
 
 import steelyard as sy
-from steelyard.errors import BadInput
 from steelyard.io import read_team, write_team
 from steelyard.io.log_files import read_recording
 from steelyard.io.urdf_files import read_arm
@@ -175,12 +175,6 @@ WRONG = {
     "fixed": ('sensor_link = "tool0"', 'sensor_link = "base"', 'DIR/arm.urdf: no joint moves link "base" against "world". Name the link of the sensor.'),
     "pose twice": ("joint_position", 'position = { columns = ["fx", "fy", "fz"] }\njoint_position', f'{STREAM}: "joint_position" tells the position, too. Give one of them.'),
 }  # fmt: skip
-
-
-def message(path: Path) -> str:
-    with pytest.raises(BadInput) as error:
-        read_recording(path)
-    return str(error.value).replace(str(path.parent), "DIR")
 
 
 @pytest.mark.parametrize(("old", "new", "said"), WRONG.values(), ids=WRONG.keys())

@@ -11,6 +11,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from refused import message
 
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue, MissingDependency
 from steelyard.io import read_recording
@@ -50,13 +51,6 @@ def swap(text: str, old: str, new: str) -> str:
 def with_matrix(rows: list[str]) -> tuple[str, str]:
     toml = swap(TOML, '["qw", "qx", "qy", "qz"], form = "quaternion-wxyz"', f'{MATRIX}, form = "matrix"')
     return toml, "t,fx,fy,fz,tx,ty,tz," + TURN + "\n" + "".join(f"{t},1,2,3,4,5,6,{r}\n" for t, r in enumerate(rows))
-
-
-def message(path: Path, error: type[BadInput] = BadInput, data: Path | None = None) -> str:
-    """Return the text of the error, with the folder written as DIR."""
-    with pytest.raises(error) as caught:
-        read_recording(path, data)
-    return str(caught.value).replace(str(path.parent), "DIR")
 
 
 DESCRIPTIONS: list[tuple[str, str, str, str]] = [

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from refused import message
 from rosbags import rosbag1, rosbag2
 from rosbags.rosbag2.enums import StoragePlugin
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -339,12 +340,6 @@ WRONG = {
         f'{STREAM}: "frames" belongs to a topic of transforms: topic = "/tf".',
     ),
 }
-
-
-def message(path: Path) -> str:
-    with pytest.raises(BadInput) as error:
-        read_recording(path)
-    return str(error.value).replace(str(path.parent), "DIR")
 
 
 @pytest.mark.parametrize(("old", "new", "said"), WRONG.values(), ids=WRONG.keys())
