@@ -100,7 +100,7 @@ class SavedParts:
         )
         if self.tree is None:
             raise other
-        node = self.tree.of_cells(self.tree.piece, self.solid.volumes).volume
+        node = np.asarray(self.tree.of_cells(self.tree.piece, self.solid.volumes).volume)
         matching = [np.flatnonzero(np.isclose(node, volume, rtol=_SAME, atol=0)) for volume in volumes]
         if not all(len(found) for found in matching):
             raise other

@@ -44,7 +44,13 @@ class Drawn:
 
 @dataclass(frozen=True, eq=False)
 class _Cells:
-    """Cells that reach from patch to patch: the solid they make, where each comes from, and its patch."""
+    """Cells that reach from patch to patch.
+
+    mesh       the solid that they make, cuts among its vertices
+    cell       (T,) the cell that each is, or was cut from
+    patch      (T,) that each belongs to; -1 of cells of a part that no corner has: they keep it
+    of_vertex  (V,) the patch of every vertex; of a cut, one of the two that meet there
+    """
 
     mesh: TetMesh
     cell: Integers
@@ -60,16 +66,18 @@ def cut_at_borders(mesh: TetMesh, skin: Skin, labels: Integers, part: Integers) 
     part    (V,) part of every vertex
     """
     long = _LONG * float(np.median(skin.lengths))
-    # A cell of a part that none of its corners has is left as it is.
-    own = part[mesh.tets] == labels[:, None]
     if not len(_long_edges(mesh, part, long, len(part))):
         return None
     patch = _patches(skin, part)
     corners = patch[mesh.tets]
-    reaching = (corners != corners[:, :1]).any(1) & own.any(1)
+    reaching = (corners != corners[:, :1]).any(1)
     cells = np.flatnonzero(reaching)
-    first = corners[cells, own[cells].argmax(1)]
-    now, places = _Cells(mesh.chosen(cells), cells, first, patch), _crossings(skin, part, long)
+    own = part[mesh.tets[cells]] == labels[cells, None]
+    first = np.take_along_axis(corners[cells], own.argmax(1)[:, None], 1)[:, 0]
+    now, places = (
+        _Cells(mesh.chosen(cells), cells, np.where(own.any(1), first, -1), patch),
+        _crossings(skin, part, long),
+    )
     for here, there, beyond in _borders(skin, patch):
         edges = _long_edges(now.mesh, beyond[now.of_vertex].astype(np.int64), long, len(part))
         share = _shares(_lines(skin, places, beyond[patch]), now.mesh.vertices, edges)
@@ -80,7 +88,7 @@ def cut_at_borders(mesh: TetMesh, skin: Skin, labels: Integers, part: Integers) 
         return None
     of_patch = np.zeros(len(patch), np.int64)
     of_patch[patch] = part
-    moved = np.flatnonzero(of_patch[now.patch] != labels[now.cell])
+    moved = np.flatnonzero((now.patch >= 0) & (of_patch[now.patch] != labels[now.cell]))
     vertex = np.full(len(mesh) - len(cells) + len(now.cell), -1)
     vertex[len(mesh) - len(cells) + moved] = _nearest(mesh.vertices, patch, now.mesh.centroids[moved], now.patch[moved])
     kept = np.flatnonzero(~reaching)
@@ -104,7 +112,8 @@ def _patches(skin: Skin, part: Integers) -> Integers:
     links = np.concatenate([skin.edges, np.column_stack([inside, nearest])])
     one, two = links[part[links[:, 0]] == part[links[:, 1]]].T
     joined = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(len(part), len(part)))
-    return np.asarray(connected_components(joined, directed=False)[1], dtype=np.int64)
+    patch: Integers = connected_components(joined, directed=False)[1].astype(np.int64)
+    return patch
 
 
 def _borders(skin: Skin, patch: Integers) -> Iterator[tuple[int, int, Any]]:
@@ -141,7 +150,7 @@ def _long_edges(mesh: TetMesh, side: Integers, long: float, count: int) -> Integ
     """
     edges = crossing_edges(mesh, side)
     length = np.linalg.norm(mesh.vertices[edges[:, 1]] - mesh.vertices[edges[:, 0]], axis=1)
-    return edges[(length > long) | (edges >= count).any(1)]
+    return np.asarray(edges[(length > long) | (edges >= count).any(1)])
 
 
 def _cut_at(now: _Cells, edges: Integers, share: Array, beyond: Any, patches: tuple[int, int]) -> _Cells:
@@ -153,8 +162,9 @@ def _cut_at(now: _Cells, edges: Integers, share: Array, beyond: Any, patches: tu
     cut = cut_cells(now.mesh, edges, share)
     side = np.concatenate([beyond[now.of_vertex].astype(np.int64), np.full(len(edges), -1)])[cut.mesh.tets]
     patch = now.patch[cut.cell]
-    inner, outer = ~(side == 1).any(1) & beyond[patch], ~(side == 0).any(1) & ~beyond[patch]
-    patch = np.where(inner, patches[0], np.where(outer, patches[1], patch))
+    lies, known = beyond[patch], patch >= 0
+    patch = np.where(known & lies & ~(side == 1).any(1), patches[0], patch)
+    patch = np.where(known & ~lies & ~(side == 0).any(1), patches[1], patch)
     of_vertex = np.concatenate([now.of_vertex, np.full(len(edges), patches[0])])
     return _Cells(cut.mesh, now.cell[cut.cell], patch, of_vertex)
 
@@ -188,7 +198,7 @@ def _crossings(skin: Skin, part: Integers, longest: float) -> Array:
             there = first + (share + step)[:, None] * way
             share += step * (part[tree.query(there)[1]] == mine)
         places[long] = first + (share + step / 2)[:, None] * way
-    return places
+    return np.asarray(places)
 
 
 def _lines(skin: Skin, places: Array, beyond: Any) -> Array:
@@ -206,7 +216,7 @@ def _lines(skin: Skin, places: Array, beyond: Any) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def _shares(lines: Array, vertices: Array, edges: Integers) -> Array:
-    """Return how far along each edge (E, 2) from here to beyond the number is a half; NaN where its ends do not tell."""
+    """Return how far along each edge (E, 2) to beyond the number is a half; NaN where its ends do not tell."""
     out, work = np.full(len(edges), np.nan), np.empty((2, lines.shape[1]))
     known = np.full(len(vertices), np.nan)
     for e in range(len(edges)):
