@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from steelyard.check import Array
+from steelyard.io.parts_files import SavedParts, read_parts, write_parts
 from steelyard.parts.inner_borders import cut_at_borders, over_half
 from steelyard.parts.pieces import cell_colours
 from steelyard.parts.segment import Segmentation, segment
@@ -117,3 +120,13 @@ def test_winding_numbers_of_half_a_ball() -> None:
         disc = (1 - abs(height) / np.hypot(1, height)) / 2
         number = 1 - disc if height > 0 else disc
         assert over_half(lines, np.array([0.0, 0.0, height]), work) == pytest.approx(number - 0.5, abs=1e-4)
+
+
+def test_a_file_of_parts_holds_the_cut_cells_and_other_cuts_of_the_tree(tmp_path: Path) -> None:
+    cloud = ball([0.01, -0.01], NORMALS[0])
+    found = segment(cloud, enclose(cloud), parts=3)
+    write_parts(SavedParts(found.mesh, found.labels, found.rgb, found.hierarchy, found.names), tmp_path / "parts.npz")
+    saved = read_parts(tmp_path / "parts.npz")
+    np.testing.assert_allclose(saved.parts.moments, found.parts.moments, rtol=1e-9, atol=1e-18)
+    two = found.cut(2)
+    np.testing.assert_array_equal(saved.recut(two.parts.volume).labels, two.labels)
