@@ -195,6 +195,24 @@ def test_bars_hold_borders_that_nobody_sees_inside_a_thick_body(seed: int) -> No
     assert off.max() < 3.0
 
 
+def test_a_ball_with_a_cap_of_steel_has_the_inertia_of_both() -> None:
+    """Its cells reach from side to side; uncut, they make the cap twice as large, and the inertia 8 % wrong."""
+    radius, low = 0.03, 0.0105
+    xyz = np.random.default_rng(0).normal(size=(2000, 3))
+    xyz *= radius / np.linalg.norm(xyz, axis=1)[:, None]
+    cloud = Cloud(xyz, np.where(xyz[:, 2:] > low, [[178, 176, 172]], [[186, 52, 38]]).astype(np.uint8))
+    step = radius / 5000
+    z = np.arange(-radius + step / 2, radius, step)
+    mass, square = step * np.where(z > low, 7850.0, 1150.0) * np.pi * (radius**2 - z**2), radius**2 - z**2
+    second = np.diag([mass @ square / 4, mass @ square / 4, mass @ z**2])
+    pseudo = np.block([[second, np.array([[0], [0], [mass @ z]])], [np.array([[0, 0, mass @ z, mass.sum()]])]])
+    X_SO = Pose(Rotation.exp([0.3, -0.5, 0.4]), np.array([0.01, -0.02, 0.1]))
+    true = InertialParameters.from_pseudo_inertia(pseudo).in_frame(X_SO)
+    found = sy.identify(handling_log(true, noise="low", seed=0), scan=shape_of(cloud), pose_in_sensor=X_SO)
+    off = np.linalg.norm(found.inertia_com - true.inertia_com) / np.linalg.norm(true.inertia_com)
+    assert off < 0.015
+
+
 def test_parts_that_were_asked_for_or_joined_by_hand_are_all_that_a_log_is_offered() -> None:
     free = shape_of(two_blocks())
     assert len(free.segmentation) == 2

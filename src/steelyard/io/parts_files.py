@@ -100,7 +100,7 @@ class SavedParts:
         )
         if self.tree is None:
             raise other
-        node = _node_volumes(self.tree, self.solid)
+        node = np.asarray(self.tree.of_cells(self.tree.piece, self.solid.volumes).volume)
         matching = [np.flatnonzero(np.isclose(node, volume, rtol=_SAME, atol=0)) for volume in volumes]
         if not all(len(found) for found in matching):
             raise other
@@ -121,14 +121,6 @@ class SavedParts:
         cells = self.rgb[self.labels] * self.solid.volumes[:, None]
         sums = [np.bincount(labels, column, count) for column in (*cells.T, self.solid.volumes)]
         return np.stack(sums[:3], axis=1) / sums[3][:, None]
-
-
-def _node_volumes(tree: Hierarchy, solid: TetMesh) -> Array:
-    """Return the volume (2N-1,) of every node of the tree [m^3]."""
-    volume = np.concatenate([np.bincount(tree.piece, solid.volumes, len(tree)), np.zeros(len(tree.merges))])
-    for k, (a, b) in enumerate(tree.merges):
-        volume[len(tree) + k] = volume[a] + volume[b]
-    return volume
 
 
 def write_parts(saved: SavedParts, path: Path | str) -> None:

@@ -69,6 +69,13 @@ class Hierarchy:
         parent[self.merges.ravel()] = np.repeat(len(self) + np.arange(len(self.merges)), 2)
         return parent
 
+    def of_cells(self, piece: Integers, volumes: Array) -> Hierarchy:
+        """Return the same tree over other cells: their pieces (T,) and volumes (T,) [m^3]; hulls are not known then."""
+        volume = np.concatenate([np.bincount(piece, volumes, len(self)), np.zeros(len(self.merges))])
+        for k, (a, b) in enumerate(self.merges):
+            volume[len(self) + k] = volume[a] + volume[b]
+        return Hierarchy(piece, self.merges, self.cost, volume)
+
     def children(self, node: int) -> tuple[int, int] | None:
         """Return the two nodes that `node` was made of, None for a piece."""
         below = self.merges[self._node(node) - len(self)] if node >= len(self) else None

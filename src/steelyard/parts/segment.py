@@ -22,6 +22,7 @@ from steelyard.parts.description import Cuts, cuts_of
 from steelyard.parts.doubt import doubts
 from steelyard.parts.fades import without_fades
 from steelyard.parts.hierarchy import Hierarchy
+from steelyard.parts.inner_borders import cut_at_borders
 from steelyard.parts.parts import Parts
 from steelyard.parts.pieces import cell_colours, inner_faces, pieces_of, with_points
 from steelyard.parts.prints import without_prints
@@ -42,7 +43,7 @@ AROUND = 16  # cells nearest to a point among which there is one of its colour, 
 class Segmentation:
     """A solid in P parts.
 
-    mesh        the solid, T tets [m]
+    mesh        the solid, T tets [m]; those that reached through it from part to part are cut at the border
     labels      (T,) the part 0..P-1 of every tet, by falling volume
     hierarchy   the tree that the parts are cut from
     cuts        the best cut into every number of parts, with its description length; None where `labels` were given
@@ -50,6 +51,7 @@ class Segmentation:
     point_part  (N,) the part of every point of the cloud: that of the nearest tet of the point's colour
     names       (P,) what each part is called
     findings    what a reader must know of the cut that was chosen; none of a cut asked for
+    inner       how many vertices, the last ones, lie inside, where cells are cut at borders
     """
 
     mesh: TetMesh
@@ -62,6 +64,7 @@ class Segmentation:
     cloud: Cloud
     nearest: Integers
     findings: tuple[Finding, ...] = ()
+    inner: int = 0
 
     def __len__(self) -> int:
         """Number P of parts."""
@@ -76,18 +79,18 @@ class Segmentation:
     def border_share(self) -> float:
         """Share of the volume that corners of another part say, of cells that reach from one part to another.
 
-        Inside a thick body nothing shows where the border lies, and cells reach through it.
+        Inside a thick body nothing shows where the border lies. Corners where cells were cut at it count half: it is
+        taken to be flat.
         """
-        foreign = (self._vertex_part[self.mesh.tets] != self.labels[:, None]).mean(1)
-        return float((self.mesh.volumes * foreign).sum() / self.mesh.volume)
+        cut = self.mesh.tets >= len(self.mesh.vertices) - self.inner
+        foreign = np.where(cut, 0.5, self._vertex_part[self.mesh.tets] != self.labels[:, None])
+        return float((self.mesh.volumes * foreign.mean(1)).sum() / self.mesh.volume)
 
     @property
     def _vertex_part(self) -> Integers:
         """The part (V,) of every vertex: that of the nearest point."""
         from scipy.spatial import cKDTree
 
-        if _same(self.cloud, self.mesh):
-            return self.point_part
         return np.asarray(self.point_part[cKDTree(self.cloud.xyz).query(self.mesh.vertices)[1]])
 
     @property
@@ -204,8 +207,32 @@ def parts_of_pieces(pieces: Pieces, *, parts: int | None = None, per_part: float
         pieces.mesh, one, tree.hierarchy, cuts, None, one[pieces.nearest], ("part 0",), pieces.cloud, pieces.nearest
     )
     if parts is not None:
-        return whole.cut(parts)
-    return replace(whole.cut(cuts.count), findings=doubts(cuts, pieces.colour))
+        return _with_borders(whole.cut(parts), pieces.skin)
+    return replace(_with_borders(whole.cut(cuts.count), pieces.skin), findings=doubts(cuts, pieces.colour))
+
+
+def _with_borders(made: Segmentation, skin: Skin) -> Segmentation:
+    """Return parts with the cells that reach from one to another cut at the border; solids of other vertices as is.
+
+    skin  the boundary of the solid
+    """
+    if len(made) == 1 or not _same(made.cloud, made.mesh):
+        return made
+    cut = cut_at_borders(made.mesh, skin, made.labels, made.point_part)
+    if cut is None:
+        return made
+    tree, kept = made.hierarchy, cut.vertex < 0
+    old = tree.piece[cut.cell]
+    tree = tree.of_cells(np.where(kept, old, tree.piece[made.nearest[cut.vertex]]), cut.mesh.volumes)
+    # Every cut cell keeps its part somewhere: there its points go on.
+    staying = np.flatnonzero(kept)[::-1]
+    nearest = np.empty(len(made.mesh), np.int64)
+    nearest[cut.cell[staying]] = staying
+    labels = np.where(kept, made.labels[cut.cell], made.point_part[cut.vertex])
+    inner = len(cut.mesh.vertices) - len(made.mesh.vertices)
+    cuts = None if made.cuts is None else replace(made.cuts, hierarchy=tree)
+    drawn = replace(made, mesh=cut.mesh, hierarchy=tree, cuts=cuts, nearest=nearest[made.nearest], inner=inner)
+    return drawn._labelled(labels)
 
 
 def nearest_cell(points: Array, centroids: Array) -> Integers:
