@@ -79,11 +79,11 @@ class Segmentation:
     def border_share(self) -> float:
         """Share of the volume that corners of another part say, of cells that reach from one part to another.
 
-        Inside a thick body nothing shows where the border lies. Corners where cells were cut at it count half: it is
-        taken to be flat.
+        Inside a thick body nothing shows where the border lies. Corners where cells were cut at it count, too: it is
+        taken to be flat, which a tang or a plug is not.
         """
         cut = self.mesh.tets >= len(self.mesh.vertices) - self.inner
-        foreign = np.where(cut, 0.5, self._vertex_part[self.mesh.tets] != self.labels[:, None])
+        foreign = cut | (self._vertex_part[self.mesh.tets] != self.labels[:, None])
         return float((self.mesh.volumes * foreign.mean(1)).sum() / self.mesh.volume)
 
     @property
