@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from steelyard.errors import BadInput, BadValue, CannotAnswer
+from steelyard.errors import BadDescription, BadInput, BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording, read_result
 from steelyard.io.in_file import in_file
@@ -169,4 +169,12 @@ def _tool(tool: str | Path | Recording | Estimate | None, data: str | Path | Non
     """Return the tool, read where it is given as a path."""
     if not isinstance(tool, str | Path):
         return tool
-    return read_result(tool) if Path(tool).suffix == ".json" else read_recording(tool, data)
+    if Path(tool).suffix == ".json":
+        return read_result(tool)
+    recording = read_recording(tool, data)
+    if recording.tool is not None:
+        raise BadDescription(
+            f'{Path(tool).name}, [log]: a tool\'s run cannot have a "tool" taken away itself: the load weighs both. '
+            "Leave the key out of this description."
+        )
+    return recording
