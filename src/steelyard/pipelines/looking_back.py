@@ -66,8 +66,9 @@ def not_tared(load: Load, estimate: Estimate) -> tuple[Finding, ...]:
     torque, force = (float(np.abs(part).max()) for part in np.split(freed.wrench_bias, 2))
     left = f"from {estimate.evidence.residual_force_N:.2g} to {freed.evidence.residual_force_N:.2g} N rms"
     message = (
-        f"The sensor is not tared: it reads up to {force:.2g} N and {torque:.2g} N m without a load. Where this bias is "
-        f"estimated, what no body explains falls {left}, and the mass borne goes from {estimate.mass:.4g} to {freed.mass:.4g} kg."
+        f"The sensor is not tared: it reads up to {force:.2g} N and {torque:.2g} N m without a load. Where this bias "
+        f"is estimated, what no body explains falls {left}, and the mass borne goes from {estimate.mass:.4g} to "
+        f"{freed.mass:.4g} kg."
     )
     return (Finding("wrench-unexplained", message, "Leave out --bias none, or tare the sensor without a load before."),)
 

@@ -43,7 +43,7 @@ def _moved(log: TeamLog, recording: TeamRecording) -> Array:
     """Return how far the payload turns [rad] and moves [m] from its middle: as far as the robot that does so least."""
     tracks = [track for name, track in recording.tracks.items() if log.robot(name).base == "still"]
     posed = [track for track in tracks if track.mask("rotation", "position").any()]
-    return np.min([_reach(track) for track in posed], axis=0) if posed else np.zeros(2)
+    return np.asarray(np.min([_reach(track) for track in posed], axis=0)) if posed else np.zeros(2)
 
 
 def _reach(track: Track) -> Array:
@@ -53,4 +53,4 @@ def _reach(track: Track) -> Array:
     middle = np.abs(matrix - np.median(matrix, 0)).sum((-1, -2)).argmin()
     turned = np.linalg.norm(turns_between(Rotation(matrix[middle]), Rotation(matrix)), axis=-1)
     moved = np.linalg.norm(place - np.median(place, 0), axis=-1)
-    return np.quantile([turned, moved], 1 - BEYOND, axis=1)
+    return np.asarray(np.quantile([turned, moved], 1 - BEYOND, axis=1))
