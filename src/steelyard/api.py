@@ -64,6 +64,8 @@ def identify(
         raise BadValue("parts and a scan both say what the object looks like; give one of them.")
     if options.materials and parts is None and scan is None:
         raise BadValue("materials are of the parts of a shape: give parts or a scan with them, or leave them out.")
+    if pose_in_sensor is not None and parts is None and scan is None:
+        raise BadValue("pose_in_sensor says where a shape sits: give parts or a scan with it, or leave it out.")
     place = None if pose_in_sensor is None else _place(pose_in_sensor)
     if isinstance(log, MotionLog):
         known = _tool(tool, data)
