@@ -7,7 +7,7 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from steelyard.errors import BadInput, BadValue, CannotAnswer
+from steelyard.errors import BadDescription, BadInput, BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording, read_result
 from steelyard.io.in_file import in_file
@@ -64,6 +64,8 @@ def identify(
         raise BadValue("parts and a scan both say what the object looks like; give one of them.")
     if options.materials and parts is None and scan is None:
         raise BadValue("materials are of the parts of a shape: give parts or a scan with them, or leave them out.")
+    if pose_in_sensor is not None and parts is None and scan is None:
+        raise BadValue("pose_in_sensor says where a shape sits: give parts or a scan with it, or leave it out.")
     place = None if pose_in_sensor is None else _place(pose_in_sensor)
     if isinstance(log, MotionLog):
         known = _tool(tool, data)
@@ -169,4 +171,12 @@ def _tool(tool: str | Path | Recording | Estimate | None, data: str | Path | Non
     """Return the tool, read where it is given as a path."""
     if not isinstance(tool, str | Path):
         return tool
-    return read_result(tool) if Path(tool).suffix == ".json" else read_recording(tool, data)
+    if Path(tool).suffix == ".json":
+        return read_result(tool)
+    recording = read_recording(tool, data)
+    if recording.tool is not None:
+        raise BadDescription(
+            f'{Path(tool).name}, [log]: a tool\'s run cannot have a "tool" taken away itself: the load weighs both. '
+            "Leave the key out of this description."
+        )
+    return recording

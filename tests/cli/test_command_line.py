@@ -416,6 +416,36 @@ def test_a_tool_named_in_the_description(made: Path, tool: tuple[Path, Path], tm
     assert named.json["mass_kg"] == given["mass_kg"]
 
 
+def test_what_was_noticed_in_the_tools_run_is_said(made: Path, tmp_path: Path) -> None:
+    """The answer leans on the tool's: a sign that was put right there must not go without a word."""
+    run = gripper()
+    wrench = run.streams[0]
+    flipped = {name: -np.array(values) for name, values in wrench.channels.items()}
+    log = write_recording(replace(run, streams=(replace(wrench, channels=flipped), *run.streams[1:])), tmp_path)
+    found = steelyard("identify", made, "--tool", log, "--json").json["findings"]
+    (told,) = (finding["message"] for finding in found if finding["code"] == "wrench-sign-flipped")
+    assert told.startswith("In the tool's run: ")
+
+
+def test_what_the_tools_run_cannot_answer_is_said_of_it(made: Path, tmp_path: Path) -> None:
+    run = gripper()
+    short = tuple(replace(s, channels={k: v[:5] for k, v in s.channels.items()}, time=s.time[:5]) for s in run.streams)
+    text = steelyard("identify", made, "--tool", write_recording(replace(run, streams=short), tmp_path)).failed(3)
+    assert text.startswith("In the tool's run: ")
+
+
+def test_a_tool_of_a_tool_is_refused(made: Path, tool: tuple[Path, Path], tmp_path: Path) -> None:
+    for path in tool[0].parent.iterdir():
+        shutil.copy(path, tmp_path)
+    log = tmp_path / tool[0].name
+    log.write_text(log.read_text().replace("[log]\n", '[log]\ntool = "gripper.json"\n'))
+    text = steelyard("identify", made, "--tool", log).failed(2)
+    assert text == (
+        f'{log.name}, [log]: a tool\'s run cannot have a "tool" taken away itself: the load weighs both. '
+        "Leave the key out of this description."
+    )
+
+
 def test_a_tool_that_is_no_result(made: Path, tmp_path: Path) -> None:
     broken = tmp_path / "tool.json"
     broken.write_text("{}")

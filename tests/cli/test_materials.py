@@ -38,6 +38,13 @@ def test_materials_need_a_shape(hammer: Path) -> None:
     assert "give parts or a scan with them" in str(done.exception)
 
 
+def test_a_place_needs_a_shape(hammer: Path) -> None:
+    place = "{ position = [0, 0, 0], rotation = [1, 0, 0, 0], form = 'quaternion-wxyz' }"
+    done = CliRunner().invoke(cli, ["identify", str(hammer / "log.toml"), "--pose-in-sensor", place])
+    assert isinstance(done.exception, BadValue)
+    assert "give parts or a scan with it" in str(done.exception)
+
+
 def test_a_log_of_the_tool_has_no_materials(hammer: Path) -> None:
     asked = [
         "identify",
@@ -50,6 +57,11 @@ def test_a_log_of_the_tool_has_no_materials(hammer: Path) -> None:
     done = CliRunner().invoke(cli, [*asked, "--materials", "steel=7850"])
     # The tool is the same as the load, of which nothing is left; but it was weighed.
     assert not isinstance(done.exception, BadValue), done.exception
+
+
+def test_a_name_stands_for_one_density() -> None:
+    with pytest.raises(BadValue, match='"steel" is listed twice'):
+        materials_of("steel=7850, oak=700, steel=7700")
 
 
 def test_a_list_is_read() -> None:

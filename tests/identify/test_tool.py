@@ -124,3 +124,6 @@ def test_what_the_tool_leaves_open_stays_open(pair: Pair) -> None:
     alone = without_tool(pair.load, unseen, False)
     assert alone.identified[:4].all()
     assert alone.inertia_com is None
+    assert [finding.message for finding in alone.findings if finding.code == "inertia-not-identified"] == [
+        "Of the object the inertia entries xx, xy, xz, yy, yz, zz are left open by the tool's run."
+    ]

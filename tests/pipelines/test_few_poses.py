@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 import steelyard as sy
+from steelyard.errors import CannotAnswer
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Rotation
 
@@ -41,3 +44,30 @@ def test_only_a_free_bias_looks_like_a_load() -> None:
     tared = sy.identify(weighed(3, 0), options=sy.Options(bias="none"))
     assert "nearly-planar" in free.codes()
     assert "nearly-planar" not in tared.codes()
+
+
+def untared(poses: int, seed: int, force: float) -> Recording:
+    """Return the table as a sensor shows it that reads `force` [N] on every axis without a load."""
+    made = weighed(poses, seed)
+    (table,) = made.streams
+    channels = {**table.channels, "force": np.array(table.channels["force"]) + force}
+    return replace(made, streams=(replace(table, channels=channels),))
+
+
+@pytest.mark.parametrize("force", [0.3, -5.0])
+def test_a_sensor_that_is_not_tared_is_named(force: float) -> None:
+    found = sy.identify(untared(4, 0, force), sy.Options(bias="none"))
+    (told,) = (finding for finding in found.findings if finding.code == "wrench-unexplained")
+    assert told.message.startswith(f"The sensor is not tared: it reads up to {abs(force):.1g}")
+    assert told.remedy == "Leave out --bias none, or tare the sensor without a load before."
+
+
+@pytest.mark.parametrize("poses", [2, 3, 4])
+def test_a_tared_sensor_is_believed(poses: int) -> None:
+    for seed in range(40):
+        assert "wrench-unexplained" not in sy.identify(weighed(poses, seed), sy.Options(bias="none")).codes()
+
+
+def test_a_refusal_says_that_a_bias_would_answer() -> None:
+    with pytest.raises(CannotAnswer, match=r"With a bias estimated the data answer: leave out --bias none\.$"):
+        sy.identify(untared(4, 0, 60.0), sy.Options(bias="none"))

@@ -18,6 +18,7 @@ from steelyard.logs.log import Mask
 
 # Two runs whose biases differ with a probability below this do not share one.
 SAME_BIAS = 1e-4
+_ENTRIES = np.array(["xx", "xy", "xz", "yy", "yz", "zz"])
 
 
 def bias_prior(tool: Estimate) -> BiasPrior | None:
@@ -62,18 +63,21 @@ def without_tool(load: Estimate, tool: Estimate, shared: bool) -> Estimate:
         covariance=0.5 * (covariance + covariance.T),
         notes=(*load.notes, message),
     )
-    return _own(rest, load.identified & tool.identified)
+    return _own(rest, load.identified, tool.identified)
 
 
-def _own(rest: Estimate, known: Mask) -> Estimate:
+def _own(rest: Estimate, of_load: Mask, of_tool: Mask) -> Estimate:
     """Return what is left with only that called identified which is so for its own size, not for that of the load."""
-    fixed = known & identified(rest.std, natural_sizes(rest.parameters.vector.copy()))
-    names = ("xx", "xy", "xz", "yy", "yz", "zz")
-    lost = [n for n, was, now in zip(names, known[4:], fixed[4:], strict=True) if was and not now]
+    fixed = of_load & of_tool & identified(rest.std, natural_sizes(rest.parameters.vector.copy()))
+    lost = {
+        "left open by the tool's run": of_load & ~of_tool,
+        "lost in the error bars of load and tool": of_load & of_tool & ~fixed,
+    }
+    told = [f"{', '.join(_ENTRIES[mask[4:]])} are {why}" for why, mask in lost.items() if mask[4:].any()]
     rest = replace(rest, identified=fixed)
-    if not lost:
+    if not told:
         return rest
-    message = f"The inertia entries {', '.join(lost)} of the object are lost in the error bars of load and tool."
+    message = f"Of the object the inertia entries {'; '.join(told)}."
     return rest.with_findings(Finding.of("inertia-not-identified", message))
 
 
@@ -83,6 +87,15 @@ def different_bias(p: float) -> Finding:
         "bias-drift",
         f"The sensor's bias changed between the tool's run and this one (p = {p:.1g}); it was not shared.",
     )
+
+
+def of_tools_run(tool: Estimate) -> tuple[Finding, ...]:
+    """Return what must be known about the tool's answer, as findings of the answer without it.
+
+    What it left open of the inertia is not said again (`without_tool` does), nor that the tool is included.
+    """
+    told = (finding for finding in tool.findings if finding.code not in ("inertia-not-identified", "tool-included"))
+    return tuple(replace(finding, message=f"In the tool's run: {finding.message}") for finding in told)
 
 
 def _gain(tool: Estimate) -> Array:

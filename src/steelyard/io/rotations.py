@@ -19,14 +19,16 @@ _ZERO = 1e-12
 TURNS = 4 * np.pi  # [rad] two turns: more than a wrist makes, less than degrees of a log for identification are
 
 
-def rotation_of(values: Array, form: str, angle: float = 1.0) -> Rotation:
+def rotation_of(values: Array, form: str, angle: float = 1.0, unit_key: str = "unit") -> Rotation:
     """Return the rotations (...) that `values` (..., k) write in `form`; `angle` turns those of angles into rad.
+
+    unit_key  what the description calls the unit of angles, for the remedy
 
     Written digits are rounded, so a matrix within `ROUNDING` of a rotation becomes the nearest one.
     Raises BadValue naming the worst row.
     """
     if form in ANGULAR:
-        _check_angles(values * angle, form)
+        _check_angles(values * angle, form, unit_key)
         return Rotation.from_rpy(values * angle) if form == "rpy" else Rotation.exp(values * angle)
     if form == "matrix":
         return _of_matrix(values.reshape(*values.shape[:-1], 3, 3))
@@ -74,14 +76,14 @@ def _check_norm(quaternion: Array) -> None:
         )
 
 
-def _check_angles(angles: Array, form: str) -> None:
+def _check_angles(angles: Array, form: str, unit_key: str) -> None:
     """Raise BadValue where a wrist would have turned round more often than any does: degrees read as radians."""
     most = float(np.nanmax(np.abs(angles), initial=0.0))
     if most > TURNS:
         what = "roll, pitch or yaw" if form == "rpy" else "the rotation vector"
         raise BadValue(
             f"{what} reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "
-            'degrees. Set unit = "deg".'
+            f'degrees. Set {unit_key} = "deg".'
         )
 
 

@@ -30,6 +30,7 @@ _LONGEST_DELAY, _FURTHEST = 1e10, 10.0
 _JOINT = ("joint_position", "joint_torque")
 # What a robot of a team may tell beside QUANTITIES: the joints of an Omnid, and whether it holds the payload.
 ROBOT: dict[str, int] = {"joint_position": 6, "joint_torque": 3, "carrying": 1}
+_MOUNTED = {"force", "torque", "specific_force"}  # what is read in the stream's own frame
 _KEYS = ("path", "topic", "frames", "kind", "time", "delay", "mount", *QUANTITIES)
 
 
@@ -126,7 +127,7 @@ def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamS
         kind == "poses",
         zero,
         _delay(entry),
-        _mount(entry),
+        _mount(entry, {quantity.name for quantity in quantities}),
         entry.text("topic"),
         _frames(entry),
     )
@@ -235,10 +236,15 @@ def _delay(stream: Entry) -> float | None:
     return entry.bounded("value", value, _LONGEST_DELAY)
 
 
-def _mount(stream: Entry) -> Mount | None:
+def _mount(stream: Entry, names: set[str]) -> Mount | None:
     if "mount" not in stream:
         return None
     entry = stream.table("mount")
+    if not names & _MOUNTED:
+        raise entry.error(
+            "of use beside force, torque or specific_force only; this stream has none of them. If its poses are those "
+            "of another frame, call that frame S: then the mount of the wrench's stream is the sensor's pose in it."
+        )
     rotation, position = parse_pose(entry)
     if rotation is None and position is None:
         raise entry.error('give "rotation", "position" or both.')
@@ -251,6 +257,7 @@ def parse_pose(entry: Entry, *more: str) -> tuple[Rotation | None, Array | None]
     `unit` is that of the position, `angle_unit` that of a rotation by angles. Raises BadDescription.
     """
     entry.only("rotation", "form", "angle_unit", "position", "unit", *more)
+    _each_of_use(entry)
     position = None
     if "position" in entry:
         position = entry.numbers("position", 3) * LENGTH[entry.choice("unit", list(LENGTH), "m")]
@@ -258,11 +265,21 @@ def parse_pose(entry: Entry, *more: str) -> tuple[Rotation | None, Array | None]
     return (_fixed_rotation(entry) if "rotation" in entry else None), position
 
 
+def _each_of_use(entry: Entry) -> None:
+    """Raise BadDescription where a pose table holds a form or a unit of what it does not give."""
+    if "unit" in entry and "position" not in entry:
+        raise entry.error('"unit" belongs to "position", which is left out; angles have "angle_unit".')
+    if "form" in entry and "rotation" not in entry:
+        raise entry.error('"form" belongs to "rotation", which is left out.')
+    if "angle_unit" in entry and entry.values.get("form") not in ANGULAR:
+        raise entry.error('"angle_unit" belongs to a rotation of form = "rpy" or "rotation-vector".')
+
+
 def _fixed_rotation(entry: Entry) -> Rotation:
     form = entry.choice("form", list(FORMS), "matrix")
     values = entry.numbers("rotation", FORMS[form])
     angle = ANGLE[entry.choice("angle_unit", list(ANGLE), "rad")]
     try:
-        return rotation_of(values, form, angle)
+        return rotation_of(values, form, angle, "angle_unit")
     except BadValue as error:
         raise entry.error(str(error)) from None

@@ -26,7 +26,12 @@ class Material:
 
 def materials_of(text: str) -> tuple[Material, ...]:
     """Return the materials of a list such as "steel=7850, rubber=1150+-5%" [kg/m^3]; raises BadValue."""
-    return tuple(_material(part.strip()) for part in text.split(","))
+    materials = tuple(_material(part.strip()) for part in text.split(","))
+    names = [material.name for material in materials]
+    for name in names:
+        if names.count(name) > 1:
+            raise BadValue(f'"{name}" is listed twice; give two materials two names.')
+    return materials
 
 
 def _material(text: str) -> Material:

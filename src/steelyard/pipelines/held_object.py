@@ -10,9 +10,10 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadInput, BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
+from steelyard.identify.tool import of_tools_run
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
@@ -43,7 +44,8 @@ def identify(
 
     Raises CannotAnswer where the data do not fix mass and centre of mass, BadInput where they make no sense.
     """
-    known = identify(tool, options) if isinstance(tool, Recording) else tool
+    known = _of_tool(tool, options) if isinstance(tool, Recording) else tool
+    of_tool = () if known is None else of_tools_run(known)
     known = None if known is None else _with_bias_as(known, recording)
     recording, before = examine(recording)
     rows = rows_to_fit(recording, before, options)
@@ -64,9 +66,17 @@ def identify(
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     moved = {stream.name: stream.moved for stream in recording.streams}
     delays_s = {name: late + moved.get(name, 0.0) for name, late in rows.aligned.delays_s.items()}
-    estimate = replace(remedied(estimate, rows), delays_s=delays_s)
+    estimate = replace(remedied(estimate, rows), delays_s=delays_s).with_findings(*of_tool)
     aligning = () if rows.unmeasured else rows.aligned.notes
     return _with_bias_as(estimate.noted(*recording.notes, *aligning, *uncalibrated(estimate)), recording)
+
+
+def _of_tool(tool: Recording, options: Options) -> Estimate:
+    """Return what the tool alone is; what is wrong with its run is said to be of its run."""
+    try:
+        return identify(tool, options)
+    except (BadInput, CannotAnswer) as error:
+        raise type(error)(f"In the tool's run: {error}") from None
 
 
 @within_numbers()
@@ -88,7 +98,7 @@ def identify_rows(
     shape = placed(parts, pose or Pose.identity(), pose_std)
     load = Load(log, Bias(options.bias, drift=options.drift), options, shape, tool)
     load, estimate = load.followed()
-    estimate = load.without_tool(estimate)
+    estimate = load.without_tool(estimate).with_findings(*(() if tool is None else of_tools_run(tool)))
     if parts is None or shape is None:
         return estimate
     return looked_at(estimate, parts, shape, load.shape is not None)

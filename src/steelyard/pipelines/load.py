@@ -70,6 +70,22 @@ class Load:
                 raise
             alone = replace(self, shape=None)
             return alone, alone.estimate()
+        except CannotAnswer as error:
+            if self.freed() is None:
+                raise
+            raise CannotAnswer(f"{error} With a bias estimated the data answer: leave out --bias none.") from None
+
+    def freed(self) -> Estimate | None:
+        """Return what was held by the log alone, with the bias of a sensor estimated that is said to be tared.
+
+        None where it is estimated anyway, or the log does not tell it.
+        """
+        if self.bias.free:
+            return None
+        try:
+            return replace(self, bias=Bias(), shape=None).estimate()
+        except CannotAnswer:
+            return None
 
     def of(self, log: MotionLog) -> Estimate:
         """Return what other rows weigh, with the same known beforehand."""

@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.scale import allow_scale
+from steelyard.identify.tool import shares_bias
 from steelyard.logs.alignment import Aligned
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.load import Load
@@ -24,6 +25,8 @@ from steelyard.sanity import (
     row_noise,
 )
 
+# A sensor that is said to be tared is not where chance gives such a bias less often than this.
+UNTARED = 1e-6
 # Where an acceleration comes from that does not see the arm's structure bend.
 ENCODERS = ("position", "linear_velocity")
 
@@ -46,10 +49,27 @@ def looked_back(
         late = (*late, *examine_masses(load.log, (*before, *late)))
     if load.shape is None:
         late = examine_wrench_unit(load.log, estimate, load.of, before, late)
+    if untared := not_tared(load, estimate):
+        late = (*untared, *(f for f in late if f.code != "wrench-unexplained"))
     if any(f.left_in for f in before):
         # With a cause left in, rows only seem to lie in one plane.
         late = tuple(f for f in late if f.code != "nearly-planar")
     return load, estimate, late
+
+
+def not_tared(load: Load, estimate: Estimate) -> tuple[Finding, ...]:
+    """Return the finding that a sensor which is said to be tared reads something without a load, if it does."""
+    freed = load.freed()
+    if freed is None or shares_bias(estimate, freed)[1] > UNTARED:
+        return ()
+    torque, force = (float(np.abs(part).max()) for part in np.split(freed.wrench_bias, 2))
+    left = f"from {estimate.evidence.residual_force_N:.2g} to {freed.evidence.residual_force_N:.2g} N rms"
+    message = (
+        f"The sensor is not tared: it reads up to {force:.2g} N and {torque:.2g} N m without a load. Where this bias "
+        f"is estimated, what no body explains falls {left}, and the mass borne goes from {estimate.mass:.4g} to "
+        f"{freed.mass:.4g} kg."
+    )
+    return (Finding("wrench-unexplained", message, "Leave out --bias none, or tare the sensor without a load before."),)
 
 
 def of_sensor_and_body(

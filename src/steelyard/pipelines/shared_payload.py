@@ -31,6 +31,7 @@ from steelyard.team.misread.angle_units import require_one_angle_unit
 from steelyard.team.misread.length_units import require_one_length_unit
 from steelyard.team.misread.same_numbers import require_own_numbers, stuck_forces
 from steelyard.team.published import PublishedTeam
+from steelyard.team.really_still import with_moves_as_motion
 
 Method = Literal["joint", "paper"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -57,9 +58,11 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_angle_unit(log)
     require_one_length_unit(log)
     require_own_numbers(log)
+    log, moving = with_moves_as_motion(log)
     found = ESTIMATORS[method].identify(log)
     before = (*stuck_forces(log), *_missing_rows(log), *_missing_wrenches(log, method))
-    return _weighed(_with_gravity(replace(found, findings=(*before, *found.findings)), log))
+    found = replace(found, findings=(*before, *found.findings), notes=(*moving, *found.notes))
+    return _weighed(_with_gravity(found, log))
 
 
 def _with_gravity(found: TeamEstimate, log: TeamLog) -> TeamEstimate:
