@@ -24,6 +24,7 @@ from steelyard.shape.placement import Placement, placement
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, followed, lost_share, scene_of, surface_of, surfels
 from steelyard.shape.spacing import Neighbours
+from steelyard.shape.stand import put_on_stand
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import DOWNWARD, Underside, closed_below
 from steelyard.shape.view_mistakes import likely_mistake
@@ -64,6 +65,7 @@ class Scan:
     empty      whether points (N, 3) of W are known to be outside the object
     guessed    share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles in W, on which no view measured
                a surface; of what stands clear of the table and does not face it
+    unsure_m3  standard deviation of the object's volume that the table leaves open [m^3]
     """
 
     cloud: Cloud
@@ -79,6 +81,7 @@ class Scan:
     stages: dict[str, float]
     empty: Callable[[Array], Any] = field(repr=False)
     guessed: Callable[[Array, Array], float] = field(repr=False)
+    unsure_m3: float = 0.0
 
     @property
     def unseen(self) -> float:
@@ -103,6 +106,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
             scene, level = (read, level) if better else (scene, replace(level, lens=None))
             off = again or 0.0
         off = off if level.lens else level.off
+        said, unsure = put_on_stand(scene)
         clock.lap("table")
         found = _surface(scene, points, off, clock)
     except CannotAnswer as error:
@@ -113,11 +117,11 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock.lap("colour")
     placed = None if found.shift is None else _placed(scene, xyz.mean(0))
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = (*_findings(scene, found, level, placed, mistake), *_few_seen(seen / len(xyz), len(scene.views)))
+    findings = (*said, *_findings(scene, found, level, placed, mistake), *_few_seen(seen / len(xyz), len(scene.views)))
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
-        empty=_empty(scene, bottom), guessed=_guessed(scene),
+        empty=_empty(scene, bottom), guessed=_guessed(scene), unsure_m3=unsure,
     )  # fmt: skip
 
 

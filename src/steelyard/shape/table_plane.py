@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numba
@@ -17,6 +18,8 @@ _TRIES, _JUDGED = 300, 3000  # planes tried, points that judge them
 NEAR = 0.012  # of the distance: a point this near a plane counts as on it
 _LEAST = 0.2  # share of the points that must lie on the table
 _LEAST_GIVEN = 0.08  # the same of a table that is known: a stand or a tray is small
+_SLICE, _FACE, _ON_FACE = 0.004, 0.75, 0.003  # of the distance, of the points in the slices beside it, of all points
+_PARALLEL = np.cos(np.radians(5.0))  # to a stand's face: the table under it
 _ROUNDS = 8
 _FEW = 30  # points of one view that its noise is not told from
 _JUDGING = 300  # of its points judge a plane
@@ -55,6 +58,41 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
             # A low, flat object seen with little noise lifts the mean off the table, and not the median.
             on = np.abs(height - np.median(height[before])) < near
     return plane
+
+
+def table_of(points: Array, cameras: Array, distance: float, given: TablePlane | None) -> TablePlane:
+    """Return the table; one that is given as its points have it, or, of a stand too small for that, as it is."""
+    try:
+        return find_table(points, cameras, distance, given)
+    except CannotAnswer:
+        if given is None or not _is_face(given.height(points), distance):
+            raise
+        if find_table(points, cameras, distance).normal @ given.normal < _PARALLEL:
+            raise
+        return given
+
+
+def leveller(points: Array, cameras: Array, distance: float, stated: TablePlane) -> tuple[TablePlane, float]:
+    """Return the plane that tells how views lie, and how far another one is under it [m], inf without.
+
+    A plane that was given may be that of a stand: then it is that one, or the table under it, whichever shows more.
+    """
+    with suppress(CannotAnswer):
+        found = find_table(points, cameras, distance)
+        step = -float(stated.height(found.offset * found.normal))
+        if found.normal @ stated.normal > _PARALLEL and step > NEAR * distance / 2:
+            return found, np.inf
+        lower = points[stated.height(points) < -NEAR * distance]
+        under = find_table(lower, cameras, distance)
+        if under.normal @ stated.normal > _PARALLEL:
+            return stated, -float(stated.height(under.offset * under.normal))
+    return stated, np.inf
+
+
+def _is_face(height: Array, distance: float) -> bool:
+    """Whether heights (N,) of points over a plane show a small face in it, and no wall that it cuts."""
+    within, around = (float((np.abs(height) < slices * _SLICE * distance).mean()) for slices in (1, 3))
+    return within > max(_ON_FACE, _FACE * (around - within))
 
 
 def looked_at(R: Array, p: Array) -> Array:
