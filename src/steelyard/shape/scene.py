@@ -20,6 +20,8 @@ from steelyard.spatial import Pose
 
 LEAST_VIEWS = 3  # that must agree before something is believed
 WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
+# Of the camera's distance: so far from where the cameras look the table is bare; and of the noise there and everywhere.
+_AROUND, _CLEARLY = 0.35, 0.75
 _SAMPLES = 30_000  # points that find the table
 _STRIDE = 3  # of the pixels that are averaged
 _ENDS, _CUT = 1.0, 0.5  # per cent of an object: its ends; share of the images from which on enough hold them
@@ -151,11 +153,23 @@ def scene_of(views: Views) -> Scene:
     if stated is not None:
         table, step = leveller(sampled[:, :3], p, distance, stated)
     X_WT = table_frame(table, looks)
-    planes = table_planes(sampled, X_WT.inverse().apply(sampled[:, :3]), 0.03 * distance)
-    noise = noise_of(planes, views.depth_unit, distance)
+    noise = _noise(views, sampled, X_WT.inverse().apply(sampled[:, :3]), distance)
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
     return Scene(views, X_WT, R.copy(), p.copy(), distance, noise, stated, floor=-step / 2)
+
+
+def _noise(views: Views, sampled: Array, xyz: Array, distance: float) -> float:
+    """Return the standard deviation of depth at 1 m, of points (N, 3) in the table's frame; `sampled` as there.
+
+    A wide, low object is no noise: what lies around tells where it is clearly more even. A cloth has folds there too.
+    """
+    found, near = [], 0.03 * distance
+    for rows in (slice(None), np.hypot(xyz[:, 0], xyz[:, 1]) > _AROUND * distance):
+        planes = table_planes(sampled[rows], xyz[rows], near)
+        if len(planes) > 0.5 * len(views) or not found:
+            found.append(noise_of(planes, views.depth_unit, distance))
+    return found[-1] if found[-1] < _CLEARLY * found[0] else found[0]
 
 
 def noise_of(planes: Array, unit: float, distance: float) -> float:

@@ -136,7 +136,9 @@ def _stand_under(scene: Scene) -> _Stand | None:
         return None
     held, shown = (_held(scene, low + pitch * (np.argwhere(cells) + 0.5), high[cells]) for cells in (brim, on))
     passed, ratio = held < _CUT and shown > _WHOLE, bare.sum() / on.sum()
-    if ratio < _BARE or not (passed or ratio >= _OF_ONE_COLOUR or _differ(scene, whole & ~brim, low, pitch, face, thick)):
+    if ratio < _BARE or not (
+        passed or ratio >= _OF_ONE_COLOUR or _differ(scene, whole & ~brim, low, pitch, face, thick)
+    ):
         return None
     area = float(whole.sum()) * pitch**2
     return _Stand(face, (area / wide, wide), float(on.sum() / whole.sum()), area * face, passed)
