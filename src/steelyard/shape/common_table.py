@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from steelyard.check import Array
 from steelyard.shape import depth_images as images
-from steelyard.shape.scene import Scene, noise_of
-from steelyard.shape.table_plane import lowest_planes, table_frame, table_planes
+from steelyard.shape.scene import Scene
+from steelyard.shape.table_plane import lowest_planes, noise_of, table_frame, table_planes
 from steelyard.shape.views import TablePlane
 from steelyard.spatial import Rotation
 

@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
-from steelyard.shape.table_plane import leveller, looked_at, table_frame, table_of, table_planes
+from steelyard.shape.table_plane import leveller, looked_at, table_frame, table_noise, table_of
 from steelyard.shape.thinning import in_cubes, spread_to
 from steelyard.shape.view_mistakes import advice
 from steelyard.shape.views import TablePlane, Views
@@ -20,8 +20,6 @@ from steelyard.spatial import Pose
 
 LEAST_VIEWS = 3  # that must agree before something is believed
 WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
-# Of the camera's distance: so far from where the cameras look the table is bare; and of the noise there and everywhere.
-_AROUND, _CLEARLY = 0.35, 0.75
 _SAMPLES = 30_000  # points that find the table
 _STRIDE = 3  # of the pixels that are averaged
 _ENDS, _CUT = 1.0, 0.5  # per cent of an object: its ends; share of the images from which on enough hold them
@@ -37,6 +35,7 @@ _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
 _NEAR = 3  # cells of the map of heights: a point so near shows the surface there
+_NEARLY = 0.9  # of an object's height: the mean over the cell of its top, its sides included
 _MARGIN = 0.008  # of table kept around the object [m]
 
 
@@ -153,33 +152,10 @@ def scene_of(views: Views) -> Scene:
     if stated is not None:
         table, step = leveller(sampled[:, :3], p, distance, stated)
     X_WT = table_frame(table, looks)
-    noise = _noise(views, sampled, X_WT.inverse().apply(sampled[:, :3]), distance)
+    noise = table_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), distance, views.depth_unit, len(views))
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
     return Scene(views, X_WT, R.copy(), p.copy(), distance, noise, stated, floor=-step / 2)
-
-
-def _noise(views: Views, sampled: Array, xyz: Array, distance: float) -> float:
-    """Return the standard deviation of depth at 1 m, of points (N, 3) in the table's frame; `sampled` as there.
-
-    A wide, low object is no noise: what lies around tells where it is clearly more even. A cloth has folds there too.
-    """
-    found, near = [], 0.03 * distance
-    for rows in (slice(None), np.hypot(xyz[:, 0], xyz[:, 1]) > _AROUND * distance):
-        planes = table_planes(sampled[rows], xyz[rows], near)
-        if len(planes) > 0.5 * len(views) or not found:
-            found.append(noise_of(planes, views.depth_unit, distance))
-    return found[-1] if found[-1] < _CLEARLY * found[0] else found[0]
-
-
-def noise_of(planes: Array, unit: float, distance: float) -> float:
-    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points.
-
-    planes  (K, 5) of the views, see `table_planes`      unit  of depth [m]      distance  of the table [m]
-    """
-    # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
-    found = float(np.median(planes[:, 4])) / 0.7 if len(planes) else 0.0
-    return max(found, float(unit / np.sqrt(12) / distance**2))
 
 
 def object_on_table(scene: Scene) -> Region:
@@ -292,7 +268,7 @@ def surfels(scene: Scene, region: Region) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
     cell = _CELL * scene.pixel
     floor = -4 * scene.sigma - 2 * cell
-    layers = int((min(region.highest, _REACHES[0] * scene.distance) - floor) / cell) + 2
+    layers = int((_top(scene, region) - floor) / cell) + 2
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else _STRIDE
     found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
@@ -300,6 +276,21 @@ def surfels(scene: Scene, region: Region) -> Array:
     if not len(found):
         raise no_surface()
     return found
+
+
+def _top(scene: Scene, region: Region) -> float:
+    """Return how high patches are looked for [m]: as usual things reach, or most of the pixels of a cell.
+
+    Pixels that fly past edges are measured anywhere up to the cameras.
+    """
+    usual = _REACHES[0] * scene.distance
+    if region.highest <= usual:
+        return region.highest
+    high, low, pitch = heights(scene)
+    xy = low + pitch * (np.argwhere(high > usual * _NEARLY) + 0.5)
+    over = region.holds(np.column_stack([xy, np.zeros(len(xy))]))
+    tallest = high[high > usual * _NEARLY][over].max(initial=0.0)
+    return min(region.highest, max(usual, float(tallest) / _NEARLY))
 
 
 def no_surface() -> CannotAnswer:

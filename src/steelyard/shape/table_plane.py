@@ -20,6 +20,8 @@ _LEAST = 0.2  # share of the points that must lie on the table
 _LEAST_GIVEN = 0.08  # the same of a table that is known: a stand or a tray is small
 _SLICE, _FACE, _ON_FACE = 0.004, 0.75, 0.003  # of the distance, of the points in the slices beside it, of all points
 _PARALLEL = np.cos(np.radians(5.0))  # to a stand's face: the table under it
+# Of the camera's distance: so far from where the cameras look the table is bare; and of the noise there and everywhere.
+_AROUND, _CLEARLY = 0.35, 0.75
 _ROUNDS = 8
 _FEW = 30  # points of one view that its noise is not told from
 _JUDGING = 300  # of its points judge a plane
@@ -139,6 +141,32 @@ def table_frame(table: TablePlane, middle: Array) -> Pose:
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)
     return Pose(Rotation.nearest(np.stack([x, np.cross(z, x), z], axis=1)), middle - table.height(middle) * z)
+
+
+def table_noise(sampled: Array, xyz: Array, distance: float, unit: float, views: int) -> float:
+    """Return the standard deviation of depth at 1 m, of `views` views.
+
+    sampled, xyz  points as `table_planes` takes them      distance  of the table [m]      unit  of depth [m]
+
+    A wide, low object is no noise: what lies around tells where it is clearly more even. A cloth has folds there too.
+    """
+    found: list[float] = []
+    near = 0.03 * distance
+    for rows in (slice(None), np.hypot(xyz[:, 0], xyz[:, 1]) > _AROUND * distance):
+        planes = table_planes(sampled[rows], xyz[rows], near)
+        if len(planes) > 0.5 * views or not found:
+            found.append(noise_of(planes, unit, distance))
+    return found[-1] if found[-1] < _CLEARLY * found[0] else found[0]
+
+
+def noise_of(planes: Array, unit: float, distance: float) -> float:
+    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points.
+
+    planes  (K, 5) of the views, see `table_planes`      unit  of depth [m]      distance  of the table [m]
+    """
+    # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
+    found = float(np.median(planes[:, 4])) / 0.7 if len(planes) else 0.0
+    return max(found, float(unit / np.sqrt(12) / distance**2))
 
 
 @numba.njit(cache=True, nogil=True)
