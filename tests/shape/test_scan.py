@@ -325,3 +325,27 @@ def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
     scan = fuse(replace(views, depth=np.array(noisy, np.uint16)))
     assert "table-uneven" in {finding.code for finding in scan.findings}
     assert "table-uneven" not in {finding.code for finding in fuse(views).findings}
+    # What the folds may hide under the box, as a share of its 30 mm, is in the bar.
+    assert shape_of(scan).solid.volume_std > 0.0015 / 0.03
+    assert fuse(views).unsure_m3 == 0.0
+
+
+def test_an_object_taller_than_the_cameras_are_far_keeps_its_top() -> None:
+    tall = mesh_of(block((-0.05, 0.05), (-0.05, 0.05), (0, 0.03)), block((-0.02, 0.02), (-0.02, 0.02), (0.03, 0.22)))
+    seen = scan_mesh(tall, 1, count=45, intrinsics=SMALL, X_WO=LIES, distance=0.32, aim=(0, 0, 0.11))
+    solid = shape_of(fuse(seen.views)).solid
+    assert solid.mesh.volume == pytest.approx(0.1 * 0.1 * 0.03 + 0.04 * 0.04 * 0.19, rel=0.05)
+
+
+def test_the_floor_of_a_cup_is_no_other_object() -> None:
+    """Between its floor and its wall next to nothing is measured; between a ring and what lies in it the table is."""
+    cup = manifold3d.Manifold.cylinder(0.07, 0.04, 0.04, 64) - manifold3d.Manifold.cylinder(
+        0.07, 0.037, 0.037, 64
+    ).translate((0, 0, 0.008))
+    low = scan_mesh(mesh_of(cup), 0, count=45, intrinsics=SMALL, X_WO=LIES, distance=0.32)
+    views = low.views.chosen(np.arange(30))
+    scan = fuse(views)
+    assert "several-objects" not in {finding.code for finding in scan.findings}
+    ring = manifold3d.Manifold.cylinder(0.02, 0.08, 0.08, 64) - manifold3d.Manifold.cylinder(0.05, 0.07, 0.07, 64)
+    both = fuse(scanned(mesh_of(ring, block((-0.012, 0.012), (-0.012, 0.012), (0, 0.025)))).views)
+    assert "several-objects" in {finding.code for finding in both.findings}

@@ -35,6 +35,7 @@ _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
 _NEAR = 3  # cells of the map of heights: a point so near shows the surface there
+_BARE = 0.3  # of a gap: more bare table parts two objects
 _NEARLY = 0.9  # of an object's height: the mean over the cell of its top, its sides included
 _MARGIN = 0.008  # of table kept around the object [m]
 
@@ -196,13 +197,15 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     level = float(np.median(even)) if len(even) else 0.0
     up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
     label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
-    area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
+    area = np.bincount(label[well], minlength=found + 1)[1:]
     if not area.any():
         raise CannotAnswer(
             "no object was found on the table: nothing stands out of it where the cameras look. "
             "Lay it there; if it stands on a stand, give the plane of that in table.json."
         )
     largest = int(np.argmax(area)) + 1
+    label = _with_its_floor(label, largest, watched & ~up)
+    area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
     others = int((area > max(0.1 * area.max(), 25)).sum()) - 1
     margin = max(3, int(np.ceil(_MARGIN / pitch)))
     mine = ndimage.binary_dilation(label == largest, np.ones((3, 3)), iterations=margin)
@@ -212,6 +215,19 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     mine &= ~stranger
     highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
     return Region(mine, low, pitch, label == largest, highest, others, False)
+
+
+def _with_its_floor(label: Any, largest: int, table: Any) -> Any:
+    """Return labels (I, J), pieces within the largest added to it where hardly any of the table shows between.
+
+    Down in a mug, beside its wall, next to nothing is measured: its floor is no other object.
+    """
+    whole = ndimage.binary_closing(label == largest, np.ones((3, 3)), iterations=_NEAR)
+    hole, count = ndimage.label(ndimage.binary_fill_holes(whole) & (label != largest))
+    gap, bare = (np.bincount(hole[cells], minlength=count + 1) for cells in (label == 0, (label == 0) & table))
+    own = bare <= _BARE * gap
+    own[0] = False
+    return np.where(own[hole] & (label > 0), largest, label)
 
 
 def heights(scene: Scene) -> tuple[Array, Array, float]:
