@@ -13,6 +13,7 @@ from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.shape.carving import carved
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import fuse
+from steelyard.shape.scene import _with_its_floor
 from steelyard.shape.thinning import spread
 from steelyard.shape.underside import Underside
 from steelyard.shape.views import Intrinsics, Views
@@ -325,3 +326,23 @@ def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
     scan = fuse(replace(views, depth=np.array(noisy, np.uint16)))
     assert "table-uneven" in {finding.code for finding in scan.findings}
     assert "table-uneven" not in {finding.code for finding in fuse(views).findings}
+    # What the folds may hide under the box, as a share of its 30 mm, is in the bar.
+    assert shape_of(scan).solid.volume_std > 0.0015 / 0.03
+    assert fuse(views).unsure_m3 == 0.0
+
+
+def test_an_object_taller_than_the_cameras_are_far_keeps_its_top() -> None:
+    tall = mesh_of(block((-0.05, 0.05), (-0.05, 0.05), (0, 0.03)), block((-0.02, 0.02), (-0.02, 0.02), (0.03, 0.22)))
+    seen = scan_mesh(tall, 1, count=45, intrinsics=SMALL, X_WO=LIES, distance=0.32, aim=(0, 0, 0.11))
+    solid = shape_of(fuse(seen.views)).solid
+    assert solid.mesh.volume == pytest.approx(0.1 * 0.1 * 0.03 + 0.04 * 0.04 * 0.19, rel=0.05)
+
+
+@pytest.mark.parametrize(("shows", "pieces"), [(False, 1), (True, 2)], ids=["nothing-between", "table-between"])
+def test_the_floor_of_a_cup_is_no_other_object(shows: bool, pieces: int) -> None:
+    """Between its floor and its wall next to nothing is measured; between a ring and what lies in it the table is."""
+    i, j = np.mgrid[-30:31, -30:31]
+    away = np.hypot(i, j)
+    label = np.where((away > 20) & (away < 25), 1, np.where(away < 12, 2, 0))
+    told = _with_its_floor(label, 1, (label == 0) & ((away > 20) | shows))
+    assert len(np.unique(told[told > 0])) == pieces

@@ -119,7 +119,7 @@ def shape_of(
 
 
 def _carved(scan: Scan) -> Solid:
-    return carved(enclose(scan.cloud), scan.empty, scan.unseen, scan.guessed)
+    return carved(enclose(scan.cloud), scan.empty, scan.unseen, scan.guessed, scan.unsure_m3)
 
 
 def _enclosed(cloud: Cloud) -> Solid:

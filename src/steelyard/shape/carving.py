@@ -34,6 +34,7 @@ def carved(
     empty: Callable[[Array], Any],
     unseen: float = 0.0,
     guessed: Callable[[Array, Array], float] | None = None,
+    unsure_m3: float = 0.0,
 ) -> Solid:
     """Return the solid with its cells decided anew where the views decide.
 
@@ -41,6 +42,7 @@ def carved(
     unseen  share of the skin that nobody saw: `Scan.unseen`
     guessed how much of a skin, middles (N, 3) and areas (N, 3) of its triangles, is a guess: `Scan.guessed`; None: not
             asked
+    unsure_m3  standard deviation of the volume that the table leaves open [m^3]: `Scan.unsure_m3`
 
     With the underside closed, all that no view saw to be empty is the object's; between, the solid's own verdict holds.
     A surface that looked open is closed by that, and what closes it is a guess: `surface-open` where that is much of
@@ -65,7 +67,7 @@ def carved(
     guess = guessed(*_skin(mesh)) if guessed else 0.0
     if guess > _GUESSED:
         findings += (_open(guess),)
-    std = float(np.hypot(std, (_BEHIND if guess > _GUESSED else 1.0) * guess))
+    std = float(np.linalg.norm([std, (_BEHIND if guess > _GUESSED else 1.0) * guess, unsure_m3 / mesh.volume]))
     return replace(
         solid, mesh=mesh, sure=sure[inside], volume_std=std, findings=findings, inside=np.flatnonzero(inside)
     )

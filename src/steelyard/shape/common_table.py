@@ -14,8 +14,8 @@ from scipy import ndimage
 
 from steelyard.check import Array
 from steelyard.shape import depth_images as images
-from steelyard.shape.scene import Scene, noise_of
-from steelyard.shape.table_plane import lowest_planes, table_frame, table_planes
+from steelyard.shape.scene import Scene
+from steelyard.shape.table_plane import lowest_planes, noise_of, table_frame, table_planes
 from steelyard.shape.views import TablePlane
 from steelyard.spatial import Rotation
 
@@ -30,6 +30,10 @@ ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judg
 _LEVEL = 0.25  # of the depth noise: tables that are less off are level
 _STEEPEST = np.tan(np.radians(8.0))  # tilt of a view's table that no arm's error explains
 _MOST = 0.75  # share of the views that must show the table
+_ALIKE, _LEAST_VIEWS = (
+    0.1,
+    4,
+)  # of their distance: how far off either of two tables a view has it; views at least that show it
 _REACH = 0.5  # of the camera's distance: how far from where the cameras look things are compared
 _CAP = 0.02  # of the camera's distance: heights beyond it count alike, so that walls make no ramps in oblique views
 _BLURS = (0.020, 0.020, 0.014, 0.014, 0.010, 0.010, 0.007, 0.007, 0.005, 0.005, 0.005, 0.005)  # of the heights [m]
@@ -48,10 +52,13 @@ def levelled(scene: Scene) -> float | None:
     planes = _tables(scene)
     if not _shown(scene, planes):
         return None
+    if (step := _two_tables(scene, planes)) > 0:
+        scene.floor = -step / 2
+        planes = _tables(scene)
     if _is_level(scene, planes):
         return 0.0
     # What all have alike is no view's error: a wide object passed for the table.
-    _lay(scene, np.median(planes[:, 1:4], axis=0))
+    laid(scene, np.median(planes[:, 1:4], axis=0))
     planes = _tables(scene)
     if not _shown(scene, planes):
         return None
@@ -66,6 +73,19 @@ def levelled(scene: Scene) -> float | None:
     return off
 
 
+def _two_tables(scene: Scene, planes: Array) -> float:
+    """Return how far under the table of most views another one lies that shows in some [m], 0 where there is none.
+
+    Wrong poses put the table anywhere; a board on a table, at its own height or the board's.
+    """
+    height = planes[:, 1]
+    under = height[height < -2 * _THIN * scene.distance]
+    step = -float(np.median(under)) if len(under) else 0.0
+    alike = max(_ALIKE * step, scene.sigma)
+    at_either = [(np.abs(height - level) < alike).sum() for level in (0.0, -step)]
+    return step if min(at_either) >= _LEAST_VIEWS and sum(at_either) >= _MOST * len(height) else 0.0
+
+
 def _shown(scene: Scene, planes: Array) -> bool:
     """Whether enough views show a table to go by."""
     return len(planes) >= _MOST * len(scene.R)
@@ -76,12 +96,12 @@ def _is_level(scene: Scene, planes: Array) -> bool:
     return _off(scene, planes) < _LEVEL * scene.sigma
 
 
-def _lay(scene: Scene, plane: Array) -> None:
+def laid(scene: Scene, plane: Array) -> None:
     """Take the plane of height a + b x + c y (3,) for the table: the cameras stay where they are in W."""
     normal = np.array([-plane[1], -plane[2], 1.0]) / np.sqrt(1 + plane[1:] @ plane[1:])
-    laid = table_frame(TablePlane(normal, float(plane[0] * normal[2])), np.zeros(3))
-    back = laid.inverse()
-    scene.X_WT = scene.X_WT @ laid
+    on_it = table_frame(TablePlane(normal, float(plane[0] * normal[2])), np.zeros(3))
+    back = on_it.inverse()
+    scene.X_WT = scene.X_WT @ on_it
     scene.R, scene.p = np.ascontiguousarray(back.rotation.matrix @ scene.R), back.apply(scene.p)
 
 
@@ -108,6 +128,7 @@ def _tables(scene: Scene) -> Array:
     The lowest plane of each, fitted to the points on it: so an object as wide as the table in view does not lift it.
     """
     sampled = images.sampled(*scene.images(), _stride(scene, _SAMPLES[0]))
+    sampled = sampled[sampled[:, 2] > scene.floor] if np.isfinite(scene.floor) else sampled
     clear = min(_CLEAR * scene.sigma, _THIN * scene.distance)
     drawn = np.random.default_rng(0).random((_TRIES, 3))
     lowest = lowest_planes(sampled, _FAR * scene.distance, clear, _STEEPEST, drawn)

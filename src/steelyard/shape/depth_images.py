@@ -36,13 +36,14 @@ def sampled(depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int) -
 
 @numba.njit(cache=True, nogil=True)
 def height_map(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int, low: Any, pitch: float, cap: float, rows: int,
-    columns: int,
+    depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int, low: Any, pitch: float, floor: float, cap: float,
+    rows: int, columns: int,
 ) -> Any:  # fmt: skip
-    """Return sums (rows, columns, 3) over a grid on the table: pixels, their heights up to +-cap, highest height.
+    """Return sums (rows, columns, 3) over a grid on the table: pixels, their heights, highest height.
 
     low    (2,) corner of the grid [m]
     pitch  [m]
+    floor, cap  heights beyond which all count alike [m]
     """
     out = np.zeros((rows, columns, 3))
     first, count = stride // 2, (depth.shape[2] - stride // 2 + stride - 1) // stride
@@ -57,7 +58,7 @@ def height_map(
                 if 0 <= i < rows and 0 <= j < columns:
                     cell = out[np.uint32(i), np.uint32(j)]
                     cell[0] += 1
-                    cell[1] += min(max(h, -cap), cap)
+                    cell[1] += min(max(h, floor), cap)
                     cell[2] = max(cell[2], h)
     return out
 

@@ -68,7 +68,20 @@ class Seen:
         good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
         if not good.any():
             raise no_surface()
-        return cls(region, patches, float(np.median(support[good, 2])) / (0.7 * scene.sigma))
+        return cls(region, patches, float(np.median(support[good, 2] / _expected(scene, xyz[good], normal[good]))))
+
+
+def _expected(scene: Scene, xyz: Array, normal: Array) -> Array:
+    """Return the spread (N,) [m] that noise makes about points (N, 3): cameras are nearer to those high up."""
+    square, seen = np.zeros(len(xyz)), np.zeros(len(xyz))
+    for eye in scene.p:
+        way = eye - xyz
+        far = (way**2).sum(1)
+        faces = (way * normal).sum(1) > FACING * np.sqrt(far)
+        square += np.where(faces, far, 0.0)
+        seen += faces
+    usual = scene.distance**2
+    return 0.7 * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
 
 
 @dataclass(frozen=True, eq=False)

@@ -24,8 +24,10 @@ from steelyard.shape.placement import Placement, placement
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, followed, lost_share, scene_of, surface_of, surfels
 from steelyard.shape.spacing import Neighbours
+from steelyard.shape.stand import put_on_stand
 from steelyard.shape.thinning import in_cubes, spread, spread_to
 from steelyard.shape.underside import DOWNWARD, Underside, closed_below
+from steelyard.shape.uneven import uneven
 from steelyard.shape.view_mistakes import likely_mistake
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.shape.working_cloud import in_small_pieces
@@ -38,7 +40,6 @@ _OFF_TABLE = 4.0  # times the depth noise: what is lower may not be told from th
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
 _ALIKE = 12.0  # levels between colours that look the same, at least
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
-_UNEVEN = 0.7  # times the depth noise: views that spread less have a table that is rougher than their noise
 _FAR = 0.02  # rms move of the cameras [m] that no arm's error explains
 _TABLE_OFF = 0.003  # of the table in the views, rms [m], from which on poses or camera are said to be wrong
 _STILL = 1e-9  # move of a camera that is none [m]
@@ -64,6 +65,7 @@ class Scan:
     empty      whether points (N, 3) of W are known to be outside the object
     guessed    share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles in W, on which no view measured
                a surface; of what stands clear of the table and does not face it
+    unsure_m3  standard deviation of the object's volume that the table leaves open [m^3]
     """
 
     cloud: Cloud
@@ -79,6 +81,7 @@ class Scan:
     stages: dict[str, float]
     empty: Callable[[Array], Any] = field(repr=False)
     guessed: Callable[[Array, Array], float] = field(repr=False)
+    unsure_m3: float = 0.0
 
     @property
     def unseen(self) -> float:
@@ -103,6 +106,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
             scene, level = (read, level) if better else (scene, replace(level, lens=None))
             off = again or 0.0
         off = off if level.lens else level.off
+        said, unsure = put_on_stand(scene)
         clock.lap("table")
         found = _surface(scene, points, off, clock)
     except CannotAnswer as error:
@@ -113,11 +117,17 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock.lap("colour")
     placed = None if found.shift is None else _placed(scene, xyz.mean(0))
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
-    findings = (*_findings(scene, found, level, placed, mistake), *_few_seen(seen / len(xyz), len(scene.views)))
+    rough, more = uneven(scene, bottom, found.disagree)
+    findings = (
+        *said,
+        *rough,
+        *_findings(scene, found, level, placed, mistake),
+        *_few_seen(seen / len(xyz), len(scene.views)),
+    )
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
-        empty=_empty(scene, bottom), guessed=_guessed(scene),
+        empty=_empty(scene, bottom), guessed=_guessed(scene), unsure_m3=float(np.hypot(unsure, more)),
     )  # fmt: skip
 
 
@@ -291,8 +301,6 @@ def _findings(
         )
     if far or level.lens or (placed and placed.at_wrist):
         found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
-    if disagree < _UNEVEN:
-        found.append(_rough_table(scene, disagree))
     if cut := cut_off(scene, surface.xyz, surface.normal):
         found.append(cut)
     # What is cut off has no surface for that reason.
@@ -306,15 +314,6 @@ def _findings(
             )
         )
     return tuple(found)
-
-
-def _rough_table(scene: Scene, disagree: float) -> Finding:
-    rough, noise = 1e3 * scene.sigma, 1e3 * scene.sigma * disagree
-    text = (
-        f"The table is not flat: views leave {rough:.2g} mm (rms) about its plane, but spread {noise:.2g} mm about the "
-        "object. The underside is closed on that plane, some of the roughness too high or too low."
-    )
-    return Finding.of("table-uneven", text)
 
 
 def _few_seen(share: float, views: int) -> tuple[Finding, ...]:

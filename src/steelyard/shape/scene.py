@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
-from steelyard.shape.table_plane import find_table, looked_at, table_frame, table_planes
+from steelyard.shape.table_plane import leveller, looked_at, table_frame, table_noise, table_of
 from steelyard.shape.thinning import in_cubes, spread_to
 from steelyard.shape.view_mistakes import advice
 from steelyard.shape.views import TablePlane, Views
@@ -35,6 +35,8 @@ _CAP = 0.02  # of the camera's distance: heights beyond it count alike where the
 _CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
 _CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
 _NEAR = 3  # cells of the map of heights: a point so near shows the surface there
+_BARE = 0.3  # of a gap: more bare table parts two objects
+_NEARLY = 0.9  # of an object's height: the mean over the cell of its top, its sides included
 _MARGIN = 0.008  # of table kept around the object [m]
 
 
@@ -46,6 +48,9 @@ class Scene:
     R, p      rotations (V, 3, 3) and positions (V, 3) [m] of the cameras in T; they start where they were reported
     distance  typical one from a camera to where the cameras look [m]
     noise     standard deviation of depth at 1 m; it grows with the square of depth [1/m]
+    stated    the table that was given, as the points have it, in W; None where it was to be found
+    raised    whether a lower table shows beside this one, as beside a stand: what lies there is no object's
+    floor     what is measured lower than this is not of the table [m]
     """
 
     views: Views
@@ -54,6 +59,9 @@ class Scene:
     p: Array
     distance: float
     noise: float
+    stated: TablePlane | None = None
+    raised: bool = False
+    floor: float = -np.inf
 
     @property
     def table(self) -> TablePlane:
@@ -138,25 +146,17 @@ def scene_of(views: Views) -> Scene:
     looks = looked_at(R, p)
     distance = float(np.median(np.linalg.norm(p - looks, axis=1)))
     try:
-        table = find_table(sampled[:, :3], p, distance, views.table)
+        table = table_of(sampled[:, :3], p, distance, views.table)
     except CannotAnswer as error:
         raise CannotAnswer(f"{error} {advice(views)}") from None
+    stated, step = None if views.table is None else table, np.inf
+    if stated is not None:
+        table, step = leveller(sampled[:, :3], p, distance, stated)
     X_WT = table_frame(table, looks)
-    planes = table_planes(sampled, X_WT.inverse().apply(sampled[:, :3]), 0.03 * distance)
-    noise = noise_of(planes, views.depth_unit, distance)
+    noise = table_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), distance, views.depth_unit, len(views))
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
-    return Scene(views, X_WT, R.copy(), p.copy(), distance, noise)
-
-
-def noise_of(planes: Array, unit: float, distance: float) -> float:
-    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points.
-
-    planes  (K, 5) of the views, see `table_planes`      unit  of depth [m]      distance  of the table [m]
-    """
-    # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
-    found = float(np.median(planes[:, 4])) / 0.7 if len(planes) else 0.0
-    return max(found, float(unit / np.sqrt(12) / distance**2))
+    return Scene(views, X_WT, R.copy(), p.copy(), distance, noise, stated, floor=-step / 2)
 
 
 def object_on_table(scene: Scene) -> Region:
@@ -186,18 +186,26 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     low = np.full(2, -half * pitch)
     size = 2 * half
     cap = max(6 * scene.sigma, _CAP * scene.distance)
-    sums = images.height_map(*scene.images(), stride, low, pitch, cap, size, size)
+    floor = 0.0 if scene.raised else -cap
+    sums = images.height_map(*scene.images(), stride, low, pitch, floor, cap, size, size)
     middle = (slice(half - near, half + near),) * 2
     well, watched = _watched(scene, sums[..., 0], middle, low, pitch)
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
-    spread = float(np.subtract(*np.percentile(mean[well], (75, 25)))) / 1.35
-    level = float(np.median(mean[well]))
+    # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
+    even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
+    spread = float(np.subtract(*np.percentile(even, (75, 25)))) / 1.35 if len(even) else 0.0
+    level = float(np.median(even)) if len(even) else 0.0
     up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
     label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
-    area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
+    area = np.bincount(label[well], minlength=found + 1)[1:]
     if not area.any():
-        raise CannotAnswer("no object was found on the table: nothing stands out of it where the cameras look.")
+        raise CannotAnswer(
+            "no object was found on the table: nothing stands out of it where the cameras look. "
+            "Lay it there; if it stands on a stand, give the plane of that in table.json."
+        )
     largest = int(np.argmax(area)) + 1
+    label = _with_its_floor(label, largest, watched & ~up)
+    area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
     others = int((area > max(0.1 * area.max(), 25)).sum()) - 1
     margin = max(3, int(np.ceil(_MARGIN / pitch)))
     mine = ndimage.binary_dilation(label == largest, np.ones((3, 3)), iterations=margin)
@@ -207,6 +215,32 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     mine &= ~stranger
     highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
     return Region(mine, low, pitch, label == largest, highest, others, False)
+
+
+def _with_its_floor(label: Any, largest: int, table: Any) -> Any:
+    """Return labels (I, J), pieces within the largest added to it where hardly any of the table shows between.
+
+    Down in a mug, beside its wall, next to nothing is measured: its floor is no other object.
+    """
+    whole = ndimage.binary_closing(label == largest, np.ones((3, 3)), iterations=_NEAR)
+    hole, count = ndimage.label(ndimage.binary_fill_holes(whole) & (label != largest))
+    gap, bare = (np.bincount(hole[cells], minlength=count + 1) for cells in (label == 0, (label == 0) & table))
+    own = bare <= _BARE * gap
+    own[0] = False
+    return np.where(own[hole] & (label > 0), largest, label)
+
+
+def heights(scene: Scene) -> tuple[Array, Array, float]:
+    """Return the mean height (I, J) [m] measured in the cells about where the cameras look, corner (2,) and pitch [m].
+
+    Cells in which too little was measured are 0.
+    """
+    pitch = 2 * scene.pixel
+    half = int(_REACHES[0] * scene.distance / pitch)
+    low = np.full(2, -half * pitch)
+    sums = images.height_map(*scene.images(), _STRIDE, low, pitch, -scene.distance, scene.distance, 2 * half, 2 * half)
+    enough = sums[..., 0] >= _WATCHED * np.median(sums[..., 0][sums[..., 0] > 0])
+    return np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0), low, pitch
 
 
 def _watched(scene: Scene, count: Array, middle: tuple[slice, slice], low: Array, pitch: float) -> tuple[Any, Any]:
@@ -250,7 +284,7 @@ def surfels(scene: Scene, region: Region) -> Array:
     """Return patches (N, 8) of the object and of the table around it."""
     cell = _CELL * scene.pixel
     floor = -4 * scene.sigma - 2 * cell
-    layers = int((min(region.highest, _REACHES[0] * scene.distance) - floor) / cell) + 2
+    layers = int((_top(scene, region) - floor) / cell) + 2
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else _STRIDE
     found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
@@ -258,6 +292,21 @@ def surfels(scene: Scene, region: Region) -> Array:
     if not len(found):
         raise no_surface()
     return found
+
+
+def _top(scene: Scene, region: Region) -> float:
+    """Return how high patches are looked for [m]: as usual things reach, or most of the pixels of a cell.
+
+    Pixels that fly past edges are measured anywhere up to the cameras.
+    """
+    usual = _REACHES[0] * scene.distance
+    if region.highest <= usual:
+        return region.highest
+    high, low, pitch = heights(scene)
+    xy = low + pitch * (np.argwhere(high > usual * _NEARLY) + 0.5)
+    over = region.holds(np.column_stack([xy, np.zeros(len(xy))]))
+    tallest = high[high > usual * _NEARLY][over].max(initial=0.0)
+    return min(region.highest, max(usual, float(tallest) / _NEARLY))
 
 
 def no_surface() -> CannotAnswer:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from contextlib import suppress
 from typing import Any
 
 import numba
@@ -17,6 +18,10 @@ _TRIES, _JUDGED = 300, 3000  # planes tried, points that judge them
 NEAR = 0.012  # of the distance: a point this near a plane counts as on it
 _LEAST = 0.2  # share of the points that must lie on the table
 _LEAST_GIVEN = 0.08  # the same of a table that is known: a stand or a tray is small
+_SLICE, _FACE, _ON_FACE = 0.004, 0.75, 0.003  # of the distance, of the points in the slices beside it, of all points
+_PARALLEL = np.cos(np.radians(5.0))  # to a stand's face: the table under it
+# Of the camera's distance: so far from where the cameras look the table is bare; and of the noise there and everywhere.
+_AROUND, _CLEARLY = 0.35, 0.75
 _ROUNDS = 8
 _FEW = 30  # points of one view that its noise is not told from
 _JUDGING = 300  # of its points judge a plane
@@ -55,6 +60,41 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
             # A low, flat object seen with little noise lifts the mean off the table, and not the median.
             on = np.abs(height - np.median(height[before])) < near
     return plane
+
+
+def table_of(points: Array, cameras: Array, distance: float, given: TablePlane | None) -> TablePlane:
+    """Return the table; one that is given as its points have it, or, of a stand too small for that, as it is."""
+    try:
+        return find_table(points, cameras, distance, given)
+    except CannotAnswer:
+        if given is None or not _is_face(given.height(points), distance):
+            raise
+        if find_table(points, cameras, distance).normal @ given.normal < _PARALLEL:
+            raise
+        return given
+
+
+def leveller(points: Array, cameras: Array, distance: float, stated: TablePlane) -> tuple[TablePlane, float]:
+    """Return the plane that tells how views lie, and how far another one is under it [m], inf without.
+
+    A plane that was given may be that of a stand: then it is that one, or the table under it, whichever shows more.
+    """
+    with suppress(CannotAnswer):
+        found = find_table(points, cameras, distance)
+        step = -float(stated.height(found.offset * found.normal))
+        if found.normal @ stated.normal > _PARALLEL and step > NEAR * distance / 2:
+            return found, np.inf
+        lower = points[stated.height(points) < -NEAR * distance]
+        under = find_table(lower, cameras, distance)
+        if under.normal @ stated.normal > _PARALLEL:
+            return stated, -float(stated.height(under.offset * under.normal))
+    return stated, np.inf
+
+
+def _is_face(height: Array, distance: float) -> bool:
+    """Whether heights (N,) of points over a plane show a small face in it, and no wall that it cuts."""
+    within, around = (float((np.abs(height) < slices * _SLICE * distance).mean()) for slices in (1, 3))
+    return within > max(_ON_FACE, _FACE * (around - within))
 
 
 def looked_at(R: Array, p: Array) -> Array:
@@ -101,6 +141,32 @@ def table_frame(table: TablePlane, middle: Array) -> Pose:
     x = x - (x @ z) * z
     x /= np.linalg.norm(x)
     return Pose(Rotation.nearest(np.stack([x, np.cross(z, x), z], axis=1)), middle - table.height(middle) * z)
+
+
+def table_noise(sampled: Array, xyz: Array, distance: float, unit: float, views: int) -> float:
+    """Return the standard deviation of depth at 1 m, of `views` views.
+
+    sampled, xyz  points as `table_planes` takes them      distance  of the table [m]      unit  of depth [m]
+
+    A wide, low object is no noise: what lies around tells where it is clearly more even. A cloth has folds there too.
+    """
+    found: list[float] = []
+    near = 0.03 * distance
+    for rows in (slice(None), np.hypot(xyz[:, 0], xyz[:, 1]) > _AROUND * distance):
+        planes = table_planes(sampled[rows], xyz[rows], near)
+        if len(planes) > 0.5 * views or not found:
+            found.append(noise_of(planes, unit, distance))
+    return found[-1] if found[-1] < _CLEARLY * found[0] else found[0]
+
+
+def noise_of(planes: Array, unit: float, distance: float) -> float:
+    """Return the standard deviation of depth at 1 m: what each view's own plane leaves of its table points.
+
+    planes  (K, 5) of the views, see `table_planes`      unit  of depth [m]      distance  of the table [m]
+    """
+    # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
+    found = float(np.median(planes[:, 4])) / 0.7 if len(planes) else 0.0
+    return max(found, float(unit / np.sqrt(12) / distance**2))
 
 
 @numba.njit(cache=True, nogil=True)
