@@ -47,7 +47,8 @@ def consistent(xyz: Array, normals: Array, near: Integers) -> Array:
     low, high = np.minimum(start, end), np.maximum(start, end)
     first = np.unique(low * count + high, return_index=True)[1]
     keep = first[low[first] != high[first]]
-    tree = minimum_spanning_tree(coo_array((turning[keep], (low[keep], high[keep])), shape=(count, count)).tocsr())
+    ends = low[keep].astype(np.int32), high[keep].astype(np.int32)  # all that SciPy's graphs took before 1.17
+    tree = minimum_spanning_tree(coo_array((turning[keep], ends), shape=(count, count)).tocsr())
     tree = tree + tree.T
     sign = np.zeros(count)
     for root in np.argsort(-xyz[:, 2], kind="stable"):
