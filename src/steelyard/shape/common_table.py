@@ -30,10 +30,8 @@ ACROSS = 0.25  # of the camera's distance: so far from the middle a tilt is judg
 _LEVEL = 0.25  # of the depth noise: tables that are less off are level
 _STEEPEST = np.tan(np.radians(8.0))  # tilt of a view's table that no arm's error explains
 _MOST = 0.75  # share of the views that must show the table
-_ALIKE, _LEAST_VIEWS = (
-    0.1,
-    4,
-)  # of their distance: how far off either of two tables a view has it; views at least that show it
+_ALIKE = 0.1  # of the distance of two tables: so far off either of them views may have theirs
+_LEAST_VIEWS = 4  # that show either of two tables
 _REACH = 0.5  # of the camera's distance: how far from where the cameras look things are compared
 _CAP = 0.02  # of the camera's distance: heights beyond it count alike, so that walls make no ramps in oblique views
 _BLURS = (0.020, 0.020, 0.014, 0.014, 0.010, 0.010, 0.007, 0.007, 0.005, 0.005, 0.005, 0.005)  # of the heights [m]

@@ -23,10 +23,8 @@ from steelyard.shape.table_plane import NEAR, find_table
 from steelyard.shape.views import TablePlane
 
 _CLEAR = (0.004, 6.0)  # how far over the table a plane is another one: at least so high [m], times the depth noise
-_LEAST, _WIDE = (
-    0.015,
-    0.120,
-)  # of a stand [m]: how high and how wide it is; base plates and feet are thinner or narrower
+_LEAST = 0.015  # height of a stand [m]: base plates and feet are thinner
+_WIDE = 0.120  # width of a stand [m]: feet are narrower
 _TALLEST = 1.0  # of its width: what is taller is a body with something on its top
 _BARE, _OF_ONE_COLOUR = 2.0, 6.0  # bare face over what stands on it: where colours differ, and where they do not
 # Of the stand's height that what stands on it rises, or of its width that it is long: less are caps and buttons, but on
@@ -38,10 +36,8 @@ _BIN = 0.002  # step in which the height of a face is sought [m]
 _LEAST_CELLS = 16  # of what stands on it
 _PIXELS = 200_000  # that tell colours
 _OTHER, _MOST = 60.0, 0.8  # levels between colours that differ, and the share of the pixels that must
-_CUT, _WHOLE = (
-    0.6,
-    0.85,
-)  # share of the images that hold the brim of a stand looked past, and of those that hold the object
+# Share of the images that hold the brim of a stand that is looked past, at most, and the object on it, at least.
+_CUT, _WHOLE = 0.6, 0.85
 _LOWER = 0.05  # share of the pixels: so many below a plane are those of a lower table
 _UNSURE = 0.6  # of the volume of what may be a stand: standard deviation
 
@@ -125,14 +121,13 @@ def _stand_under(scene: Scene) -> _Stand | None:
     whole = ndimage.binary_fill_holes(whole)
     on, bare = whole & (high > face + thick), whole & (np.abs(high - face) <= thick)
     wide = 2 * pitch * float(ndimage.distance_transform_edt(np.pad(whole, 1)).max())
-    if face < max(_LEAST, 2 * clear) or wide < _WIDE or face > _TALLEST * wide or on.sum() < _LEAST_CELLS:
+    if not max(_LEAST, 2 * clear) <= face <= _TALLEST * wide or wide < _WIDE or on.sum() < _LEAST_CELLS:
         return None
     brim = whole & ~ndimage.binary_erosion(whole, np.ones((3, 3)), iterations=_BRIM)
     sloping = whole & ~brim & (high > 0) & ~on & ~bare
-    if sloping.sum() > _SHEER * whole.sum() or on[brim].mean() > _INSIDE:
-        return None
     long = pitch * float(np.linalg.norm(np.ptp(np.argwhere(on), axis=0)))
-    if float(high[on].max()) < (1 + _STANDS_UP) * face and long < _LONG * wide and face > _FLAT * wide:
+    is_cap = float(high[on].max()) < (1 + _STANDS_UP) * face and long < _LONG * wide and face > _FLAT * wide
+    if sloping.sum() > _SHEER * whole.sum() or on[brim].mean() > _INSIDE or is_cap:
         return None
     held, shown = (_held(scene, low + pitch * (np.argwhere(cells) + 0.5), high[cells]) for cells in (brim, on))
     passed, ratio = held < _CUT and shown > _WHOLE, bare.sum() / on.sum()
