@@ -105,7 +105,7 @@ class PartMasses:
     def seen(self, problem: Problem) -> Effective:
         """Return what a statistic says of the whole body, the error of the shape taken into account."""
         data = self._data(problem, self._start(problem), None)
-        body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), self.parts).mean)
+        body = self.parts.whole(self._unlisted(data, self.parts.whole(self.parts.volume)).mean)
         data = self._data(problem, data.linear_at(body.vector), None)
         return data.blurred(self.shape_error.with_grasp(body))
 
@@ -144,7 +144,7 @@ class PartMasses:
         body = InertialParameters(linear[:10])
         for _ in range(RENEWALS - 1):
             free = self.density == "free" and not self.materials
-            mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
+            mean = free_mean(data, self.parts) if free else self._unlisted(data, body).mean
             body = with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
         there = self
@@ -174,7 +174,7 @@ class PartMasses:
 
         What is wrong with the centre is wrong with the inertia. Source: scale factor of the Particle Data Group.
         """
-        drawn = with_mass(self.parts, self._masses(data, body, self.parts).mean, data)
+        drawn = with_mass(self.parts, self._masses(data, body).mean, data)
         times = apart(data, drawn, self.shape_error.with_grasp(drawn))
         if times <= 1:
             return self._answered(problem, data, body)
@@ -189,7 +189,7 @@ class PartMasses:
         return replace(found, findings=(Finding.of("part-not-homogeneous", text), *found.findings))
 
     def _answered(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
-        masses = self._masses(data, body, self.parts)
+        masses = self._masses(data, body)
         body = with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
         # Judged where the shape puts the body, as far as a scan says: what a wrong grasp moves must not hide a misfit.
@@ -263,18 +263,29 @@ class PartMasses:
             return body
         return self.parts.whole(self.parts.volume * (abs(float(body.mass)) / self.parts.volume.sum()))
 
-    def _masses(self, data: Effective, body: InertialParameters, parts: Parts) -> Masses:
+    def _masses(self, data: Effective, body: InertialParameters) -> Masses:
         """Return the masses of the parts by the chosen model.
 
         A list of materials is sharp enough for a shape error of a tenth of a millimetre to decide between two of them,
-        so that the log is blurred by it; a smooth average over densities is better off without, unless the shape is a
-        scan: then masses would bend to put right what the shape has wrong.
+        so that the log is blurred by it.
         """
-        if self.materials or self._movable:
-            data = data.blurred(self.shape_error.with_grasp(self._sane(body)))
-        if self.materials:
-            return material_masses(data, parts, self.materials)
-        return (averaged_masses if self.density == "averaged" else free_masses)(data, parts)
+        if not self.materials:
+            return self._unlisted(data, body)
+        return material_masses(data.blurred(self._error_at(body)), self.parts, self.materials)
+
+    def _unlisted(self, data: Effective, body: InertialParameters) -> Masses:
+        """Return the masses of the parts without a list of materials, all that the weights of the rows need.
+
+        A smooth average over densities is better off with a log that is not blurred, unless the shape is a scan: then
+        masses would bend to put right what the shape has wrong.
+        """
+        if self._movable:
+            data = data.blurred(self._error_at(body))
+        return (averaged_masses if self.density == "averaged" else free_masses)(data, self.parts)
+
+    def _error_at(self, body: InertialParameters) -> Array:
+        """Return the covariance (10, 10) of shape and grasp at about that body."""
+        return self.shape_error.with_grasp(self._sane(body))
 
     @property
     def _doubtful(self) -> bool:
