@@ -105,7 +105,7 @@ class PartMasses:
     def seen(self, problem: Problem) -> Effective:
         """Return what a statistic says of the whole body, the error of the shape taken into account."""
         data = self._data(problem, self._start(problem), None)
-        body = self.parts.whole(self._unlisted(data, self.parts.whole(self.parts.volume)).mean)
+        body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), listed=False).mean)
         data = self._data(problem, data.linear_at(body.vector), None)
         return data.blurred(self.shape_error.with_grasp(body))
 
@@ -142,9 +142,9 @@ class PartMasses:
         """
         data = self._data(problem, linear, score)
         body = InertialParameters(linear[:10])
-        for _ in range(RENEWALS - 1):
+        for _ in range(RENEWALS - 1):  # weights hardly depend on how the whole is shared among parts
             free = self.density == "free" and not self.materials
-            mean = free_mean(data, self.parts) if free else self._unlisted(data, body).mean
+            mean = free_mean(data, self.parts) if free else self._masses(data, body, listed=False).mean
             body = with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
         there = self
@@ -263,29 +263,19 @@ class PartMasses:
             return body
         return self.parts.whole(self.parts.volume * (abs(float(body.mass)) / self.parts.volume.sum()))
 
-    def _masses(self, data: Effective, body: InertialParameters) -> Masses:
-        """Return the masses of the parts by the chosen model.
+    def _masses(self, data: Effective, body: InertialParameters, listed: bool = True) -> Masses:
+        """Return the masses by the chosen model, without the list of materials where it is not `listed`.
 
         A list of materials is sharp enough for a shape error of a tenth of a millimetre to decide between two of them,
-        so that the log is blurred by it.
+        so that the log is blurred by it; a smooth average over densities is better off without, unless the shape is a
+        scan: then masses would bend to put right what the shape has wrong.
         """
-        if not self.materials:
-            return self._unlisted(data, body)
-        return material_masses(data.blurred(self._error_at(body)), self.parts, self.materials)
-
-    def _unlisted(self, data: Effective, body: InertialParameters) -> Masses:
-        """Return the masses of the parts without a list of materials, all that the weights of the rows need.
-
-        A smooth average over densities is better off with a log that is not blurred, unless the shape is a scan: then
-        masses would bend to put right what the shape has wrong.
-        """
-        if self._movable:
-            data = data.blurred(self._error_at(body))
+        listed = listed and bool(self.materials)
+        if listed or self._movable:
+            data = data.blurred(self.shape_error.with_grasp(self._sane(body)))
+        if listed:
+            return material_masses(data, self.parts, self.materials)
         return (averaged_masses if self.density == "averaged" else free_masses)(data, self.parts)
-
-    def _error_at(self, body: InertialParameters) -> Array:
-        """Return the covariance (10, 10) of shape and grasp at about that body."""
-        return self.shape_error.with_grasp(self._sane(body))
 
     @property
     def _doubtful(self) -> bool:
