@@ -20,7 +20,9 @@ from steelyard.logs.log import Integers
 
 # Chain c draws by evidence to the power TRUST^c. Neighbours may exchange their choices after every draw: with ten draws
 # between, shares of materials were off by up to 0.21, now by 0.07.
-CHAINS, DRAWS, SETTLING = 7, 2000, 200
+CHAINS, DRAWS = 7, 2000
+# Once settled every other choice is kept: what differs in one pair at most says little new.
+KEPT = slice(200, None, 2)
 # Combinations of masses that the log sees less than this share of the best seen one are left out.
 UNSEEN = 1e-12
 # No part takes what is less likely than the likeliest by this, in logarithms.
@@ -47,7 +49,7 @@ def draw(
     chance = np.random.default_rng(SEED).random((DRAWS, CHAINS, 4))
     t = vectors[:, seen].T @ b / root
     drawn, fits = _chains(R, t, mass, (mass * tolerance) ** 2, start, chance)
-    return drawn[0, SETTLING:], drawn[1, SETTLING:], fits.reshape(-1, len(volume))
+    return drawn[0, KEPT], drawn[1, KEPT], fits.reshape(-1, len(volume))
 
 
 @numba.njit(cache=True)
