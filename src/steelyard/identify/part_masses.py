@@ -105,7 +105,7 @@ class PartMasses:
     def seen(self, problem: Problem) -> Effective:
         """Return what a statistic says of the whole body, the error of the shape taken into account."""
         data = self._data(problem, self._start(problem), None)
-        body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), self.parts).mean)
+        body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), listed=False).mean)
         data = self._data(problem, data.linear_at(body.vector), None)
         return data.blurred(self.shape_error.with_grasp(body))
 
@@ -142,9 +142,9 @@ class PartMasses:
         """
         data = self._data(problem, linear, score)
         body = InertialParameters(linear[:10])
-        for _ in range(RENEWALS - 1):
+        for _ in range(RENEWALS - 1):  # weights hardly depend on how the whole is shared among parts
             free = self.density == "free" and not self.materials
-            mean = free_mean(data, self.parts) if free else self._masses(data, body, self.parts).mean
+            mean = free_mean(data, self.parts) if free else self._masses(data, body, listed=False).mean
             body = with_mass(self.parts, mean, data)
             data = self._data(problem, data.linear_at(body.vector), score)
         there = self
@@ -174,7 +174,7 @@ class PartMasses:
 
         What is wrong with the centre is wrong with the inertia. Source: scale factor of the Particle Data Group.
         """
-        drawn = with_mass(self.parts, self._masses(data, body, self.parts).mean, data)
+        drawn = with_mass(self.parts, self._masses(data, body).mean, data)
         times = apart(data, drawn, self.shape_error.with_grasp(drawn))
         if times <= 1:
             return self._answered(problem, data, body)
@@ -189,7 +189,7 @@ class PartMasses:
         return replace(found, findings=(Finding.of("part-not-homogeneous", text), *found.findings))
 
     def _answered(self, problem: Problem, data: Effective, body: InertialParameters) -> Estimate:
-        masses = self._masses(data, body, self.parts)
+        masses = self._masses(data, body)
         body = with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
         # Judged where the shape puts the body, as far as a scan says: what a wrong grasp moves must not hide a misfit.
@@ -263,18 +263,19 @@ class PartMasses:
             return body
         return self.parts.whole(self.parts.volume * (abs(float(body.mass)) / self.parts.volume.sum()))
 
-    def _masses(self, data: Effective, body: InertialParameters, parts: Parts) -> Masses:
-        """Return the masses of the parts by the chosen model.
+    def _masses(self, data: Effective, body: InertialParameters, listed: bool = True) -> Masses:
+        """Return the masses by the chosen model, without the list of materials where it is not `listed`.
 
         A list of materials is sharp enough for a shape error of a tenth of a millimetre to decide between two of them,
         so that the log is blurred by it; a smooth average over densities is better off without, unless the shape is a
         scan: then masses would bend to put right what the shape has wrong.
         """
-        if self.materials or self._movable:
+        listed = listed and bool(self.materials)
+        if listed or self._movable:
             data = data.blurred(self.shape_error.with_grasp(self._sane(body)))
-        if self.materials:
-            return material_masses(data, parts, self.materials)
-        return (averaged_masses if self.density == "averaged" else free_masses)(data, parts)
+        if listed:
+            return material_masses(data, self.parts, self.materials)
+        return (averaged_masses if self.density == "averaged" else free_masses)(data, self.parts)
 
     @property
     def _doubtful(self) -> bool:

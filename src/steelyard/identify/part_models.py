@@ -60,7 +60,7 @@ def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]
     A, b = _in_masses(data, parts)
     guess = averaged_masses(data, parts).mean
     choices = choose(A, b, parts.volume, materials, guess)
-    mean, covariance, _ = density_priors.averaged([(choices.masses, choices.evidence, choices.spread)])
+    mean, covariance = choices.mixture()
     return Masses(mean, covariance, choices)
 
 
