@@ -89,7 +89,7 @@ def test_both_quaternion_orders_agree_with_scipy(batch: tuple[int, ...], data: s
     same(Rotation.from_quaternion_wxyz(-3.7 * wxyz), rotation)
     assert (wxyz[..., 0] >= 0).all()
     flat = xyzw.reshape(-1, 4)
-    expected = scipy_transform.Rotation.from_matrix(rotation.matrix.reshape(-1, 3, 3)).as_quat()
+    expected = scipy_transform.Rotation.from_matrix(rotation.matrix.reshape(-1, 3, 3).copy()).as_quat()
     assert_allclose(np.abs((flat * expected).sum(-1)), 1, atol=TIGHT)
     turned = scipy_transform.Rotation.from_quat(flat).as_matrix()
     assert_allclose(turned, rotation.matrix.reshape(-1, 3, 3), atol=TIGHT)
