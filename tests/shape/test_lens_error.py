@@ -116,7 +116,7 @@ def test_a_handful_of_views_tells_nothing() -> None:
 
 
 def volume(scan: Scan) -> float:
-    return carved(enclose(scan.cloud), scan.empty).mesh.volume
+    return carved(enclose(scan.cloud), scan.space).mesh.volume
 
 
 def test_a_scan_is_read_with_the_lens_that_its_table_asks_for_and_says_so() -> None:

@@ -11,6 +11,7 @@ import pytest
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.shape.carving import carved
+from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import fuse
 from steelyard.shape.scene import _with_its_floor
@@ -102,7 +103,7 @@ def test_volume_is_right_and_a_bridge_is_not_filled(mesh: TriangleMesh) -> None:
     scan = fuse(scanned(mesh).views)
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
     true = np.einsum("fi,fi->f", a, np.cross(b, c)).sum() / 6
-    assert 0.93 < carved(enclose(scan.cloud), scan.empty).mesh.volume / true < 1.2  # filled bridge: 2.0
+    assert 0.93 < carved(enclose(scan.cloud), scan.space).mesh.volume / true < 1.2  # filled bridge: 2.0
 
 
 @pytest.mark.parametrize(("count", "few"), [(8, True), (45, False)])
@@ -141,15 +142,15 @@ def test_what_is_empty_is_outside(box: Scanned) -> None:
     scan = fuse(box.views)
     inside = np.random.default_rng(0).uniform([-0.047, -0.027, 0.002], [0.047, 0.027, 0.027], (500, 3))
     up = np.array([0, 0, 0.04])
-    assert scan.empty(inside).mean() < 0.02
-    assert scan.empty(inside + up).all()
-    assert scan.empty(inside - up).all()
+    assert scan.space.empty(inside).mean() < 0.02
+    assert scan.space.empty(inside + up).all()
+    assert scan.space.empty(inside - up).all()
 
 
 def test_a_solid_of_which_the_views_leave_nothing_is_refused(box: Scanned) -> None:
     solid = enclose(fuse(box.views).cloud)
     with pytest.raises(CannotAnswer, match=r"no volume left: .* check their poses"):
-        carved(solid, lambda points: np.ones(len(points), bool))
+        carved(solid, SeenSpace(lambda points: np.ones(len(points), bool)))
 
 
 def test_poses_slightly_off_are_mended(box: Scanned) -> None:
@@ -188,7 +189,7 @@ def test_pixels_lost_anywhere_leave_the_volume_as_it_is(box: Scanned, lost: floa
     views = box.views
     kept = np.random.default_rng(0).random(views.depth.shape) >= lost
     scan = fuse(replace(views, depth=np.where(kept, views.depth, 0)))
-    assert carved(enclose(scan.cloud), scan.empty).mesh.volume == pytest.approx(1.8e-4, rel=0.02)
+    assert carved(enclose(scan.cloud), scan.space).mesh.volume == pytest.approx(1.8e-4, rel=0.02)
     assert not scan.findings
 
 
@@ -199,15 +200,17 @@ def test_views_from_one_side_close_the_far_one(arc: float) -> None:
     azimuth = np.degrees(np.arctan2(*views.X_WC.position[:, 1::-1].T))
     near = np.abs((azimuth - 40 + 180) % 360 - 180) < arc / 2
     scan = fuse(replace(views, depth=views.depth[near], rgb=views.rgb[near], X_WC=views.X_WC[near]))
-    assert carved(enclose(scan.cloud), scan.empty).mesh.volume == pytest.approx(1.8e-4, rel=0.025)
+    assert carved(enclose(scan.cloud), scan.space).mesh.volume == pytest.approx(1.8e-4, rel=0.025)
 
 
 def test_a_volume_is_less_sure_the_more_of_its_skin_nobody_saw(box: Scanned) -> None:
     scan = fuse(box.views)
     solid = enclose(scan.cloud)
-    assert 0.2 < scan.unseen < 0.6
-    assert carved(solid, scan.empty, scan.unseen).volume_std < 0.07
-    assert carved(solid, scan.empty, 0.8).volume_std > carved(solid, scan.empty, 0.6).volume_std > 0.07
+    assert 0.2 < scan.space.unseen < 0.6
+    space = replace(scan.space, guess=None)
+    assert carved(solid, space).volume_std < 0.07
+    much, some = (carved(solid, replace(space, unseen=share)).volume_std for share in (0.8, 0.6))
+    assert much > some > 0.07
 
 
 @pytest.mark.parametrize(("camera", "most"), [(D435, 0.167), (SMALL, 0.14)], ids=["fine", "coarse"])
@@ -304,13 +307,14 @@ def test_a_tunnel_that_too_few_views_look_into_is_named_and_its_volume_is_unsure
 
 def test_of_skin_on_which_nothing_was_measured_only_what_views_ought_to_see_is_a_guess(box: Scanned) -> None:
     scan = fuse(box.views)
+    assert scan.space.guess is not None
     middles = np.array([[0, 0, 0.03], [0, 0, 0.06], [0, 0, 0.0], [0, 0, 0.06]])
     areas = 1e-4 * np.array([[0, 0, 3.0], [0, 0, 1.0], [0, 0, 9.0], [0, 0, -9.0]])
-    assert scan.guessed(middles, areas) == pytest.approx(0.25)
-    assert scan.guessed(middles[2:], areas[2:]) == 0.0
+    assert scan.space.guess(middles, areas) == pytest.approx(0.25)
+    assert scan.space.guess(middles[2:], areas[2:]) == 0.0
     solid = enclose(scan.cloud)
-    assert carved(solid, scan.empty, scan.unseen, lambda *_: 0.3).volume_std > 0.3
-    assert not carved(solid, scan.empty, scan.unseen, scan.guessed).findings
+    assert carved(solid, replace(scan.space, guess=lambda *_: 0.3)).volume_std > 0.3
+    assert not carved(solid, scan.space).findings
 
 
 def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
@@ -328,7 +332,7 @@ def test_a_cloth_with_folds_is_named(box: Scanned) -> None:
     assert "table-uneven" not in {finding.code for finding in fuse(views).findings}
     # What the folds may hide under the box, as a share of its 30 mm, is in the bar.
     assert shape_of(scan).solid.volume_std > 0.0015 / 0.03
-    assert fuse(views).unsure_m3 == 0.0
+    assert fuse(views).space.unsure_m3 == 0.0
 
 
 def test_an_object_taller_than_the_cameras_are_far_keeps_its_top() -> None:

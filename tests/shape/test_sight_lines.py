@@ -10,6 +10,7 @@ from steelyard.shape import sight_lines
 from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.depth_images import pixel_of
+from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.medians import middle_mean, quantile
 from steelyard.shape.table_plane import table_planes
 from steelyard.shape.volume import enclose
@@ -104,10 +105,12 @@ def test_the_noise_of_every_view_is_told_about_its_own_plane() -> None:
 def test_carving_twice_by_the_same_views_changes_nothing_and_needs_the_complex() -> None:
     ball = np.random.default_rng(0).normal(size=(400, 3))
     solid = enclose(Cloud(0.05 * ball / np.linalg.norm(ball, axis=1, keepdims=True)))
-    once = carved(solid, lambda points: points[:, 2] > 0.0)
+    once = carved(solid, SeenSpace(lambda points: points[:, 2] > 0.0))
     assert 0.4 < once.mesh.volume / solid.mesh.volume < 0.6
-    twice = carved(once, lambda points: points[:, 2] > 0.0)
+    twice = carved(once, SeenSpace(lambda points: points[:, 2] > 0.0))
     assert twice.mesh.volume == pytest.approx(once.mesh.volume)
     assert len(once.sure) == len(once.mesh)
     with pytest.raises(BadValue, match="fresh from a cloud"):
-        carved(type(solid)(solid.mesh, solid.cloud, solid.sure, 0.1, 0.001, ()), lambda points: points[:, 2] > 0)
+        carved(
+            type(solid)(solid.mesh, solid.cloud, solid.sure, 0.1, 0.001, ()), SeenSpace(lambda points: points[:, 2] > 0)
+        )

@@ -11,6 +11,7 @@ import pytest
 
 from steelyard.pipelines.shape_in_parts import Shape, shape_of
 from steelyard.shape.mesh import TriangleMesh
+from steelyard.shape.scan import Scan
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose
@@ -56,7 +57,7 @@ def test_a_stand_whose_plane_is_given_is_no_part_of_the_object(x: float, y: floa
     given = replace(on_stand(x, y, high), table=TablePlane(np.array([0, 0, 1.0]), high))
     shape = shape_of(given)
     assert shape.solid.mesh.volume == pytest.approx(EDGE**3, rel=0.05)
-    assert shape.scan is not None
+    assert isinstance(shape.scan, Scan)
     assert shape.scan.table.offset == pytest.approx(high, abs=5e-4)
     assert "table-in-cloud" not in said(shape)
 
@@ -78,7 +79,7 @@ def test_a_stand_that_fills_the_views_is_the_table(x: float, y: float, high: flo
     """Where it is low, the table under it shows in some views."""
     shape = shape_of(on_stand(x, y, high))
     assert shape.solid.mesh.volume == pytest.approx(EDGE**3, rel=0.05)
-    assert shape.scan is not None
+    assert isinstance(shape.scan, Scan)
     assert shape.scan.table.offset == pytest.approx(high, abs=1e-3)
 
 

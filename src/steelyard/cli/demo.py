@@ -64,15 +64,18 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     from steelyard.io.cloud_files import write_cloud
     from steelyard.io.recording_files import write_recording
     from steelyard.logs.alignment import align
+    from steelyard.pipelines.shape_in_parts import kept, shape_of
     from steelyard.report import write_report
+    from steelyard.shape.scan import fuse
     from steelyard.simulate import hammer
 
     seen = hammer.scanned(seed)
-    shape = api.shape_of(seen.views)
+    scan = fuse(seen.views)
+    shape = shape_of(scan)
     with tempfile.TemporaryDirectory() as scratch:
         folder = keep or Path(scratch)
         log = write_recording(seen.recording, folder)
-        write_cloud(shape.solid.cloud, folder / "hammer.ply")
+        write_cloud(kept(scan), folder / "hammer.ply")
         recording = read_recording(log)
         rows = align(recording).log
         answers = _answers(log, shape, rows, seen.X_SW)

@@ -27,6 +27,7 @@ def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     """Fuse the posed RGB-D images in the folder VIEWS into one cloud of the object on the table, underside closed."""
     from steelyard.io.cloud_files import write_cloud
     from steelyard.io.view_folders import read_views
+    from steelyard.pipelines.shape_in_parts import kept
     from steelyard.shape.scan import fuse
 
     require_output(output, "a cloud", [".ply", ".npz"], views)
@@ -36,7 +37,7 @@ def scan(views: Path, output: Path | None, points: int, as_json: bool) -> None:
     fused = fuse(read, points)
     seconds = time.process_time() - begun
     if output is not None:
-        write_cloud(fused.cloud, output)
+        write_cloud(kept(fused), output)
     if as_json:
         print_json(_plain(fused, output, seconds))
     else:

@@ -11,9 +11,11 @@ import numpy as np
 from steelyard.errors import BadFile
 from steelyard.io.array_table import ArrayTable, array_headers, read_numbers
 from steelyard.io.in_file import in_file
+from steelyard.io.kept_scans import CELLS, SCAN, bytes_of, kept_of
 from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.known_space import Kept
 from steelyard.whole_files import write_bytes
 
 SUFFIXES = (".ply", ".pcd", ".npz")
@@ -27,7 +29,7 @@ def read_cloud(path: Path | str) -> Cloud:
 
     Points with NaN or infinity, as in the holes of an organised PCD, are left out and counted.
     """
-    path = Path(path)
+    path, kept = Path(path), None
     if not path.is_file():
         raise BadFile(f"{path}: no such file.")
     match path.suffix.lower():
@@ -35,10 +37,11 @@ def read_cloud(path: Path | str) -> Cloud:
             elements = read_ply(path)
             columns = elements.get("vertex", {})
             _require_points_only(path, len(next(iter(elements.get("face", {}).values()), ())))
+            kept = kept_of(path, *(next(iter(elements.get(name, {}).values()), None) for name in (SCAN, CELLS)))
         case ".pcd":
             columns = read_pcd(path)
         case ".npz":
-            return _checked(path, *_of_arrays(path))
+            return _of_arrays(path)
         case other:
             raise BadFile(f'{path}: "{other}" is no cloud. Give {", ".join(SUFFIXES)}.')
     missing = [axis for axis in "xyz" if axis not in columns]
@@ -47,7 +50,8 @@ def read_cloud(path: Path | str) -> Cloud:
     normals = next((names for names in _NORMALS if set(names) <= set(columns)), None)
     label = next((columns[name] for name in _LABELS if name in columns), None)
     turned = None if normals is None else _stacked(columns, normals)
-    return _checked(path, _stacked(columns, "xyz"), _rgb(columns), label, turned, columns.get("seen"))
+    points = (_stacked(columns, "xyz"), _rgb(columns), label, turned, columns.get("seen"))
+    return _checked(path, points, kept)
 
 
 def _require_points_only(path: Path, faces: int) -> None:
@@ -76,15 +80,16 @@ def _rgb(columns: dict[str, Any]) -> Any:
     return None
 
 
-def _of_arrays(path: Path) -> tuple[Any, ...]:
+def _of_arrays(path: Path) -> Cloud:
     header = ArrayTable.open(path).header  # refuses pickles by their header
     if "xyz" not in header.groups:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
     wanted = ("xyz", _coloured(header.groups), "label", "normals", "seen")
     held = array_headers(path)
-    found = read_numbers(path, [name for name in wanted if name in held])
-    return tuple(found.get(name) for name in wanted)
+    found = read_numbers(path, [name for name in (*wanted, SCAN, CELLS) if name in held])
+    kept = kept_of(path, found.get(SCAN), found.get(CELLS))
+    return _checked(path, tuple(found.get(name) for name in wanted), kept)
 
 
 def _coloured(names: Any) -> str:
@@ -92,19 +97,22 @@ def _coloured(names: Any) -> str:
     return next((name for name in ("rgb", "colors", "colours") if name in names), "rgb")
 
 
-def _checked(path: Path, xyz: Any, rgb: Any, label: Any, normals: Any, seen: Any) -> Cloud:
-    """Return the cloud of finite points; raises BadFile where none is left or columns differ in length."""
-    xyz = np.asarray(xyz, np.float64)
+def _checked(path: Path, points: tuple[Any, ...], kept: Kept | None) -> Cloud:
+    """Return the cloud of finite points; raises BadFile where none is left or columns differ in length.
+
+    points  xyz, rgb, label, normals, seen; None what is not known
+    """
+    xyz = np.asarray(points[0], np.float64)
     if xyz.ndim != 2 or xyz.shape[1] != 3:
         raise BadFile(f"{path}: points must have shape (N, 3); got {xyz.shape}.")
-    holes = ~np.isfinite(xyz).all(1)
+    holes: Any = ~np.isfinite(xyz).all(1)
     if holes.all():
         what = f"all {len(xyz)} points are NaN or infinite" if len(xyz) else "the file holds no points"
         raise BadFile(f"{path}: {what}. Write the cloud again, or scan the object again.")
-    whole = [None if c is None else np.asarray(c) for c in (rgb, label, normals, seen)]
+    whole = [None if c is None else np.asarray(c) for c in points[1:]]
     if holes.any():
         xyz, whole = xyz[~holes], [c if c is None or len(c) != len(holes) else c[~holes] for c in whole]
-    return in_file(path, lambda: Cloud(xyz, *whole, left_out=int(holes.sum())))
+    return in_file(path, lambda: Cloud(xyz, *whole, left_out=int(holes.sum()), kept=kept))
 
 
 def write_cloud(cloud: Cloud, path: Path | str) -> None:
@@ -117,16 +125,21 @@ def write_cloud(cloud: Cloud, path: Path | str) -> None:
             content = io.BytesIO()
             names = ("xyz", "rgb", "label", "normals", "seen")
             columns = {name: getattr(cloud, name) for name in names if getattr(cloud, name) is not None}
-            np.savez_compressed(content, allow_pickle=False, **columns)
+            np.savez_compressed(content, allow_pickle=False, **columns, **_beside(cloud))
             write_bytes(path, content.getvalue())
         case other:
             raise BadFile(f'{path}: a cloud is written as .ply or .npz, not as "{other}".')
 
 
+def _beside(cloud: Cloud) -> dict[str, Any]:
+    """Return the arrays of bytes that keep what a scan said beside its points: none where no scan did."""
+    return {} if cloud.kept is None else {SCAN: bytes_of(cloud.kept), CELLS: cloud.kept.space.fifths.astype(np.uint8)}
+
+
 def _ply(cloud: Cloud) -> bytes:
     fields: list[tuple[str, str, str, Any]] = [(axis, "double", "<f8", cloud.xyz[:, k]) for k, axis in enumerate("xyz")]
     if cloud.normals is not None:
-        fields += [(name, "float", "<f4", cloud.normals[:, k]) for k, name in enumerate(_NORMALS[0])]
+        fields += [(name, "double", "<f8", cloud.normals[:, k]) for k, name in enumerate(_NORMALS[0])]
     if cloud.rgb is not None:
         fields += [(name, "uchar", "u1", cloud.rgb[:, k]) for k, name in enumerate(("red", "green", "blue"))]
     if cloud.label is not None:
@@ -138,4 +151,8 @@ def _ply(cloud: Cloud) -> bytes:
         table[name] = values
     header = ["ply", "format binary_little_endian 1.0", "comment units metres", f"element vertex {len(cloud)}"]
     header += [f"property {word} {name}" for name, word, _, _ in fields]
-    return ("\n".join([*header, "end_header"]) + "\n").encode() + table.tobytes()
+    beside = _beside(cloud)
+    for name, values in beside.items():
+        header += [f"element {name} {len(values)}", "property uchar value"]
+    body = [table.tobytes(), *(values.tobytes() for values in beside.values())]
+    return ("\n".join([*header, "end_header"]) + "\n").encode() + b"".join(body)

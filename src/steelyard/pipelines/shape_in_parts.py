@@ -11,12 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.parts.parts import Parts
 from steelyard.parts.segment import Segmentation, segment
-from steelyard.shape.carving import carved, least_std
+from steelyard.shape import carving
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.known_space import Kept, KeptSpace
 from steelyard.shape.scan import Scan, fuse
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.views import Views
@@ -31,6 +33,7 @@ LEAST_SURE = 0.03
 STRETCH = 1.5
 # The same over the share of the volume that cells carry across borders between parts.
 BORDER = 0.6
+_CHANGED = "points of the cloud are not those that its scan wrote: where its views looked past the object was not used"
 
 
 @dataclass(frozen=True, eq=False)
@@ -39,14 +42,15 @@ class Shape:
 
     solid         the closed volume
     segmentation  its parts as shape and colour alone say
-    scan          the fusion of the views that it came from, None where a cloud was given
+    scan          what its views said: their fusion, or what the cloud that was written of it keeps; None where the
+                  cloud comes from elsewhere
     asked         whether the number of parts was asked for, so that a log is offered no other
     notes         what was done to the points as they were given
     """
 
     solid: Solid
     segmentation: Segmentation
-    scan: Scan | None = None
+    scan: Scan | Kept | None = None
     asked: bool = False
     notes: tuple[str, ...] = ()
 
@@ -67,8 +71,7 @@ class Shape:
         """How wrong the shape may be: no less than a measured mesh, more as far as solid and cameras are unsure."""
         stretch = float(np.hypot(STRETCH * self.solid.volume_std, BORDER * self.segmentation.border_share))
         error = MEASURED.at_least(self.solid.surface_m, stretch)
-        placed = None if self.scan is None else self.scan.placement
-        return error.laid(placed.std_m, placed.std_rad) if placed else error
+        return error if self.scan is None else error.laid(*self.scan.place_std)
 
     def cuts(self) -> Cuts:
         """Return the cuts that a log may choose from: about the number shape and colour chose, and half of it.
@@ -106,28 +109,40 @@ def shape_of(
     """
     if isinstance(seen, Views):
         seen = fuse(seen)
-    solid = _carved(seen) if isinstance(seen, Scan) else _enclosed(seen)
+    scan, cloud = (seen, seen.cloud) if isinstance(seen, Scan) else (seen.kept, seen)
+    solid, notes = _solid(cloud, scan)
     if refill is not None:
         mesh = refill(solid.mesh)
         solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)), around=None, inside=None)
     # Normals that were found and not measured blur at edges: they would split one colour by its shading.
-    measured = (seen.cloud if isinstance(seen, Scan) else seen).normals is not None
-    cloud = solid.cloud if measured else replace(solid.cloud, normals=None)
-    made = segment(cloud, solid, parts=parts)
-    scan, given = (seen, seen.cloud) if isinstance(seen, Scan) else (None, seen)
-    return Shape(solid, made, scan, parts is not None, _notes(given))
+    measured = cloud.normals is not None
+    made = segment(solid.cloud if measured else replace(solid.cloud, normals=None), solid, parts=parts)
+    return Shape(solid, made, scan, parts is not None, (*_notes(cloud), *notes))
 
 
-def _carved(scan: Scan) -> Solid:
-    return carved(enclose(scan.cloud), scan.empty, scan.unseen, scan.guessed, scan.unsure_m3)
+def kept(scan: Scan) -> Cloud:
+    """Return the cloud of a scan with what its views know beside it, so that a file of it answers as the views do."""
+    try:
+        space = carving.kept(enclose(scan.cloud), scan.space)
+    except (BadValue, CannotAnswer):
+        space = KeptSpace(scan.space.unseen, scan.space.unsure_m3)
+    return replace(scan.cloud, kept=Kept(scan.findings, space, scan.place_std))
 
 
-def _enclosed(cloud: Cloud) -> Solid:
-    """Return the solid of a cloud; that of a scan which was saved is no surer than with its views at hand."""
+def _solid(cloud: Cloud, scan: Scan | Kept | None) -> tuple[Solid, tuple[str, ...]]:
+    """Return the solid of a cloud, carved by what its views saw where that is known, and what was not used."""
     solid = enclose(cloud)
-    if cloud.seen is None:
-        return solid
-    return replace(solid, volume_std=max(solid.volume_std, least_std(1 - float(cloud.seen.mean()))))
+    match scan:
+        case Scan():
+            return carving.carved(solid, scan.space), ()
+        case Kept(space=space) if space.fits(solid.around):
+            return carving.carved(solid, space), ()
+        case Kept(space=space):
+            return carving.uncarved(solid, space), (_CHANGED,)
+        case None if cloud.seen is not None:
+            return carving.uncarved(solid, KeptSpace(1 - float(cloud.seen.mean()))), ()
+        case None:
+            return solid, ()
 
 
 def _notes(given: Cloud) -> tuple[str, ...]:

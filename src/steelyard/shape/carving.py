@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
@@ -12,11 +10,10 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding, percent
 from steelyard.shape.islands import without_islands
+from steelyard.shape.known_space import KeptSpace, SeenSpace, Space
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import Solid
 
-# Places in a cell that are asked: its centroid, and halfway from there to each corner.
-_PLACES = np.array([[0.25] * 4, *(0.15 + 0.4 * np.eye(4))])
 _EMPTY, _FULL = 0.5, 0.1  # share of the places seen empty, above which a cell is outside, below which it is inside
 # Cells that cloud and views judge differently count half. Volumes of scans are no better than this share even where
 # they agree: the rms error over scans of tools without hidden hollows, whose undersides nobody saw.
@@ -29,29 +26,15 @@ _ON_TABLE, _UNSEEN = 0.5, 0.3
 _GUESSED, _BEHIND = 0.12, 2.0
 
 
-def carved(
-    solid: Solid,
-    empty: Callable[[Array], Any],
-    unseen: float = 0.0,
-    guessed: Callable[[Array, Array], float] | None = None,
-    unsure_m3: float = 0.0,
-) -> Solid:
+def carved(solid: Solid, space: Space) -> Solid:
     """Return the solid with its cells decided anew where the views decide.
-
-    empty   whether points (N, 3) are known to be outside: `Scan.empty`
-    unseen  share of the skin that nobody saw: `Scan.unseen`
-    guessed how much of a skin, middles (N, 3) and areas (N, 3) of its triangles, is a guess: `Scan.guessed`; None: not
-            asked
-    unsure_m3  standard deviation of the volume that the table leaves open [m^3]: `Scan.unsure_m3`
 
     With the underside closed, all that no view saw to be empty is the object's; between, the solid's own verdict holds.
     A surface that looked open is closed by that, and what closes it is a guess: `surface-open` where that is much of
     the skin. CannotAnswer where the views leave nothing.
     """
     around, known = _cells(solid)
-    corners = around.vertices[around.tets]
-    asked = np.einsum("pk,tkd->ptd", _PLACES, corners)
-    share = np.asarray(empty(asked.reshape(-1, 3)), float).reshape(len(_PLACES), -1).mean(0)
+    share = space.emptied(around)
     inside = without_islands(around, ((known >= 0) & (share < _EMPTY)) | (share < _FULL))
     if not inside.any():
         raise CannotAnswer(
@@ -63,20 +46,36 @@ def carved(
     findings = tuple(f for f in solid.findings if f.code != "surface-open")
     mesh = around.chosen(inside)
     disputed = float(around.volumes[(share < _EMPTY) != (known >= 0)].sum()) / mesh.volume
-    std = max(least_std(unseen), min(solid.volume_std, _HALF * disputed))
-    guess = guessed(*_skin(mesh)) if guessed else 0.0
-    if guess > _GUESSED:
-        findings += (_open(guess),)
-    std = float(np.linalg.norm([std, (_BEHIND if guess > _GUESSED else 1.0) * guess, unsure_m3 / mesh.volume]))
-    return replace(
+    std = max(least_std(space.unseen), min(solid.volume_std, _HALF * disputed))
+    made = replace(
         solid, mesh=mesh, sure=sure[inside], volume_std=std, findings=findings, inside=np.flatnonzero(inside)
     )
+    return _unsure(made, space)
 
 
-def _skin(mesh: TetMesh) -> tuple[Array, Array]:
-    """Return middles (F, 3) and outward areas (F, 3) [m^2] of the triangles of the surface."""
-    corners = mesh.vertices[mesh.surface]
-    return corners.mean(1), np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
+def kept(solid: Solid, space: SeenSpace) -> KeptSpace:
+    """Return what a file is to keep, beside the cloud of a solid, of the space that its views saw."""
+    found = space.kept(_cells(solid)[0])
+    return replace(found, skin=space.guessed(carved(solid, found).mesh))
+
+
+def uncarved(solid: Solid, space: Space) -> Solid:
+    """Return the solid, its cells as they are, no surer than its views were: points were changed since they were seen.
+
+    Whatever the cells, what nobody saw, what is a guess and what the table left open stays so.
+    """
+    return _unsure(replace(solid, volume_std=max(solid.volume_std, least_std(space.unseen))), space)
+
+
+def _unsure(solid: Solid, space: Space) -> Solid:
+    """Return the solid with what the views leave open in its bar: guessed skin, and the table."""
+    guess, findings = space.guessed(solid.mesh), solid.findings
+    if guess > _GUESSED:
+        findings, behind = (*findings, _open(guess)), _BEHIND
+    else:
+        behind = 1.0
+    std = float(np.linalg.norm([solid.volume_std, behind * guess, space.unsure_m3 / solid.mesh.volume]))
+    return replace(solid, volume_std=std, findings=findings)
 
 
 def _open(guess: float) -> Finding:

@@ -12,6 +12,7 @@ from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.eight_bits import Colours, eight_bits
+from steelyard.shape.known_space import Kept
 from steelyard.shape.mesh import Integers
 from steelyard.shape.spacing import Neighbours
 from steelyard.spatial import Pose
@@ -31,6 +32,7 @@ class Cloud:
     seen     (N,) whether a camera saw the colour of each point; the rest have that of the nearest that one saw.
              None where all were seen
     left_out how many further points were given without a place: NaN or infinite
+    kept     what the scan said that the cloud was written by; None where it comes from elsewhere
     """
 
     xyz: Array
@@ -39,6 +41,7 @@ class Cloud:
     normals: Array | None = None
     seen: Mask | None = None
     left_out: int = field(default=0, kw_only=True)
+    kept: Kept | None = field(default=None, kw_only=True, repr=False)
 
     def __post_init__(self) -> None:
         xyz = check.vectors("points", self.xyz)

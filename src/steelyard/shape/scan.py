@@ -19,6 +19,7 @@ from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.common_table import levelled
 from steelyard.shape.image_borders import cut_off
+from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.lens_error import lens_by_table
 from steelyard.shape.placement import Placement, placement
 from steelyard.shape.registration import Seen, agreed
@@ -62,10 +63,7 @@ class Scan:
     placement  what moved cameras say of where the cloud lies as a whole, None where the poses were good enough
     findings   what you must know
     stages     CPU time of each step [s]
-    empty      whether points (N, 3) of W are known to be outside the object
-    guessed    share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles in W, on which no view measured
-               a surface; of what stands clear of the table and does not face it
-    unsure_m3  standard deviation of the object's volume that the table leaves open [m^3]
+    space      what the views know of the space around the object, in W
     """
 
     cloud: Cloud
@@ -79,14 +77,12 @@ class Scan:
     placement: Placement | None
     findings: tuple[Finding, ...]
     stages: dict[str, float]
-    empty: Callable[[Array], Any] = field(repr=False)
-    guessed: Callable[[Array, Array], float] = field(repr=False)
-    unsure_m3: float = 0.0
+    space: SeenSpace = field(repr=False)
 
     @property
-    def unseen(self) -> float:
-        """Share of the cloud that no camera saw, which closes the rest."""
-        return 1 - self.seen / len(self.cloud)
+    def place_std(self) -> tuple[float, float]:
+        """Standard deviations of where the cloud lies as a whole, per axis [m], [rad]; 0 where the poses were right."""
+        return (self.placement.std_m, self.placement.std_rad) if self.placement else (0.0, 0.0)
 
 
 def fuse(views: Views, points: int = POINTS) -> Scan:
@@ -127,7 +123,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
-        empty=_empty(scene, bottom), guessed=_guessed(scene), unsure_m3=float(np.hypot(unsure, more)),
+        space=SeenSpace(_empty(scene, bottom), _guessed(scene), 1 - seen / len(cloud), float(np.hypot(unsure, more))),
     )  # fmt: skip
 
 
