@@ -20,9 +20,12 @@ from steelyard.shape.plane_axis import least_axis
 _NEIGHBOURS = 20  # that show two layers
 _ROUNDS = 6  # of telling the layers apart and fitting them
 _TWO = 0.12  # of the squared heights that one quadric leaves, what two leave at most: chance leaves a fifth
+_BLURRED = 0.2  # the same where noise blurs two layers: chance leaves less at four tenths of the points
+_FLAT = 0.005  # of the reach of a neighbourhood: heights over one sheet that are no larger are none
 _FEWEST = 0.2  # of a neighbourhood that lies on the smaller layer, at least
-_LOOKED_AT, _SOME = 300, 0.2  # points looked at first, and the share of them on two layers below which there are none
-_MANY = 0.25  # of the points that lie on two layers, at least
+_LOOKED_AT = 300  # points looked at first
+_SOME, _SOME_BLURRED = 0.2, 0.5  # share of them on two layers, clear or blurred, below which there are none
+_MANY, _MOST = 0.25, 0.6  # of all points that lie on two layers, clear or blurred, at least
 _PARALLEL = 0.7  # cosine between the planes of neighbours on one wall, at least
 _TERMS = 7  # of two quadrics: six of the lower one, and how far the other lies over it
 
@@ -46,10 +49,17 @@ class Layers(NamedTuple):
         """Return the layers of points (N, 3) with neighbours (N, K), nearest first; None where they have one."""
         near = np.ascontiguousarray(index[:, :_NEIGHBOURS])
         some = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
-        if near.shape[1] < _NEIGHBOURS or _layers(xyz, near, some)[0].mean() < _SOME:
+        if near.shape[1] < _NEIGHBOURS:
             return None
-        two, same, plane, apart = _layers(xyz, near, np.arange(len(xyz)))
-        return cls(two, same, plane, float(np.median(apart[two]))) if two.mean() > _MANY else None
+        if _two(_layers(xyz, near, some)[0], _SOME, _SOME_BLURRED) is None:
+            return None
+        left, same, plane, apart = _layers(xyz, near, np.arange(len(xyz)))
+        two = _two(left, _MANY, _MOST)
+        return None if two is None else cls(two, same, plane, float(np.median(apart[two])))
+
+    def volume(self, area: Array) -> float:
+        """Return what lies between the layers, each point standing for `area` (N,) of their surface."""
+        return float(area[self.two].sum()) * self.thickness / 2
 
     def told(self, plane: Array, link: Array, index: Integers) -> tuple[Array, Array]:
         """Return planes (N, 3) and links (N, K) to neighbours, those of walls by their layers.
@@ -64,11 +74,26 @@ class Layers(NamedTuple):
         return own, np.where(self.two[:, None], told, np.abs(link) * np.sign(turn))
 
 
+def _two(left: Array, many: float, most: float) -> Mask | None:
+    """Return which points lie on two layers, by what these leave (N,) of one sheet's heights; None where too few do.
+
+    Noise blurs the layers of single points, not how many there are: so of walls that are nearly all of a cloud less is
+    asked.
+    """
+    for share, limit in ((many, _TWO), (most, _BLURRED)):
+        if (left < limit).mean() > share:
+            return left < limit
+    return None
+
+
 @numba.njit(cache=True, nogil=True)
-def _layers(xyz: Array, index: Integers, rows: Integers) -> tuple[Mask, Mask, Array, Array]:
-    """Return for points `rows` whether two layers lie there, which neighbours are on theirs, its normal, their gap."""
+def _layers(xyz: Array, index: Integers, rows: Integers) -> tuple[Array, Mask, Array, Array]:
+    """Return for points `rows` what two layers leave of what one leaves, neighbours on theirs, its normal, their gap.
+
+    1 is left where there are no two: in a plane, and where nearly all lie on one of them.
+    """
     count = index.shape[1]
-    two, same = np.zeros(len(rows), np.bool_), np.zeros((len(rows), count), np.bool_)
+    share, same = np.ones(len(rows)), np.zeros((len(rows), count), np.bool_)
     plane, apart = np.zeros((len(rows), 3)), np.zeros(len(rows))
     terms, height = np.empty((count + 1, _TERMS)), np.empty(count + 1)
     high, left, matrix = np.empty(count + 1, np.bool_), np.empty(count + 1), np.empty((_TERMS, _TERMS))
@@ -90,13 +115,14 @@ def _layers(xyz: Array, index: Integers, rows: Integers) -> tuple[Mask, Mask, Ar
         for k in range(count + 1):
             upper += high[k]
         least = min(upper, count + 1 - upper)
-        two[r] = both < _TWO * one and least > _FEWEST * (count + 1)
+        if one > _FLAT**2 * (count + 1) / (frame[0] ** 2).sum() and least > _FEWEST * (count + 1):
+            share[r] = both / one
         _normal(frame, terms[0], found, plane[r])
         # Heights are along the normal of the neighbourhood, which is that of both layers.
         apart[r] = abs(found[6])
         for k in range(count):
             same[r, k] = high[k + 1] == high[0]
-    return two, same, plane, apart
+    return share, same, plane, apart
 
 
 @numba.njit(cache=True, nogil=True)

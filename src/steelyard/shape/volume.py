@@ -34,7 +34,7 @@ _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below 
 # missing (0.12 and more without an underside). Patterns of points that are unlike on two sides leave up to 0.10, or
 # 0.135 where one is five times as dense.
 _OPEN = 0.11
-_LOST = 0.4  # of the spacing: thinner walls, told by their layers, lose 8 to 45 % of their volume
+_LOST = 0.4  # of the spacing: thinner walls, told by their layers, lose 8 to 45 % of their own volume
 _NOISY = 0.3  # of the points: so many that are nearer to the other side make the solid doubtful
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Doubt above which normals that come with a cloud may be wrong: thin walls reach 0.44, a tenth of them turned 0.67.
@@ -46,7 +46,8 @@ _CLEARER = 0.5  # of that doubt: no more is left without such normals
 _TORN, _MENDED = 0.004, 0.8
 _PATCHES = 0.05  # of the points: fewer that change sides are walls and gaps too narrow for neighbours, no patches
 # Standard deviation of the volume: of any solid; per share between points of round surfaces and their chords; per share
-# of cells unsure; per share that a skin as thick as the noise has; where walls blur; per share left open.
+# of cells unsure; per share that a skin as thick as the noise has; where walls blur, else per share in thin ones;
+# per share left open.
 _STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
 
 
@@ -240,6 +241,10 @@ def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
     hole = gap > _OPEN
     findings = used.findings + turned
     thin = _thin_walls(used, surface, doubt, noisy)
+    wrong = 0.0 if thin is None else 1.0
+    if thin is None and surface.layers is not None and surface.layers.thickness < _LOST * surface.spacing:
+        thin = thinner_than_seen(surface.layers.thickness * diagonal * 1e3, surface.spacing * diagonal * 1e3)
+        wrong = min(surface.layers.volume(surface.area) * diagonal**3 / solid.volume, 1.0)
     if thin is not None:
         findings += (thin,)
     if hole:
@@ -248,7 +253,7 @@ def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
         )
         findings += (Finding.of("surface-open", text),)
     unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
-    wrong = thin is not None or any(finding.code == "table-in-cloud" for finding in findings)
+    wrong = 1.0 if any(finding.code == "table-in-cloud" for finding in findings) else wrong
     few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
     skin = used.noise * total * diagonal**2 / solid.volume
     std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
@@ -257,13 +262,7 @@ def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
 
 
 def _thin_walls(used: WorkingCloud, surface: Oriented, doubt: float, noisy: float) -> Finding | None:
-    """Return what is said of walls too thin for the points, or for a share `noisy` of them in their noise."""
-    mm = used.cloud.diagonal * 1e3
-    apart = surface.spacing * mm
+    """Return what is said of walls that are no walls for the points, or for a share `noisy` of them in their noise."""
     if doubt > _BLURRED:
-        return blurred_walls(used.cloud, apart, doubt)
-    if noisy > _NOISY:
-        return within_noise(noisy, used.noise)
-    if surface.layers is not None and surface.layers.thickness < _LOST * surface.spacing:
-        return thinner_than_seen(surface.layers.thickness * mm, apart)
-    return None
+        return blurred_walls(used.cloud, surface.spacing * used.cloud.diagonal * 1e3, doubt)
+    return within_noise(noisy, used.noise) if noisy > _NOISY else None
