@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 
 from steelyard.shape.common_table import levelled
-from steelyard.shape.joint_registration import steps_together
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scene import Scene, scene_of
+from steelyard.shape.view_steps import steps_together
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.catalogue import build
