@@ -24,6 +24,7 @@ from steelyard.shape.scene import (
     surface_of,
     surfels,
 )
+from steelyard.shape.table_plane import INCIDENCE
 from steelyard.shape.thinning import spread_to
 from steelyard.shape.view_steps import moved, steps_together
 from steelyard.spatial import Rotation
@@ -78,7 +79,7 @@ def _expected(scene: Scene, xyz: Array, normal: Array) -> Array:
         square += np.where(faces, far, 0.0)
         seen += faces
     usual = scene.distance**2
-    return 0.7 * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
+    return INCIDENCE * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
 
 
 @dataclass(frozen=True, eq=False)

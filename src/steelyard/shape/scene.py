@@ -12,6 +12,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape import sight_lines
+from steelyard.shape.medians import middle_half_std
 from steelyard.shape.table_plane import leveller, looked_at, table_frame, table_noise, table_of
 from steelyard.shape.thinning import in_cubes, spread_to
 from steelyard.shape.view_mistakes import advice
@@ -193,7 +194,7 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
     # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
     even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
-    spread = float(np.subtract(*np.percentile(even, (75, 25)))) / 1.35 if len(even) else 0.0
+    spread = middle_half_std(even) if len(even) else 0.0
     level = float(np.median(even)) if len(even) else 0.0
     up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
     label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
@@ -341,7 +342,7 @@ def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tup
     around = table & ~object_cells[region.cells_under(xyz)[0]]
     if around.sum() >= 20:
         level = float(np.median(xyz[around, 2]))
-        rough = float(np.subtract(*np.percentile(xyz[around, 2], (75, 25)))) / 1.35
+        rough = middle_half_std(xyz[around, 2])
     xyz[:, 2] -= level
     scene.p[:, 2] -= level
     keep = good & (xyz[:, 2] > 5 * rough)
