@@ -84,7 +84,7 @@ class _Clusters(NamedTuple):
 def seam_tree(
     mesh: TetMesh, skin: Skin, piece: Integers, colour: Integers, pairs: Integers, corners: Integers
 ) -> SeamTree:
-    """Return the tree of pieces (T,) with colours (N,); pairs and corners as `pieces.inner_faces` gives them."""
+    """Return the tree of pieces (T,) with colours (N,); pairs and corners are `mesh.dual` and its `inner_faces`."""
     count = len(colour)
     corner = np.zeros((count, len(mesh.vertices)), dtype=bool)  # which vertices each piece has
     corner[np.repeat(piece, 4), mesh.tets.ravel()] = True

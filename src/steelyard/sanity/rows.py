@@ -67,7 +67,7 @@ def without_repeats(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
         f"{count} of {len(stream)} rows of '{stream.name}' ({100 * count / len(stream):.0f} %) repeat the row before "
         f"in every channel{_with_stamps(int(stamped.sum()), count)}; each was used once."
     )
-    return _kept(stream, np.concatenate([[True], ~again])), (Finding.of("rows-duplicated", message),)
+    return stream.rows(np.concatenate([[True], ~again])), (Finding.of("rows-duplicated", message),)
 
 
 def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
@@ -168,7 +168,7 @@ def _left_out(stream: Stream, rows: Mask) -> tuple[Stream, str]:
     """Return the stream without `rows` (N,), or all of it where they are too many, and what was done in words."""
     if rows.mean() > MOST_LEFT_OUT:
         return stream, "so many cannot be left out, and these were used as they are"
-    return _kept(stream, ~rows) if rows.any() else stream, "these rows were left out"
+    return stream.rows(~rows) if rows.any() else stream, "these rows were left out"
 
 
 def _columns(stream: Stream) -> Array:
@@ -282,11 +282,6 @@ def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: i
     )
 
 
-def _kept(stream: Stream, rows: Mask) -> Stream:
-    time = None if stream.time is None else stream.time[rows]
-    return replace(stream, channels={q: v[rows] for q, v in stream.channels.items()}, time=time)
-
-
 def _rising(stream: Stream) -> Stream:
     """Return the stream with equal stamps of a coarse clock spread evenly up to the next one."""
     if stream.time is None or (np.diff(stream.time) > 0).all():
@@ -314,7 +309,7 @@ def _repeated_in_tables(recording: Recording) -> tuple[Recording, tuple[Finding,
         f"{count} of {len(together)} rows ({100 * count / len(together):.0f} %) repeat an earlier row in every "
         "channel; each was used once."
     )
-    streams = tuple(_kept(s, rows) for s in recording.streams)
+    streams = tuple(s.rows(rows) for s in recording.streams)
     return replace(recording, streams=streams), (Finding.of("rows-duplicated", message),)
 
 

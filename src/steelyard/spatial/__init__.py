@@ -10,6 +10,7 @@ from steelyard.spatial.vectors import (
     cross,
     cross_matrix,
     lever_acceleration,
+    signed_axes,
     unit_vectors,
 )
 
@@ -23,5 +24,6 @@ __all__ = [
     "cross",
     "cross_matrix",
     "lever_acceleration",
+    "signed_axes",
     "unit_vectors",
 ]

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations, product
 from typing import Any, Self
 
 import numpy as np
@@ -40,6 +41,12 @@ def cross_matrix(vector: ArrayLike) -> Array:
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return out
+
+
+def signed_axes() -> Array:
+    """Return every order and sign of three axes (48, 3, 3), first as they are: 24 rotations, 24 reflections."""
+    orders, signs = permutations(range(3)), tuple(product((1.0, -1.0), repeat=3))
+    return np.stack([np.eye(3)[list(order)] * np.array(sign) for order in orders for sign in signs])
 
 
 def axial_vector(matrix: Array) -> Array:
