@@ -11,9 +11,10 @@ from steelyard.errors import CannotAnswer
 from steelyard.shape import registration, scan
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled
+from steelyard.shape.region import object_on_table
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scene import Scene, object_on_table, scene_of
+from steelyard.shape.scene import Scene, scene_of
 from steelyard.shape.views import Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed

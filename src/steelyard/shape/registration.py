@@ -13,17 +13,9 @@ from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import slid
 from steelyard.shape.depth_images import FACING
-from steelyard.shape.scene import (
-    LEAST_VIEWS,
-    WINDOW,
-    Region,
-    Scene,
-    no_surface,
-    object_on_table,
-    settled,
-    surface_of,
-    surfels,
-)
+from steelyard.shape.patches import no_surface, settled, surface_of, surfels
+from steelyard.shape.region import Region, object_on_table
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene
 from steelyard.shape.table_plane import INCIDENCE
 from steelyard.shape.thinning import spread_to
 from steelyard.shape.view_steps import moved, steps_together

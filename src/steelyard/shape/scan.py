@@ -20,9 +20,11 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.common_table import levelled
 from steelyard.shape.image_borders import cut_off
 from steelyard.shape.lens_error import lens_by_table
+from steelyard.shape.patches import surface_of, surfels
 from steelyard.shape.placement import Placement, placement
+from steelyard.shape.region import followed, lost_share
 from steelyard.shape.registration import Seen, agreed
-from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, followed, lost_share, scene_of, surface_of, surfels
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene, scene_of
 from steelyard.shape.spacing import Neighbours
 from steelyard.shape.stand import put_on_stand
 from steelyard.shape.thinning import in_cubes, spread, spread_to
