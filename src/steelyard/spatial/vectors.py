@@ -29,6 +29,16 @@ def lever_acceleration(omega: Array, alpha: Array, p: Array) -> Array:
     return np.asarray(cross(alpha, p) + cross(omega, cross(omega, p)))
 
 
+def classical_acceleration(derivative: Array, twist: Array) -> Array:
+    """Return that of the origin (..., 3) [m/s^2] from the component-wise derivative (..., 6) of a body twist (..., 6).
+
+    a = dv/dt + omega x v, all in body axes.
+    Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B, differentiates the components;
+    Newton-Euler about a point needs the classical acceleration.
+    """
+    return np.asarray(derivative[..., 3:] + cross(twist[..., :3], twist[..., 3:]))
+
+
 def unit_vectors(vectors: Array) -> Array:
     """Return vectors (..., n) made one long; zero stays zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
@@ -129,14 +139,9 @@ class Acceleration(_SixVector):
 
     @classmethod
     def from_twist_derivative(cls, derivative: ArrayLike, twist: Twist) -> Acceleration:
-        """Return the classical acceleration from the component-wise derivative (..., 6) of a body twist.
-
-        a = dv/dt + omega x v, all in body axes.
-        Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B, differentiates the components;
-        Newton-Euler about a point needs the classical acceleration.
-        """
+        """Return the classical acceleration from the component-wise derivative (..., 6) of a body twist."""
         d = check.vectors("twist derivative", derivative, 6)
-        return cls(d[..., :3], d[..., 3:] + cross(twist.angular, twist.linear))
+        return cls(d[..., :3], classical_acceleration(d, twist.array()))
 
 
 class Wrench(_SixVector):
