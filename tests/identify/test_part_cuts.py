@@ -7,6 +7,7 @@ import re
 import numpy as np
 import pytest
 
+from bent_rows import bent_row
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_cuts import PartCuts
@@ -20,15 +21,7 @@ from steelyard.simulate.handling import handling_log
 
 @pytest.fixture(scope="module")
 def rod() -> Parts:
-    """Six boxes in a row."""
-    half = np.array([0.02, 0.01, 0.015])
-    rows = []
-    for k in range(6):
-        volume, c = 8 * half.prod(), np.array([0.04 * k + 0.05, 0.02 * (k % 2), 0.01 * (k % 3)])
-        second = volume * (np.diag(half**2 / 3) + np.outer(c, c))
-        inertia = np.trace(second) * np.eye(3) - second
-        rows.append([volume, *(volume * c), *inertia[np.triu_indices(3)]])
-    return Parts(np.arange(6), np.array(rows))
+    return bent_row(6)
 
 
 DENSITY = np.array([7800.0, 7800, 1000, 1000, 1000, 1000])

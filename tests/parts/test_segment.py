@@ -271,8 +271,8 @@ def test_seams_are_the_same_where_qhull_stands_in(colours, monkeypatch: pytest.M
 
     monkeypatch.setattr(seams, "_BLUNT", 1e-13)
     right, rooms, runs = tree(), [], []
-    merge = seams._merge
-    monkeypatch.setattr(seams, "_merge", lambda *given: runs.append(1) or merge(*given))
+    merge = seams.merge
+    monkeypatch.setattr(seams, "merge", lambda *given: runs.append(1) or merge(*given))
     monkeypatch.setattr(seams, "hull_work", cut_room)
     found = tree()
     assert len(rooms) == 1 < len(runs)

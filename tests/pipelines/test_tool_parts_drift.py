@@ -9,6 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from bent_rows import bent_row
 from steelyard import api
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
@@ -24,14 +25,7 @@ GRIPPER = InertialParameters.from_com(0.9, [0.001, 0.002, 0.06], np.diag([1.5e-3
 
 @pytest.fixture(scope="module")
 def bar() -> Parts:
-    """Four boxes in a bent row."""
-    half = np.array([0.02, 0.01, 0.015])
-    rows = []
-    for k in range(4):
-        volume, c = 8 * half.prod(), np.array([0.04 * k + 0.05, 0.02 * (k % 2), 0.01 * (k % 3)])
-        second = volume * (np.diag(half**2 / 3) + np.outer(c, c))
-        rows.append([volume, *(volume * c), *(np.trace(second) * np.eye(3) - second)[np.triu_indices(3)]])
-    return Parts(np.arange(4), np.array(rows))
+    return bent_row(4)
 
 
 @pytest.fixture(scope="module")

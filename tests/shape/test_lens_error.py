@@ -8,7 +8,7 @@ from functools import cache
 import numpy as np
 import pytest
 
-from steelyard.shape import scan
+from steelyard.shape import scan, scan_findings
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled
 from steelyard.shape.lens_error import Tables, _corrected, lens_by_table
@@ -128,5 +128,5 @@ def test_a_scan_is_read_with_the_lens_that_its_table_asks_for_and_says_so() -> N
 
 def test_only_what_was_found_is_said() -> None:
     lens = views().intrinsics
-    said = scan._said_of(scan._Level(0.0, lens, None), 0.025, None)
+    said = scan_findings._said_of(scan_findings.Level(0.0, lens, None), 0.025, None)
     assert said == "The cameras had to be moved by 25 mm (rms) until the views agreed."

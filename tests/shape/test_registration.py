@@ -6,14 +6,16 @@ from functools import cache
 
 import numpy as np
 import pytest
+from views_apart import apart
 
 from steelyard.errors import CannotAnswer
 from steelyard.shape import registration, scan
 from steelyard.shape.carving import carved
 from steelyard.shape.common_table import levelled
+from steelyard.shape.region import object_on_table
 from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scene import Scene, object_on_table, scene_of
+from steelyard.shape.scene import scene_of
 from steelyard.shape.views import Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed
@@ -30,12 +32,6 @@ def scanned(tool: str = "pliers") -> Scanned:
 
 def wrong_by(views: Views, mm: float, deg: float) -> Views:
     return views.posed(disturbed(views.X_WC, mm, deg, np.random.default_rng(1)))
-
-
-def apart(scene: Scene, true: Pose) -> float:
-    """Return how far the views have what lies under the cameras apart, rms [m]."""
-    error = Pose(Rotation.nearest(scene.R), scene.p) @ (scene.X_WT.inverse() @ true).inverse()
-    return float(np.sqrt(error.apply(np.zeros(3)).var(0).sum()))
 
 
 def volume(scan: Scan) -> float:

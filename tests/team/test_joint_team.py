@@ -375,15 +375,6 @@ def test_two_robots_weigh_until_the_noise_has_settled(monkeypatch: pytest.Monkey
     np.testing.assert_allclose(found.std, last.std, rtol=0.05)
 
 
-def test_forces_of_nobody() -> None:
-    made = trial()
-    bare = [
-        TeamRecording(r.kind, {n: t.without("force") for n, t in r.tracks.items()}, r.name) for r in made.log.recordings
-    ]
-    with pytest.raises(CannotAnswer, match="no robot of the team measured a force"):
-        JointTeam().identify(made.log.with_recordings(*bare))
-
-
 def test_answers_that_are_no_body_become_the_nearest_one() -> None:
     rng = np.random.default_rng(0)
     body = InertialParameters.from_com(12, np.array([0.1, 0.05, 0.1]), np.diag([2.3, 3.4, 5.6])).vector

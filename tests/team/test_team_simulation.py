@@ -20,7 +20,7 @@ from steelyard.simulate.team_cases import CASES, EXACT, GRAVITY, Hinge, Presence
 from steelyard.simulate.team_motions import Freedom, draw_motion
 from steelyard.simulate.team_sensing import autoregressive, read_joints
 from steelyard.spatial import Pose, Rotation, cross
-from steelyard.team.loop_closure import _BRACKETS
+from steelyard.team.adjoint import BRACKETS
 
 FACTS = Path(__file__).resolve().parents[3] / "shared" / "facts" / "team-cases.json"
 SHORT = TeamScene(sensing="poses", kinds=("motion",), motion_samples=400)
@@ -208,7 +208,7 @@ def test_motions_show_as_much_of_a_grasp_as_they_should(name: str) -> None:
     time = np.arange(300) / 100
     seen = draw_motion(np.random.default_rng(1), time, (0.2, 0.9), 0.14, 0.03, freedom).at(time)
     twist = np.concatenate([seen.angular_velocity, seen.velocity], 1)
-    values = np.linalg.svd(np.einsum("ta,abc->tbc", twist, _BRACKETS).reshape(-1, 6), compute_uv=False)
+    values = np.linalg.svd(np.einsum("ta,abc->tbc", twist, BRACKETS).reshape(-1, 6), compute_uv=False)
     assert int((values > 1e-9 * values[0]).sum()) == rank
 
 

@@ -96,12 +96,17 @@ def build(
     seconds = time.perf_counter() - begun
     if as_json:
         print_json({"folder": str(folder), "seed": seed, "seconds": round(seconds, 3), "objects": rows})
-        return
+    else:
+        _tell(rows, folder, f"seed {seed}, {seconds:.1f} s", views)
+
+
+def _tell(rows: list[dict[str, Any]], folder: Path, how: str, views: bool) -> None:
+    """Print a line for each tool written, and the command to try next."""
     for row in rows:
         click.echo(
             f"{row['name']:26s} {1e3 * row['mass_kg']:7.1f} g  {counted(row['parts'], 'part'):8s}  {row['half']}"
         )
-    say(f"{counted(len(rows), 'object folder')} in {folder} (seed {seed}, {seconds:.1f} s).")
+    say(f"{counted(len(rows), 'object folder')} in {folder} ({how}).")
     if views:
         one = folder / rows[0]["name"]
         say(

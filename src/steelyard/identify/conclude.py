@@ -58,6 +58,12 @@ def _taken(H: Array, problem: Problem, solution: Solution) -> float:
     return fitted(J.T @ H @ J, prior)
 
 
+def _fixed_weights(problem: Problem, linear: Array, weights: Array, variance: float) -> tuple[Array, Array]:
+    """Return the information (p, p) with fixed weights, and the variance of its score at linear (p,)."""
+    bread, _ = normal_equations(problem.T, problem.scatter, weights)
+    return bread, variance * problem.fixed_weight_score(linear, weights)
+
+
 def conclude(
     problem: Problem, solution: Solution, method: str, score: Score = NOTHING, response: Array | None = None
 ) -> Estimate:
@@ -81,9 +87,8 @@ def conclude(
     # Noise that few degrees of freedom told is uncertain itself: the variance of Student's t.
     white = max(chi2, 1.0) * max(left, 3.0) / (max(left, 3.0) - 2) * nonnegative(H + extra, plain)
     bread, meat = H, white
-    if solution.weights is not None:
-        bread, _ = normal_equations(problem.T, problem.scatter, solution.weights)
-        meat = max(chi2, 1.0) * problem.fixed_weight_score(solution.linear, solution.weights)
+    if (weights := solution.weights) is not None:
+        bread, meat = _fixed_weights(problem, solution.linear, weights, max(chi2, 1.0))
     meat = meat if score.by_noise is None else score.by_noise
     bread, meat = problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
     covariance = _sandwich(bread, meat + score.by_pose, solution)

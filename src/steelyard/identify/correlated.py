@@ -19,6 +19,7 @@ from steelyard.identify.linear import nonnegative
 from steelyard.identify.pose_errors import directions, pose_errors
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
+from steelyard.logs.clock import median_step
 from steelyard.logs.log import Integers, MotionLog
 
 # Shorter logs tell nothing; of longer ones so many rows in turn are joined that no more than these are left.
@@ -152,7 +153,7 @@ def _whitened(
 
 def _slots(time: Array) -> Integers:
     """Return the place of each row on an even clock, so that left-out rows leave gaps; row numbers if it is uneven."""
-    step = float(np.median(np.diff(time)))
+    step = median_step(time)
     if step > 0:
         slot: Integers = np.rint((time - time[0]) / step).astype(np.int64)
         if (np.diff(slot) > 0).all() and slot[-1] < MOST_GAPS * len(time):

@@ -8,6 +8,7 @@ Source: "The Sum of Its Parts", section III, for the model; the estimator is our
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -22,9 +23,9 @@ from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.linear import reweighted
+from steelyard.identify.loosened import loosened
 from steelyard.identify.misdrawn import misdrawn
-from steelyard.identify.nearest_body import nearest_body
-from steelyard.identify.part_findings import elsewhere, misfit_limit, named_materials, part_findings
+from steelyard.identify.part_findings import elsewhere, named_materials, part_findings
 from steelyard.identify.part_models import (
     Masses,
     averaged_masses,
@@ -34,9 +35,9 @@ from steelyard.identify.part_models import (
     material_masses,
 )
 from steelyard.identify.part_uneven import Uneven, suspicious, uneven
-from steelyard.identify.placement import misplaced, refused, with_mass
+from steelyard.identify.placement import consistent, misplaced, with_mass
 from steelyard.identify.problem import Problem
-from steelyard.identify.recentred import apart, followed, recentred, strayed
+from steelyard.identify.recentred import apart, followed, recentred
 from steelyard.identify.rest import without_noise_of_rest
 from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
@@ -48,9 +49,6 @@ from steelyard.parts.parts import Parts
 
 # The weights depend on the answer, and settle in so many rounds.
 RENEWALS = 2
-# A shape that is wrong by more than this many doublings of its error says nothing.
-DOUBLINGS = 12
-LEAST_MASS = 0.1  # of what the log weighs; a shape that allows less has nothing to do with it
 
 
 @dataclass(frozen=True)
@@ -150,7 +148,9 @@ class PartMasses:
         there = self
         if self.shape_error.grasp_steps():
             there, data, body = self._where_seen(problem, data, body, score)
-        return there._of_scan(problem, data, body) if self._doubtful else there._answered(problem, data, body)
+        return (
+            there._of_scan(problem, data, body) if self.shape_error.doubtful else there._answered(problem, data, body)
+        )
 
     def _where_seen(
         self, problem: Problem, data: Effective, body: InertialParameters, score: Array | None
@@ -193,7 +193,7 @@ class PartMasses:
         body = with_mass(self.parts, masses.mean, data)
         first = self._estimate(problem, data, masses)
         # Judged where the shape puts the body, as far as a scan says: what a wrong grasp moves must not hide a misfit.
-        if self._doubtful:
+        if self.shape_error.doubtful:
             body = recentred(data, body, self.shape_error.covariance(body)).body
         seen = data.blurred(self.shape_error.with_grasp(body))
         findings = part_findings(first, body, self.parts, seen, masses.choices, self.materials)
@@ -205,7 +205,7 @@ class PartMasses:
                 uneven_part = Finding.of("part-not-homogeneous", text)
                 return self._with_freed(problem, data, found).with_findings(*others, uneven_part)
         contradicted = any(f.code == "part-not-homogeneous" for f in findings)
-        if self._doubtful and not contradicted:
+        if self.shape_error.doubtful and not contradicted:
             words = elsewhere(data, self.parts.whole(masses.mean), self.parts, self.shape_error)
             findings += [Finding.of("part-not-homogeneous", words)] if words else []
         if not any(f.code == "part-not-homogeneous" for f in findings):
@@ -217,51 +217,24 @@ class PartMasses:
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
         body = InertialParameters(found.vector)
-        if self._movable:
+        if self.shape_error.movable:
             return self._built(problem, data, found.masses, *self._placed(data, body, found.covariance))
         error = self.shape_error.covariance(body)
         follows = found.covariance @ data.left_by(error)
         return self._built(problem, data, found.masses, body, found.covariance + error, follows)
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
-        """Return the Estimate with the smallest shape error, in steps of two, that homogeneous parts are within.
+        """Return the Estimate with the shape trusted less; raises NoMasses where that does not help."""
+        found = loosened(data, self.parts, self.shape_error, self._model)
+        masses = (
+            misdrawn(data, self.parts, found.masses, self.shape_error) if self.shape_error.doubtful else found.masses
+        )
+        return self._built(problem, data, masses, found.body, found.covariance, found.follows).noted(found.note)
 
-        Raises NoMasses where even the largest keeps mass and centre of mass from where the log sees them.
-        """
-        body = InertialParameters(data.best)
-        limit = misfit_limit(data, len(self.parts))
-        for doubling in range(1, DOUBLINGS):
-            error = self.shape_error.scaled(2.0**doubling).with_grasp(self._sane(body))
-            seen = data.blurred(error)
-            masses = (averaged_masses if self.density == "averaged" else free_masses)(seen, self.parts)
-            body = with_mass(self.parts, masses.mean, data)
-            if seen.misfit(body.vector) < limit:
-                break
-        with_mass(self.parts, masses.mean, data, LEAST_MASS)
-        gain = error @ seen.information
-        rest = np.eye(10) - gain
-        B = self.parts.per_mass
-        spread = B @ masses.covariance @ B.T
-        moved = body.vector + error @ seen.pull - gain @ body.vector
-        if self._doubtful:
-            masses = misdrawn(data, self.parts, masses, self.shape_error)
-        covariance = rest @ spread @ rest.T + error - gain @ error
-        whole, fits = nearest_body(body.vector, moved), seen.misfit(body.vector) < limit
-        if not fits and strayed(data, whole) > limit:
-            raise refused(self.parts, data)
-        blur = data.left_by(error)
-        masses_follow = spread @ blur
-        follows = masses_follow + error @ (blur - seen.information @ masses_follow)
-        made = self._built(problem, data, masses, whole, covariance, follows)
-        so = "so that the wrench fits" if fits else "and the wrench does not fit even so"
-        note = f"the shape was trusted {2**doubling} times less than given, {so}"
-        return replace(made, notes=(*made.notes, note))
-
-    def _sane(self, body: InertialParameters) -> InertialParameters:
-        """Return the body if it is one, else one density of the same mass: the size of a shape error needs a body."""
-        if body.validity().consistent:
-            return body
-        return self.parts.whole(self.parts.volume * (abs(float(body.mass)) / self.parts.volume.sum()))
+    @property
+    def _model(self) -> Callable[[Effective, Parts], Masses]:
+        """What gives the masses where no materials are listed."""
+        return averaged_masses if self.density == "averaged" else free_masses
 
     def _masses(self, data: Effective, body: InertialParameters, listed: bool = True) -> Masses:
         """Return the masses by the chosen model, without the list of materials where it is not `listed`.
@@ -271,21 +244,11 @@ class PartMasses:
         scan: then masses would bend to put right what the shape has wrong.
         """
         listed = listed and bool(self.materials)
-        if listed or self._movable:
-            data = data.blurred(self.shape_error.with_grasp(self._sane(body)))
+        if listed or self.shape_error.movable:
+            data = data.blurred(self.shape_error.with_grasp(consistent(self.parts, body)))
         if listed:
             return material_masses(data, self.parts, self.materials)
-        return (averaged_masses if self.density == "averaged" else free_masses)(data, self.parts)
-
-    @property
-    def _doubtful(self) -> bool:
-        """Whether the shape may be worse than a measured mesh."""
-        return self.shape_error.com_m > MEASURED.com_m or self.shape_error.stretch > 0
-
-    @property
-    def _movable(self) -> bool:
-        """Whether the object may lie elsewhere than its shape says."""
-        return self._doubtful or bool(self.shape_error.grasp_steps())
+        return self._model(data, self.parts)
 
     def _estimate(self, problem: Problem, data: Effective, masses: Masses) -> Estimate:
         """Return the Estimate: evidence from the log, covariance from the masses, shape and grasp.
@@ -296,9 +259,9 @@ class PartMasses:
         """
         body, B = self.parts.whole(masses.mean), self.parts.per_mass
         spread = B @ masses.covariance @ B.T
-        if self._doubtful:
+        if self.shape_error.doubtful:
             masses = misdrawn(data, self.parts, masses, self.shape_error)
-        if self._movable:
+        if self.shape_error.movable:
             return self._built(problem, data, masses, *self._placed(data, body, spread))
         return self._built(problem, data, masses, body, spread + self.shape_error.covariance(body), spread)
 
@@ -310,7 +273,7 @@ class PartMasses:
         spread  (10, 10) of the body by masses of the log as blurred by the error of shape and grasp
         """
         error = self.shape_error.with_grasp(body)
-        placed = (followed if self._doubtful else recentred)(data, body, error)
+        placed = (followed if self.shape_error.doubtful else recentred)(data, body, error)
         covariance = placed.left_of(data, spread) + placed.error
         return placed.body, covariance, placed.following(data, spread @ data.left_by(error))
 

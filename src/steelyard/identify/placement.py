@@ -79,6 +79,13 @@ def with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) ->
     raise refused(parts, data)
 
 
+def consistent(parts: Parts, body: InertialParameters) -> InertialParameters:
+    """Return the body if it is one, else one density of the same mass: the size of a shape error needs a body."""
+    if body.validity().consistent:
+        return body
+    return parts.whole(parts.volume * (abs(float(body.mass)) / parts.volume.sum()))
+
+
 def refused(parts: Parts, data: Effective) -> NoMasses:
     """Return the error for parts that a log of this mass shows to lie elsewhere, or to be of another size."""
     return NoMasses(f"{no_masses(data.best[0], parts)} Check the unit of its points, pose_in_sensor.")

@@ -49,6 +49,16 @@ class ShapeError:
         if not all(np.isfinite(v) and v >= 0 for v in values):
             raise BadValue(f"standard deviations of shape and grasp must not be negative; got {values}.")
 
+    @property
+    def doubtful(self) -> bool:
+        """Whether the shape may be worse than a measured mesh."""
+        return self.com_m > MEASURED.com_m or self.stretch > 0
+
+    @property
+    def movable(self) -> bool:
+        """Whether the object may lie elsewhere than its shape says."""
+        return self.doubtful or bool(self.grasp_steps())
+
     def at_least(self, com_m: float, stretch: float, turn_rad: float = 0.0) -> ShapeError:
         """Return the error with its shape part no less than this."""
         turn = max(self.turn_rad, turn_rad)

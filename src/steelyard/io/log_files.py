@@ -8,6 +8,7 @@ from pathlib import Path
 
 from steelyard import check
 from steelyard.errors import BadFile
+from steelyard.findings import Finding
 from steelyard.io import guess
 from steelyard.io.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.description import Description, read_description
@@ -63,28 +64,10 @@ def _recording(
     data: Path | None = None,
     arm: SerialArm | None = None,
 ) -> Recording:
-    specs = description.streams
-    require_answerable(specs, path.name)
-    channels = [channels_of(*each, description.gravity, True) for each in zip(specs, tables, cells, strict=True)]
-    times = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels], gaps=True)
-    names = stream_names(specs)
-    streams = tuple(
-        Stream(
-            name,
-            values,
-            time,
-            {q.name: "W" for q in spec.quantities if q.frame == "W"},
-            spec.delay,
-            spec.mount,
-            spec.poses,
-            "s" if spec.time is None else spec.time.unit,
-        )
-        for name, spec, values, time in zip(names, specs, channels, times, strict=True)
-    )
-    require_matched_rows(streams, path.name)
-    streams, findings = without_missing(specs, streams)
+    require_answerable(description.streams, path.name)
+    streams, findings = _streams(description, tables, cells, path.name)
     if arm is not None:
-        streams = tuple(posed(*each, arm) for each in zip(specs, streams, strict=True))
+        streams = tuple(posed(*each, arm) for each in zip(description.streams, streams, strict=True))
     tool = description.tool
     tool = None if tool is None else str(find_file(tool, path.parent, data, f"{path.name}, [log], tool"))
     placed = description.placed
@@ -101,3 +84,28 @@ def _recording(
         notes=description.notes,
         gravity_std=description.gravity_std,
     )
+
+
+def _streams(
+    description: Description, tables: Sequence[Table], cells: Sequence[Cells], where: str
+) -> tuple[tuple[Stream, ...], tuple[Finding, ...]]:
+    """Return the streams in SI units without the rows that miss a number, and what was left out."""
+    specs = description.streams
+    channels = [channels_of(*each, description.gravity, True) for each in zip(specs, tables, cells, strict=True)]
+    times = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels], gaps=True)
+    names = stream_names(specs)
+    streams = tuple(
+        Stream(
+            name,
+            values,
+            time,
+            {q.name: "W" for q in spec.quantities if q.frame == "W"},
+            spec.delay,
+            spec.mount,
+            spec.poses,
+            "s" if spec.time is None else spec.time.unit,
+        )
+        for name, spec, values, time in zip(names, specs, channels, times, strict=True)
+    )
+    require_matched_rows(streams, where)
+    return without_missing(specs, streams)

@@ -7,12 +7,11 @@ its driver failed, and mostly not at random (at high loads, in one pose): what i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from steelyard.check import Mask, frozen
+from steelyard.check import Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.io.channels import known_rows, rows_text, unfit_text
@@ -42,7 +41,8 @@ def without_missing(
         together = np.logical_and.reduce(whole)
         _refuse_many(together, ", ".join(f'"{stream.name}"' for stream in streams))
         whole = [together] * len(streams)
-    return tuple(_kept(stream, rows) for stream, rows in zip(streams, whole, strict=True)), tuple(findings)
+    kept = (s if rows.all() else s.rows(rows) for s, rows in zip(streams, whole, strict=True))
+    return tuple(kept), tuple(findings)
 
 
 def _whole(stream: Stream) -> Mask:
@@ -100,10 +100,3 @@ def _told(stream: Stream, rows: Mask, others: bool) -> Finding:
 
 def _cut(missing: np.ndarray[Any, np.dtype[np.int64]], count: int) -> str:
     return " (the last)" if missing[-1] == count - 1 else ""
-
-
-def _kept(stream: Stream, rows: Mask) -> Stream:
-    if rows.all():
-        return stream
-    time = None if stream.time is None else frozen(stream.time[rows])
-    return replace(stream, channels={name: frozen(values[rows]) for name, values in stream.channels.items()}, time=time)

@@ -12,8 +12,9 @@ from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
 from steelyard.logs.bandwidth import rigid_up_to
+from steelyard.logs.clock import sampling_rate, stamps_of
 from steelyard.logs.clock_rates import ClockRate, clock_rates, put_right
-from steelyard.logs.conditioning import noise_std, sampling_rate, signal
+from steelyard.logs.conditioning import noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Mounting
@@ -22,7 +23,7 @@ from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
 from steelyard.logs.noise import classes, levels
 from steelyard.logs.outliers import bursts, inside, merged
-from steelyard.logs.prepared import AlignOptions, Prepared, prepared, stamps_of
+from steelyard.logs.prepared import AlignOptions, Prepared, prepared
 from steelyard.logs.recording import Recording
 from steelyard.logs.steady import with_steady_stamps
 from steelyard.logs.stillness import pose_numbers, still_rows

@@ -11,6 +11,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.logs.clock import sampling_rate
 
 _NOISE_BLOCK = 64
 _QUIETEST = 0.84  # 0.1 quantile of the noise level over blocks of that length
@@ -33,13 +34,6 @@ class Signal:
         """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is
         held."""
         return np.asarray(self.spline(np.clip(time, self.start, self.end)))
-
-
-def sampling_rate(time: Array) -> float:
-    """Return the median sampling rate [Hz] of a rising clock [s]."""
-    if len(time) < 2:
-        raise BadValue("a clock needs at least two samples.")
-    return 1.0 / float(np.median(np.diff(time)))
 
 
 def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Signal:

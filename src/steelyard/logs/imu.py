@@ -7,8 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadDescription
-from steelyard.logs.conditioning import Signal, noise_std, sampling_rate, signal
+from steelyard.logs.clock import sampling_rate, stamps_of
+from steelyard.logs.conditioning import Signal, noise_std, signal
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -59,9 +59,7 @@ class Mounting:
 
 def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     """Return the accelerometer of a timed stream; numbers that are plainly in g are turned into m/s^2."""
-    values, time = stream.channels["specific_force"], stream.time
-    if time is None:
-        raise BadDescription(f"'{stream.name}' has no time.")
+    values, time = stream.channels["specific_force"], stamps_of(stream)
     factor = unit_factor(values, gravity_size)
     curve = signal(time, values * factor, cutoff_hz)
     rate = sampling_rate(time)

@@ -10,6 +10,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
+from steelyard.logs.clock import stamps_of
 from steelyard.logs.conditioning import Signal, noise_std, signal
 from steelyard.logs.recording import Stream
 from steelyard.logs.smoothing import Smooth, SmoothRotation, smooth, smooth_rotations
@@ -239,25 +240,19 @@ def _ends(curve: Signal | Smooth | SmoothRotation, start: float, end: float) -> 
     return float(smoothed.time[0]), float(smoothed.time[-1])
 
 
-def _clock(stream: Stream) -> Array:
-    if stream.time is None:
-        raise BadDescription(f"'{stream.name}' has no time; streams with their own rows need a clock.")
-    return stream.time
-
-
 def _rotation_channel(stream: Stream, values: Array, cutoff_hz: float | None) -> Channel:
-    return Channel(stream.name, smooth_rotations(_clock(stream), Rotation.nearest(values), cutoff_hz), False)
+    return Channel(stream.name, smooth_rotations(stamps_of(stream), Rotation.nearest(values), cutoff_hz), False)
 
 
 def _plain_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
-    curve = signal(_clock(stream), values, cutoff_hz)
+    curve = signal(stamps_of(stream), values, cutoff_hz)
     share = min(1.0, 2 * cutoff_hz / curve.rate) if cutoff_hz is not None else 1.0
     variance = float((noise_std(values) ** 2).mean()) * share
     return Channel(stream.name, curve, _world(stream, quantity), variance)
 
 
 def _smooth_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
-    curve = smooth(_clock(stream), values, cutoff_hz=cutoff_hz)
+    curve = smooth(stamps_of(stream), values, cutoff_hz=cutoff_hz)
     return Channel(stream.name, curve, _world(stream, quantity))
 
 

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.logs.conditioning import lowpass, sampling_rate
+from steelyard.logs.clock import sampling_rate
+from steelyard.logs.conditioning import lowpass
 
 _SPLIT_HZ = 20.0  # a held body moves below, a knock rings above
 _PEAK, _EDGE = 8.0, 4.0  # sigmas to call a tap, and to end it

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription
-from steelyard.logs.conditioning import sampling_rate
+from steelyard.logs.clock import sampling_rate, stamps_of
 from steelyard.logs.felt import Felt
 from steelyard.logs.holes import unknown_motion
 from steelyard.logs.imu import Imu, imu
@@ -119,13 +119,6 @@ def _wrench_stream(recording: Recording) -> Stream:
                 raise BadDescription(f"'{stream.name}' has force but no torque; give both in one stream.")
             return stream
     raise BadDescription("no stream has force; a log needs force and torque.")
-
-
-def stamps_of(stream: Stream) -> Array:
-    """Return the stamps (N,) [s] of a stream; raises BadDescription where it has none."""
-    if stream.time is None:
-        raise BadDescription(f"'{stream.name}' has no time.")
-    return stream.time
 
 
 def _cutoff(streams: tuple[Stream, ...], wrench: Stream, options: AlignOptions) -> float | None:

@@ -6,9 +6,9 @@ Streams keep their own clocks and frames; units are SI.
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask, frozen
 from steelyard.findings import Finding
 from steelyard.spatial import Pose, Rotation
 
@@ -74,6 +74,11 @@ class Stream:
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
+
+    def rows(self, kept: Mask) -> Stream:
+        """Return the stream of those rows (N,) alone."""
+        time = None if self.time is None else frozen(self.time[kept])
+        return replace(self, channels={name: frozen(values[kept]) for name, values in self.channels.items()}, time=time)
 
     @property
     def turn(self) -> Rotation | None:

@@ -19,6 +19,7 @@ from numba import njit
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import lowpass, lowpass_gain
 from steelyard.spatial import Rotation
 
@@ -71,7 +72,7 @@ def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: 
     t, y = check.finite("time", time), check.finite("values", values)
     if len(t) < 2 * _WARM_UP:
         raise BadValue(f"smoothing needs at least {2 * _WARM_UP} samples in time; got {len(t)}.")
-    step = float(np.median(np.diff(t)))
+    step = median_step(t)
     origin = y.mean(0)
     clock, centred = (t - t[0]) / step, np.ascontiguousarray(y - origin)
     share = (noise_dof or y.shape[1]) / y.shape[1]
@@ -118,7 +119,7 @@ def _below(whole: Smooth, cutoff_hz: float) -> Smooth:
     """
     sound = whole.time[whole.variance[:, 2] <= _NOISY_END * np.median(whole.variance[:, 2])]
     # A digital low-pass bends near half the rate: the wrench, mostly quicker, has none of that.
-    rate = max(1 / float(np.median(np.diff(whole.time))), _FINE * cutoff_hz)
+    rate = max(1 / median_step(whole.time), _FINE * cutoff_hz)
     even = np.linspace(sound[0], sound[-1], round(float(sound[-1] - sound[0]) * rate) + 1)
     states, variance = whole.at(even)
     states = lowpass(states.reshape(len(even), -1), cutoff_hz, rate).reshape(states.shape)

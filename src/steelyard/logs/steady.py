@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 
 # Shorter streams, and stretches between gaps, are left as they are (samples).
@@ -66,7 +67,7 @@ def _jitters(off: Array) -> bool:
 
 def _counts(time: Array) -> tuple[Integers, Integers]:
     """Return two counts (N,) of samples: every row is the next one, or some were lost between them."""
-    steps = np.diff(time) / np.median(np.diff(time))
+    steps = np.diff(time) / median_step(time)
     gaps = np.where(steps > _GAP, np.round(steps), 1)
     lost = np.maximum(np.round(steps), 1)
     first, second = (np.concatenate([[0], np.cumsum(n)]).astype(np.int64) for n in (gaps, lost))
@@ -78,7 +79,7 @@ def _even(time: Array, index: Integers) -> Array:
     from scipy.interpolate import make_lsq_spline
 
     even = time.copy()
-    step = float(np.median(np.diff(time)))
+    step = median_step(time)
     for rows in np.split(np.arange(len(time)), np.flatnonzero(np.diff(time) > _GAP * step) + 1):
         if len(rows) < _FEWEST:
             continue

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
+from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import noise_std
 from steelyard.logs.runs import runs
 
@@ -36,7 +37,7 @@ def steady(time: Array, values: Array, limit: float | None = None) -> Mask:
 
     limit  largest local spread; None = three times that of the quietest tenth
     """
-    step = float(np.median(np.diff(time)))
+    step = median_step(time)
     width = max(round(_SHORTEST_S / step), 3)
     if len(time) < 2 * width:
         return np.ones(len(time), bool)

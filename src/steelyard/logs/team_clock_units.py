@@ -11,6 +11,7 @@ import numpy as np
 
 from steelyard.errors import BadValue
 from steelyard.findings import about
+from steelyard.logs.clock import median_step
 from steelyard.logs.team_track import Track
 
 # Stamps with so many times the step and the span of another robot's are milliseconds, or less, beside seconds.
@@ -38,7 +39,7 @@ def require_one_clock_unit(recording: str, tracks: Mapping[str, Track]) -> None:
 
 
 def _step(track: Track) -> float:
-    return max(float(np.median(np.diff(track.time))), _LEAST)
+    return max(median_step(track.time), _LEAST)
 
 
 def _odd(spans: Mapping[str, float], short: str, long: str) -> str:

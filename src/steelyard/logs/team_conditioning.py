@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array, Mask
+from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.runs import runs
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -60,9 +61,7 @@ def _carries(recording: TeamRecording, name: str, time: Array) -> Mask:
     track = recording.tracks.get(name)
     if track is None or track.carrying is None:
         return np.ones(len(time), np.bool_)
-    nearest = np.clip(
-        np.searchsorted(track.time, time - 0.5 * float(np.median(np.diff(track.time)))), 0, len(track) - 1
-    )
+    nearest = np.clip(np.searchsorted(track.time, time - 0.5 * median_step(track.time)), 0, len(track) - 1)
     return track.carrying[nearest]
 
 

@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask, frozen
 from steelyard.errors import BadValue
+from steelyard.logs.clock import median_step
 from steelyard.logs.cubic import cubic
 from steelyard.logs.team_log import TeamRecording
 from steelyard.logs.team_track import Track
@@ -80,7 +81,7 @@ def common_time(recording: TeamRecording, names: Sequence[str]) -> Array:
         if np.abs(steps - np.median(steps)).max() < _EVEN * np.median(steps):
             return first
     begin, end = max(float(t.time[0]) for t in tracks), min(float(t.time[-1]) for t in tracks)
-    rates = [1 / float(np.median(np.diff(t.time))) for t in tracks if len(t) > 1]
+    rates = [1 / median_step(t.time) for t in tracks if len(t) > 1]
     if not rates or end <= begin:
         raise BadValue(f"'{recording.name}' needs at least two samples of every robot in the time that all cover.")
     return begin + np.arange(int((end - begin) * max(rates) * (1 + 1e-9)) + 1) / max(rates)
@@ -104,7 +105,7 @@ def channel_at(track: Track, name: str, time: Array) -> tuple[Array, Mask]:
     known = track.time[good]
     if len(known) < 2:
         return np.zeros((len(time), 3)), np.zeros(len(time), np.bool_)
-    step = float(np.median(np.diff(track.time)))
+    step = median_step(track.time)
     return between(known, values[good], time), good if same else near_samples(known, time, step)
 
 

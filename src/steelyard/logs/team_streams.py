@@ -11,6 +11,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
+from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Mount, Stream
 from steelyard.logs.team_rows import between, near_samples
 from steelyard.spatial import Rotation, cross
@@ -85,8 +86,8 @@ def _values_at(own: Array, values: Array, time: Array) -> Array:
     known = own[good]
     if len(known) < 2:
         return np.full((len(time), values.shape[1]), np.nan)
-    step = float(np.median(np.diff(own)))
-    many = round(float(np.median(np.diff(time))) / step) if len(time) > 1 and step > 0 else 1
+    step = median_step(own)
+    many = round(median_step(time) / step) if len(time) > 1 and step > 0 else 1
     found = between(known, _averaged(values, good, many)[good], time)
     found[~near_samples(known, time, step)] = np.nan
     return found

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.parts.groups import root
 from steelyard.parts.skin import Skin
 from steelyard.shape.mesh import Integers
-from steelyard.shape.tets import FACES, TetMesh
+from steelyard.shape.tets import TetMesh
 
 PIECE = 1 / 200  # of the volume: a tenth of the finest part that is looked for
 TINY = 1 / 2000  # of the volume: less is no part ...
@@ -48,13 +48,6 @@ def _cell_colours(vertices: Array, tets: Any, centroids: Array, label: Any) -> A
     return found
 
 
-def inner_faces(mesh: TetMesh) -> tuple[Integers, Integers]:
-    """Return the faces between tets: the pairs of tets (I, 2), and corners (I, 3), turned out of the first of them."""
-    cell, other = np.repeat(np.arange(len(mesh)), 4), mesh.neighbours.ravel()
-    once = cell < other
-    return np.stack([cell[once], other[once]], axis=1), mesh.tets[:, FACES].reshape(-1, 3)[once]
-
-
 def pieces_of(
     mesh: TetMesh, skin: Skin, colour: Integers, pairs: Integers, corners: Integers, areas: Array
 ) -> tuple[Integers, Integers]:
@@ -64,7 +57,7 @@ def pieces_of(
     little; then what is left too small to be seen joins a neighbour of another colour.
 
     colour         (T,) of every tet
-    pairs, corners as `inner_faces` gives them; areas (I,) of the faces [m^2]
+    pairs, corners `mesh.dual` and `mesh.inner_faces`; areas (I,) of the faces [m^2]
     """
     crease = np.zeros(len(mesh.vertices))
     np.maximum.at(crease, skin.edges.ravel(), np.repeat(skin.turning, 2))

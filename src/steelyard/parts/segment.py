@@ -24,7 +24,7 @@ from steelyard.parts.fades import without_fades
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.inner_borders import cut_at_borders
 from steelyard.parts.parts import Parts
-from steelyard.parts.pieces import cell_colours, inner_faces, pieces_of, with_points
+from steelyard.parts.pieces import cell_colours, pieces_of, with_points
 from steelyard.parts.prints import without_prints
 from steelyard.parts.seams import seam_tree
 from steelyard.parts.skin import Skin, skin_of
@@ -189,7 +189,7 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
         told = (cloud.normals, cloud.seen) if same else (None, None)  # what is known of points is known of vertices
         colours = colour_modes(_vertex_colours(cloud, mesh), skin, *told)
         colour = without_prints(without_fades(colours, skin), skin)
-    pairs, corners = inner_faces(mesh)
+    pairs, corners = mesh.dual, mesh.inner_faces
     a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
     areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
     piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)

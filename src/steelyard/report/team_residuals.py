@@ -10,7 +10,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.team_conditioning import condition
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.report.contents import Residuals
-from steelyard.spatial import cross
+from steelyard.spatial import classical_acceleration, cross
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.grasps import Grasps
 
@@ -60,7 +60,7 @@ def _left(log: TeamLog, recording: TeamRecording, grasps: Grasps, estimate: Team
     twist, change = _mean(speed, has)[keep], _mean(rate, has)[keep]
     down = _mean(np.einsum("nij,ntj->nti", turn, rows.gravity), rows.has_gravity)[keep]
     wrench = grasps.total_wrench(rows.wrench)[keep]
-    acceleration = change[:, 3:] + cross(twist[:, :3], twist[:, 3:])
+    acceleration = classical_acceleration(change, twist)
     moved = MotionLog(wrench, down, acceleration, twist[:, :3], change[:, :3])
     left = wrench - moved.predicted(estimate.parameters.vector) - estimate.wrench_bias
     return rows.time[keep], left

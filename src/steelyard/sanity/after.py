@@ -10,6 +10,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.alignment import Aligned
+from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import noise_std
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
@@ -186,7 +187,7 @@ def _passed(log: MotionLog, time: Array | None, values: Array) -> float:
     """Return the white noise of a timed channel per axis that the low-pass leaves in the rows; zero for tables."""
     if time is None or log.time is None or len(log) < 2:
         return 0.0
-    share = PASSED * float(np.median(np.diff(time)) / np.median(np.diff(log.time)))
+    share = PASSED * (median_step(time) / median_step(log.time))
     return _white(time, values) * float(np.sqrt(min(1.0, share)))
 
 

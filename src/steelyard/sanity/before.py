@@ -10,9 +10,10 @@ from steelyard.logs.recording import Recording
 from steelyard.sanity.clock_offset import examine_offset
 from steelyard.sanity.clock_unit import examine_clock
 from steelyard.sanity.conventions import examine_conventions, examine_turns
+from steelyard.sanity.frozen_rows import dead_channels
 from steelyard.sanity.leaps import examine_sparse
 from steelyard.sanity.memory import examine_memory
-from steelyard.sanity.rows import dead_channels, examine_rows
+from steelyard.sanity.rows import examine_rows
 from steelyard.sanity.silent import without_silent
 from steelyard.sanity.units import examine_units
 

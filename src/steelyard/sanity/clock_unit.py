@@ -11,6 +11,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.findings import Finding
+from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording
 from steelyard.sanity.both_masses import both_masses
 from steelyard.sanity.glance import glance
@@ -47,7 +48,7 @@ def _doubted(recording: Recording) -> Recording:
     turning = next((s for s in recording.streams if "rotation" in s.channels), None)
     if turning is None or turning.time is None or len(turning) < FEWEST_ROWS:
         return recording
-    step, span = float(np.median(np.diff(turning.time))), float(turning.time[-1] - turning.time[0])
+    step, span = median_step(turning.time), float(turning.time[-1] - turning.time[0])
     R = turning.channels["rotation"]
     turns = Rotation.nearest(np.swapaxes(R[:-1], 1, 2) @ R[1:]).log()
     like = float((turns[1:] * turns[:-1]).sum()) / max(float((turns**2).sum()), 1e-300)

@@ -11,6 +11,7 @@ from scipy.special import chdtrc
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.identify.regressor import design
+from steelyard.logs.clock import median_step
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.logs.recording import ROUNDED_GRAVITY
@@ -122,7 +123,7 @@ def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[
 def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers]:
     """Return the slices of an ordered log and the slice of each row (N,)."""
     time = log.time if log.time is not None else np.zeros(0)
-    width = max(SLICE, FEWEST_ROWS * float(np.median(np.diff(time))), float(time[-1] - time[0]) / MOST_SLICES)
+    width = max(SLICE, FEWEST_ROWS * median_step(time), float(time[-1] - time[0]) / MOST_SLICES)
     number = ((time - time[0]) / width).astype(np.int64)
     edges = np.flatnonzero(np.diff(number, prepend=-1))
     counts = np.diff(np.append(edges, len(log)))
@@ -217,7 +218,7 @@ def _explained(slices: Slices, found: Consensus, touches: Sequence[Touch], memor
     away = np.abs(slices.time - change.time) > HANDS
     parts = [square[t.first : t.last][away[t.first : t.last]] for t in touches]
     quiet = all(part.mean() < SAME for part in parts if len(part)) and square[found.kept & away].mean() < SAME
-    lasting = max(map(len, parts)) * float(np.median(np.diff(slices.time))) > SHORTEST / 2
+    lasting = max(map(len, parts)) * median_step(slices.time) > SHORTEST / 2
     return change if quiet and lasting else None
 
 
@@ -252,7 +253,7 @@ def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: M
 
     unlike_hands  whether the words leave open why the wrench does not fit one body
     """
-    half = float(np.median(np.diff(slices.time))) / 2
+    half = median_step(slices.time) / 2
     spans = [(slices.time[a] - half, slices.time[b - 1] + half) for a, b in runs(~kept)]
     named = ", ".join(f"{a:.1f} to {b:.1f}" for a, b in spans[:5]) + (
         f" and {len(spans) - 5} more" if len(spans) > 5 else ""

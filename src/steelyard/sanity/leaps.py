@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Mask
+from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
 from steelyard.sanity.still_rows import angles, as_table, spans, split
@@ -41,7 +42,7 @@ def examine_sparse(recording: Recording) -> Recording:
     first = recording.streams[0].time
     if first is None or any(s.time is None or not np.array_equal(s.time, first) for s in recording.streams):
         return recording
-    step = float(np.median(np.diff(first))) if len(first) > 1 else 0.0
+    step = median_step(first) if len(first) > 1 else 0.0
     R = next((s.channels["rotation"] for s in recording.streams if "rotation" in s.channels), None)
     if step < SPARSE_S or R is None or not (angles(np.swapaxes(R[:-1], 1, 2) @ R[1:]) > TURN).any():
         return recording

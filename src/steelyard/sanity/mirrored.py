@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from itertools import permutations, product
 
 import numpy as np
 
@@ -11,6 +10,7 @@ from steelyard.check import Array
 from steelyard.sanity.glance import Glance
 from steelyard.sanity.static_fit import beside, solve
 from steelyard.sanity.tilt import force_and_weight
+from steelyard.spatial import signed_axes
 
 
 @dataclass(frozen=True, eq=False)
@@ -21,14 +21,8 @@ class Mirror:
     force_share: float
 
 
-def _reflections() -> Array:
-    """Return the 24 matrices (24, 3, 3) that exchange axes and signs, and turn a right hand into a left one."""
-    signed = (np.eye(3)[list(order)] * np.array(signs) for order in permutations(range(3))
-              for signs in product((1.0, -1.0), repeat=3))  # fmt: skip
-    return np.stack([X for X in signed if np.linalg.det(X) < 0])
-
-
-REFLECTIONS = _reflections()
+# The 24 (24, 3, 3) that turn a right hand into a left one.
+REFLECTIONS = np.stack([X for X in signed_axes() if np.linalg.det(X) < 0])
 
 
 def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:

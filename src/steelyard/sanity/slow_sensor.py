@@ -13,6 +13,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
+from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import signal
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.full_fit import Rows
@@ -44,7 +45,7 @@ def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
 
 def taken_away(time: Array, wrench: Array, late: float) -> Array:
     """Return what a filter of first order that is `late` [s] had taken away (N, 6) for `wrench` (N, 6) to be left."""
-    step = float(np.median(np.diff(time)))
+    step = median_step(time)
     even = np.arange(time[0], time[-1] + step / 2, step)
     values = signal(time, wrench).at(even)
     # There and back, so that the ends meet.

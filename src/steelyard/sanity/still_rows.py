@@ -44,7 +44,7 @@ def as_table(streams: Sequence[Stream], windows: Array) -> tuple[tuple[Stream, .
     """
     tables = [_averaged(s, windows) for s in streams if set(_KEPT) & s.channels.keys()]
     full = np.logical_and.reduce([filled for _, filled in tables])
-    return tuple(_rows(stream, full) for stream, _ in tables), int(full.sum())
+    return tuple(stream.rows(full) for stream, _ in tables), int(full.sum())
 
 
 def _averaged(stream: Stream, windows: Array) -> tuple[Stream, Mask]:
@@ -65,8 +65,3 @@ def _means(values: Array, first: Integers, last: Integers) -> Array:
     sums = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values - values[:1], axis=0)])
     count = np.maximum(last - first, 1).reshape(-1, *(1,) * (values.ndim - 1))
     return np.asarray((sums[last] - sums[first]) / count + values[:1])
-
-
-def _rows(stream: Stream, which: Mask) -> Stream:
-    """Return some rows of a table."""
-    return replace(stream, channels={q: v[which] for q, v in stream.channels.items()})

@@ -4,9 +4,7 @@ from __future__ import annotations
 
 from contextlib import suppress
 from dataclasses import dataclass
-from typing import Any
 
-import numba
 import numpy as np
 from scipy.spatial import cKDTree
 
@@ -14,23 +12,15 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import slid
-from steelyard.shape.depth_images import FACING, pixel_of
-from steelyard.shape.joint_registration import steps_together
-from steelyard.shape.scene import (
-    LEAST_VIEWS,
-    WINDOW,
-    Region,
-    Scene,
-    no_surface,
-    object_on_table,
-    settled,
-    surface_of,
-    surfels,
-)
+from steelyard.shape.depth_images import FACING
+from steelyard.shape.patches import no_surface, settled, surface_of, surfels
+from steelyard.shape.region import Region, object_on_table
+from steelyard.shape.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.shape.table_plane import INCIDENCE
 from steelyard.shape.thinning import spread_to
+from steelyard.shape.view_steps import moved, steps_together
 from steelyard.spatial import Rotation
 
-_STEPS = 3
 _POSE_STD = (0.01, np.radians(2.0))  # how far reported poses may be off [m, rad]
 _APART = 0.8  # of the depth noise: views that one fit moves apart by less are left where they are, rms
 _NEARBY = 0.001  # views that one fit moves apart by less need no search [m], rms
@@ -81,7 +71,7 @@ def _expected(scene: Scene, xyz: Array, normal: Array) -> Array:
         square += np.where(faces, far, 0.0)
         seen += faces
     usual = scene.distance**2
-    return 0.7 * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
+    return INCIDENCE * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
 
 
 @dataclass(frozen=True, eq=False)
@@ -219,75 +209,3 @@ def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
     if not good.any():
         raise no_surface()
     return xyz[good], normal[good]
-
-
-def moved(
-    depth: Any, unit: float, camera: Array, R: Array, p: Array, xyz: Array, normal: Array, window: float, noise: float,
-    loose: tuple[float, float],
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return poses (V, 3, 3), (V, 3) from which the views measure the surface of patches (N, 3) with normals (N, 3).
-
-    Point-to-plane distances of the pixels that patches fall on, Huber-weighted, three Gauss-Newton steps per view.
-    window  distances beyond it are another surface [m]
-    loose   standard deviations of the reported poses, [m] and [rad]: how freely a view may leave its pose
-    """
-    R, p = R.copy(), p.copy()
-    middle = xyz.mean(0)
-    for k in range(len(R)):
-        for _ in range(_STEPS):
-            H, g = _normal_equations(depth, unit, camera, R, p, k, xyz, normal, middle, window, noise)
-            H[np.arange(6), np.arange(6)] += 1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2
-            step = np.linalg.solve(H, -g)
-            turn = _rotation(step[:3])
-            R[k] = turn @ R[k]
-            p[k] = middle + turn @ (p[k] - middle) + step[3:]
-    return R, p
-
-
-@numba.njit(cache=True, nogil=True)
-def _rotation(w: Any) -> Any:
-    """Return the rotation (3, 3) by a vector w (3,) [rad]."""
-    angle = np.sqrt((w * w).sum())
-    if angle < 1e-12:
-        return np.eye(3)
-    a = w / angle
-    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
-
-
-@numba.njit(cache=True, nogil=True)
-def _normal_equations(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, xyz: Any, normal: Any, middle: Any, window: float,
-    noise: float,
-) -> Any:  # fmt: skip
-    """Return the Hessian (6, 6) and gradient (6,) of half the squared distances, in standard deviations of depth."""
-    H, g, row = np.zeros((6, 6)), np.zeros(6), np.empty(6)
-    for i in range(len(xyz)):
-        nx, ny, nz = normal[i, 0], normal[i, 1], normal[i, 2]
-        dx, dy, dz = xyz[i, 0] - p[k, 0], xyz[i, 1] - p[k, 1], xyz[i, 2] - p[k, 2]
-        cosine = -(dx * nx + dy * ny + dz * nz) / np.sqrt(dx * dx + dy * dy + dz * dz)
-        if cosine < FACING:
-            continue
-        z, u, v = pixel_of(camera, R, p, k, xyz[i, 0], xyz[i, 1], xyz[i, 2])
-        if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
-            continue
-        measured = depth[k, v, u] * unit
-        if measured <= 0:
-            continue
-        a, b = measured * (u - camera[2]) / camera[0], measured * (v - camera[3]) / camera[1]
-        x = R[k, 0, 0] * a + R[k, 0, 1] * b + R[k, 0, 2] * measured + p[k, 0]
-        y = R[k, 1, 0] * a + R[k, 1, 1] * b + R[k, 1, 2] * measured + p[k, 1]
-        h = R[k, 2, 0] * a + R[k, 2, 1] * b + R[k, 2, 2] * measured + p[k, 2]
-        height = nx * (x - xyz[i, 0]) + ny * (y - xyz[i, 1]) + nz * (h - xyz[i, 2])
-        if abs(height) > window:
-            continue
-        sigma = noise * z * z * cosine + 1e-4
-        weight = 1 / sigma**2 * min(1.0, 2 * sigma / (abs(height) + 1e-12))
-        x, y, h = x - middle[0], y - middle[1], h - middle[2]
-        row[0], row[1], row[2] = y * nz - h * ny, h * nx - x * nz, x * ny - y * nx
-        row[3], row[4], row[5] = nx, ny, nz
-        for r in range(6):
-            g[r] += weight * row[r] * height
-            for c in range(6):
-                H[r, c] += weight * row[r] * row[c]
-    return H, g

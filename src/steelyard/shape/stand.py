@@ -18,7 +18,8 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.shape import depth_images as images
 from steelyard.shape.common_table import laid
-from steelyard.shape.scene import Scene, heights, object_on_table
+from steelyard.shape.region import heights, object_on_table
+from steelyard.shape.scene import Scene
 from steelyard.shape.table_plane import NEAR, find_table
 from steelyard.shape.views import TablePlane
 

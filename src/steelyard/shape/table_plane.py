@@ -10,12 +10,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.shape.medians import quantile
+from steelyard.shape.medians import MIDDLE_HALF, middle_half_std, quantile
 from steelyard.shape.views import TablePlane
 from steelyard.spatial import Pose, Rotation
 
 _TRIES, _JUDGED = 300, 3000  # planes tried, points that judge them
 NEAR = 0.012  # of the distance: a point this near a plane counts as on it
+INCIDENCE = 0.7  # heights over a table, over depth errors: the cosine of incidence, about, of a wrist's arc of views
 _LEAST = 0.2  # share of the points that must lie on the table
 _LEAST_GIVEN = 0.08  # the same of a table that is known: a stand or a tray is small
 _SLICE, _FACE, _ON_FACE = 0.004, 0.75, 0.003  # of the distance, of the points in the slices beside it, of all points
@@ -53,8 +54,7 @@ def find_table(points: Array, cameras: Array, distance: float, start: TablePlane
     for _ in range(_ROUNDS):
         plane = _fitted(points[on], plane)
         height = plane.height(points)
-        # A trimmed normal distribution: its middle half spans 1.35 standard deviations.
-        near = max(min(near, 3 * float(np.subtract(*np.percentile(height[on], (75, 25)))) / 1.35), 1e-4)
+        near = max(min(near, 3 * middle_half_std(height[on])), 1e-4)
         before, on = on, np.abs(height) < near
         if on.sum() < before.sum() / 2:
             # A low, flat object seen with little noise lifts the mean off the table, and not the median.
@@ -164,8 +164,7 @@ def noise_of(planes: Array, unit: float, distance: float) -> float:
 
     planes  (K, 5) of the views, see `table_planes`      unit  of depth [m]      distance  of the table [m]
     """
-    # heights over the table are depth errors times the cosine of incidence, about 0.7 for a wrist's arc
-    found = float(np.median(planes[:, 4])) / 0.7 if len(planes) else 0.0
+    found = float(np.median(planes[:, 4])) / INCIDENCE if len(planes) else 0.0
     return max(found, float(unit / np.sqrt(12) / distance**2))
 
 
@@ -198,7 +197,7 @@ def table_planes(sampled: Array, xyz: Array, near: float) -> Array:
             plane = _plane(A[:n], b[:n], plane, 3 * max(spread, 1e-9))
             for j in range(n):
                 rest[j] = b[j] - A[j, 0] * plane[0] - A[j, 1] * plane[1] - A[j, 2] * plane[2]
-            spread = (quantile(rest, n, 0.75) - quantile(rest, n, 0.25)) / 1.35
+            spread = (quantile(rest, n, 0.75) - quantile(rest, n, 0.25)) / MIDDLE_HALF
         out[count, 0], out[count, 1:4], out[count, 4] = view, plane, spread
         count += 1
     return out[:count]

@@ -10,7 +10,7 @@ import numba
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.shape.mesh import Integers
@@ -88,10 +88,18 @@ class TetMesh:
     @cached_property
     def dual(self) -> Integers:
         """Pairs (E, 2) of cells that share a face, each once, the lower number first."""
-        cell = np.repeat(np.arange(len(self)), 4)
-        other = self.neighbours.ravel()
-        once = cell < other
-        return np.stack([cell[once], other[once]], axis=1)
+        cell, other = np.repeat(np.arange(len(self)), 4), self.neighbours.ravel()
+        return np.stack([cell, other], axis=1)[self._once]
+
+    @property
+    def inner_faces(self) -> Integers:
+        """Corners (E, 3) of the faces between the cells of `dual`, counter-clockwise seen from the second."""
+        return self.tets[:, FACES].reshape(-1, 3)[self._once]
+
+    @property
+    def _once(self) -> Mask:
+        """Which faces of cells (4 T,) have a cell of a higher number behind them."""
+        return np.repeat(np.arange(len(self)), 4) < self.neighbours.ravel()
 
     @property
     def surface(self) -> Integers:

@@ -6,10 +6,10 @@ import numpy as np
 
 from steelyard.findings import Finding
 from steelyard.shape.scene import Scene
+from steelyard.shape.table_plane import INCIDENCE
 from steelyard.shape.underside import Underside
 
 _UNEVEN = 0.7  # times the depth noise: views that spread less have a table that is rougher than their noise
-_INCIDENCE = 0.7  # heights over depth errors, of sight lines down to a table
 _CREST = 3.0  # times the roughness: what the underside is off by. Of four bodies on six cloths 2 to 4, of a mug up to 7
 
 
@@ -20,7 +20,7 @@ def uneven(scene: Scene, bottom: Underside, disagree: float) -> tuple[tuple[Find
     """
     if disagree >= _UNEVEN:
         return (), 0.0
-    rough = _INCIDENCE * scene.sigma * float(np.sqrt(1 - disagree**2))
+    rough = INCIDENCE * scene.sigma * float(np.sqrt(1 - disagree**2))
     text = (
         f"The table is not flat: views leave {1e3 * scene.sigma:.2g} mm (rms) about its plane, but spread "
         f"{1e3 * scene.sigma * disagree:.2g} mm about the object. The underside is closed on that plane, some of the "

@@ -21,6 +21,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog, Noise
+from steelyard.simulate import logs
 from steelyard.simulate.motions import Kinematics, Motion, Step, StopAndGo
 from steelyard.simulate.noise import Spectrum, unit_noise
 from steelyard.spatial import Rotation
@@ -142,22 +143,8 @@ def motion_arrays(variant: str = "paper", body: InertialParameters | None = None
 
 
 def exact_log(seen: Kinematics, body: InertialParameters | None) -> MotionLog:
-    """Return the log without noise along `seen` (N rows) of `body` in S; wrenches are zero without one.
-
-    Still rows are marked by their true speed and carry the number of their pose.
-    """
-    still = seen.at_rest(STILL_SPEED, STILL_ANGULAR_SPEED)
-    log = MotionLog(
-        wrench=np.zeros((len(seen.time), 6)),
-        gravity=seen.rotation.inverse().apply(np.array(GRAVITY)),
-        acceleration=seen.acceleration,
-        angular_velocity=seen.angular_velocity,
-        angular_acceleration=seen.angular_acceleration,
-        time=seen.time,
-        still=still,
-        pose=np.where(still, seen.pose, -1),
-    )
-    return log if body is None else replace(log, wrench=log.predicted(body.vector))
+    """Return the log without noise along `seen` (N rows) of `body` in S; wrenches are zero without one."""
+    return logs.exact_log(seen, body, np.array(GRAVITY), (STILL_SPEED, STILL_ANGULAR_SPEED))
 
 
 def handling_log(

@@ -85,7 +85,8 @@ def log_of(
     to the wrench.
     """
     seen = motion.at(np.arange(samples) / rate)
-    exact = _exact(body, seen, check.vectors("gravity", gravity))
+    still_below = scenarios.STILL_SPEED, scenarios.STILL_ANGULAR_SPEED
+    exact = exact_log(seen, body, check.vectors("gravity", gravity), still_below)
     rows = samples * repeats
     angular, linear, force, torque = std
     noise = unit_noise(rng, rows, 12, spectrum, rate) * np.repeat([angular, linear, torque, force], 3)
@@ -103,19 +104,26 @@ def log_of(
     )
 
 
-def _exact(body: InertialParameters, seen: Kinematics, gravity: Array) -> MotionLog:
-    """Return the log without noise."""
-    still = seen.at_rest(scenarios.STILL_SPEED, scenarios.STILL_ANGULAR_SPEED)
-    motion = MotionLog(
+def exact_log(
+    seen: Kinematics, body: InertialParameters | None, gravity: Array, still_below: tuple[float, float]
+) -> MotionLog:
+    """Return the log without noise along `seen` (N rows) of `body` in S; wrenches are zero without one.
+
+    gravity      (3,) [m/s^2] in W
+    still_below  true speeds [m/s, rad/s] below which rows are at rest and carry the number of their pose
+    """
+    still = seen.at_rest(*still_below)
+    log = MotionLog(
         wrench=np.zeros((len(seen.time), 6)),
         gravity=seen.rotation.inverse().apply(gravity),
         acceleration=seen.acceleration,
         angular_velocity=seen.angular_velocity,
         angular_acceleration=seen.angular_acceleration,
+        time=seen.time,
         still=still,
         pose=np.where(still, seen.pose, -1),
     )
-    return replace(motion, wrench=motion.predicted(body.vector))
+    return log if body is None else replace(log, wrench=log.predicted(body.vector))
 
 
 def _shuffled(log: MotionLog, rng: np.random.Generator) -> MotionLog:

@@ -7,9 +7,11 @@ from steelyard.spatial.vectors import (
     Twist,
     Wrench,
     axial_vector,
+    classical_acceleration,
     cross,
     cross_matrix,
     lever_acceleration,
+    signed_axes,
     unit_vectors,
 )
 
@@ -20,8 +22,10 @@ __all__ = [
     "Twist",
     "Wrench",
     "axial_vector",
+    "classical_acceleration",
     "cross",
     "cross_matrix",
     "lever_acceleration",
+    "signed_axes",
     "unit_vectors",
 ]

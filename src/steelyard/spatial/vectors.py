@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from itertools import permutations, product
 from typing import Any, Self
 
 import numpy as np
@@ -28,6 +29,16 @@ def lever_acceleration(omega: Array, alpha: Array, p: Array) -> Array:
     return np.asarray(cross(alpha, p) + cross(omega, cross(omega, p)))
 
 
+def classical_acceleration(derivative: Array, twist: Array) -> Array:
+    """Return that of the origin (..., 3) [m/s^2] from the component-wise derivative (..., 6) of a body twist (..., 6).
+
+    a = dv/dt + omega x v, all in body axes.
+    Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B, differentiates the components;
+    Newton-Euler about a point needs the classical acceleration.
+    """
+    return np.asarray(derivative[..., 3:] + cross(twist[..., :3], twist[..., 3:]))
+
+
 def unit_vectors(vectors: Array) -> Array:
     """Return vectors (..., n) made one long; zero stays zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
@@ -40,6 +51,12 @@ def cross_matrix(vector: ArrayLike) -> Array:
     out[..., 0, 1], out[..., 0, 2], out[..., 1, 2] = -v[..., 2], v[..., 1], -v[..., 0]
     out[..., 1, 0], out[..., 2, 0], out[..., 2, 1] = v[..., 2], -v[..., 1], v[..., 0]
     return out
+
+
+def signed_axes() -> Array:
+    """Return every order and sign of three axes (48, 3, 3), first as they are: 24 rotations, 24 reflections."""
+    orders, signs = permutations(range(3)), tuple(product((1.0, -1.0), repeat=3))
+    return np.stack([np.eye(3)[list(order)] * np.array(sign) for order in orders for sign in signs])
 
 
 def axial_vector(matrix: Array) -> Array:
@@ -122,14 +139,9 @@ class Acceleration(_SixVector):
 
     @classmethod
     def from_twist_derivative(cls, derivative: ArrayLike, twist: Twist) -> Acceleration:
-        """Return the classical acceleration from the component-wise derivative (..., 6) of a body twist.
-
-        a = dv/dt + omega x v, all in body axes.
-        Source: "Cooperative Payload Estimation by a Team of Mocobots", IV-B, differentiates the components;
-        Newton-Euler about a point needs the classical acceleration.
-        """
+        """Return the classical acceleration from the component-wise derivative (..., 6) of a body twist."""
         d = check.vectors("twist derivative", derivative, 6)
-        return cls(d[..., :3], d[..., 3:] + cross(twist.angular, twist.linear))
+        return cls(d[..., :3], classical_acceleration(d, twist.array()))
 
 
 class Wrench(_SixVector):

@@ -26,6 +26,17 @@ def adjoint_inverse(X_AB: Pose) -> Array:
     return out
 
 
+def _brackets() -> Array:
+    """Return C (6, 6, 6), so that ad_V = sum_a V_a C_a: [ad_V U] is the Lie bracket of twists, angular part first."""
+    out = np.zeros((6, 6, 6))
+    for a in range(3):
+        out[a, :3, :3] = out[a, 3:, 3:] = out[3 + a, 3:, :3] = cross_matrix(np.eye(3)[a])
+    return out
+
+
+BRACKETS = _brackets()
+
+
 def exp(step: Array) -> Pose:
     """Return the pose of a small step (..., 6): rotation vector [rad] and position [m].
 

@@ -17,27 +17,14 @@ from itertools import permutations
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.spatial import Pose, Rotation, cross_matrix
+from steelyard.spatial import Pose, Rotation
 from steelyard.spatial.screws import exp_pose
-from steelyard.team.adjoint import adjoint
+from steelyard.team.adjoint import BRACKETS, adjoint
 from steelyard.team.grasp_kinematics import Pair
 from steelyard.team.grasps import Grasps
 
 _POLISH = 60  # secant steps at most; three robots take some ten until rounding stops them
 _SERIES = 8  # terms of the right Jacobian: corrections are a few degrees at most
-
-
-def _brackets() -> Array:
-    """Return C (6, 6, 6), so that ad_V = sum_a V_a C_a (angular part first)."""
-    out = np.zeros((6, 6, 6))
-    for a in range(3):
-        unit = cross_matrix(np.eye(3)[a])
-        out[a, :3, :3] = out[a, 3:, 3:] = unit
-        out[3 + a, 3:, :3] = unit
-    return out
-
-
-_BRACKETS = _brackets()
 
 
 @dataclass(frozen=True, eq=False)
@@ -125,8 +112,8 @@ def _pair_cost(poses: Pose, moments: _Moments, weight: Array) -> tuple[float, Ar
     value = 0.5 * float((np.einsum("paa->pa", squares) * weight).sum())
     weighed = crossed * weight
     slope = np.zeros((len(poses.position), 6))
-    np.add.at(slope, j, np.einsum("pab,abc->pc", weighed @ A, _BRACKETS))
-    np.add.at(slope, i, -np.einsum("pab,abc->pc", A @ weighed, _BRACKETS))
+    np.add.at(slope, j, np.einsum("pab,abc->pc", weighed @ A, BRACKETS))
+    np.add.at(slope, i, -np.einsum("pab,abc->pc", A @ weighed, BRACKETS))
     return value, slope
 
 
@@ -141,7 +128,7 @@ def _moved(poses: Pose, free: list[int], xi: Array) -> Pose:
 
 def _right_jacobian(xi: Array) -> Array:
     """Return J (n, 6, 6): exp(xi + d) = exp(xi) exp(J d) to first order, by its series sum (-ad)^k / (k + 1)!."""
-    ad = -np.einsum("na,abc->nbc", xi, _BRACKETS)
+    ad = -np.einsum("na,abc->nbc", xi, BRACKETS)
     term = np.broadcast_to(np.eye(6), ad.shape)
     total = term.copy()
     for k in range(1, _SERIES):

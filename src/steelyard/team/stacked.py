@@ -10,6 +10,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.logs.clock import median_step
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
@@ -123,7 +124,7 @@ def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
     turn, pose = mean_rotation(track), track.pose
     own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
     curve = between(track.time, np.concatenate([*own, track.wrench()], axis=1), time)
-    near = near_samples(track.time, time, float(np.median(np.diff(track.time))))
+    near = near_samples(track.time, time, median_step(track.time))
     return turned_by(turn, curve[:, :3]), turn.apply(curve[:, 3:6]), curve[:, 6:], near
 
 
@@ -169,7 +170,7 @@ def row_slices(parts: Sequence[Sized]) -> list[slice]:
 
 
 def _rate(time: Array) -> float:
-    return 1 / float(np.median(np.diff(time))) if len(time) > 1 else 1.0
+    return 1 / median_step(time) if len(time) > 1 else 1.0
 
 
 def all_poses(parts: tuple[Stretch, ...]) -> tuple[Pose, Mask]:

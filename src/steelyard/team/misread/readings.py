@@ -3,32 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from itertools import permutations, product
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.recording import INCH, POUND_FORCE, STANDARD_GRAVITY
+from steelyard.spatial import signed_axes
 
 # Units taken for newtons: force, and the torque that goes with it, in SI.
 _UNITS = {"kgf": (STANDARD_GRAVITY, STANDARD_GRAVITY), "lbf": (POUND_FORCE, POUND_FORCE * INCH), "kN": (1e3, 1e3)}
 # As given; what makes newtons of units taken for them; what undoes newtons taken for such units.
 _NAMES = ("N", *_UNITS, *["N"] * len(_UNITS))
 _SIZES = np.array([(1.0, 1.0), *_UNITS.values(), *((1 / f, 1 / t) for f, t in _UNITS.values())])
-
-
-def _axes() -> Array:
-    """Return every order and sign of three axes (48, 3, 3), as they are first."""
-    return np.stack(
-        [
-            np.eye(3)[list(order)] * np.array(signs)
-            for order in permutations(range(3))
-            for signs in product((1.0, -1.0), repeat=3)
-        ]
-    )
-
-
-AXES = _axes()
+AXES = signed_axes()
 # Every reading (R, 3, 3) of a force, as it is first, and how many times larger each makes it (R,).
 FACTORS = np.repeat(_SIZES[:, 0], len(AXES))
 READINGS = FACTORS[:, None, None] * np.tile(AXES, (len(_SIZES), 1, 1))

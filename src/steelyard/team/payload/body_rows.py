@@ -19,7 +19,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.log import Mask
 from steelyard.logs.runs import runs
-from steelyard.spatial import Pose, Rotation, cross, cross_matrix, unit_vectors
+from steelyard.spatial import Pose, Rotation, classical_acceleration, cross_matrix, unit_vectors
 from steelyard.team.stacked import Stretch
 from steelyard.team.turns import turns_between
 
@@ -181,7 +181,7 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
         if PATH_FILTER * highest_hz < 0.45 * part.rate:
             smooth = lowpass(smooth, PATH_FILTER * highest_hz, part.rate)
         rise = _slope(smooth, part.rate)
-        lifted = rise[:, 3:] + cross(smooth[:, :3], smooth[:, 3:]) + supported[rows]
+        lifted = classical_acceleration(rise, smooth) + supported[rows]
         motion = features(smooth[:, :3], rise[:, :3], lifted)
         inside = _inside(rows, part.rate, highest_hz)
         kept = slice(inside.start - rows.start, inside.stop - rows.start)

@@ -17,8 +17,8 @@ from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers, Mask
-from steelyard.spatial import Pose, cross_matrix
-from steelyard.team.adjoint import adjoint, adjoint_inverse, exp
+from steelyard.spatial import Pose
+from steelyard.team.adjoint import BRACKETS, adjoint, adjoint_inverse, exp
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.fit import EXACT
 from steelyard.team.poses.noise import noise_of_scatter
@@ -29,16 +29,8 @@ from steelyard.team.twists.statistic import TwistScatter
 STEPS = 25
 
 
-def _ad() -> Array:
-    """Return A (6, 6, 6) with ad(y)[c, a] = A[c, a, k] y_k."""
-    out = np.zeros((6, 6, 6))
-    for k in range(3):
-        turn = cross_matrix(np.eye(3)[k])
-        out[:3, :3, k] = out[3:, 3:, k] = out[3:, :3, 3 + k] = turn
-    return out
-
-
-AD = _ad()
+# ad(y)[c, a] = AD[c, a, k] y_k.
+AD = np.ascontiguousarray(np.moveaxis(BRACKETS, 0, 2))
 # Where its entries are that are not zero, and what they are.
 PLACES, SIGNS = np.argwhere(AD != 0).astype(np.int64), AD[AD != 0]
 

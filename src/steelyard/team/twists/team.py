@@ -88,7 +88,7 @@ class TwistTeam:
         noise = np.sqrt(np.einsum("nii->ni", noise_alone(self.fit.J, self.fit.W)))
         raw = twist_stretches(log, self.late)
         return [
-            np.sqrt(((self._against(was, now) / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
+            np.sqrt(((self._left(was, now)[0] / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
         ]
 
     def slip(self, log: TeamLog) -> SlipAt | None:
@@ -112,7 +112,7 @@ class TwistTeam:
             return found
         raw, robot = twist_stretches(log, self.late)[found.recording], found.slip.robot
         noise = noise_alone(self.fit.J, self.fit.W)[robot]
-        apart = np.cumsum(self._against(raw, self.parts[found.recording])[:, robot], axis=0) / raw.rows.rate
+        apart = np.cumsum(self._left(raw, self.parts[found.recording])[0][:, robot], axis=0) / raw.rows.rate
         return found.renewed(apart, raw.seen[:, robot], raw.rows, noise, drifts=True)
 
     @cached_property
@@ -158,18 +158,16 @@ class TwistTeam:
         known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
         return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
 
-    def _against(self, was: TwistStretch, now: TwistStretch) -> Array:
-        """Return what twists (T, N, 6) of a recording as it was differ by from the motion that is left of it now."""
-        fused, _ = fused_twist(now.twist, now.seen, self.fit.grasps, self.fit.noise)
-        moved = np.einsum("nij,tj->tni", self.fit.J, fused)
-        told = was.seen & now.seen.any(1, keepdims=True)
-        return np.asarray((was.twist - moved) * told[..., None])
+    def _left(self, part: TwistStretch, now: TwistStretch | None = None) -> tuple[Array, Array, Array]:
+        """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6).
 
-    def _left(self, part: TwistStretch) -> tuple[Array, Array, Array]:
-        """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6)."""
-        fused, covariance = fused_twist(part.twist, part.seen, self.fit.grasps, self.fit.noise)
+        now  what is left of the recording, where it tells the motion from which `part`, as it was, differs
+        """
+        now = part if now is None else now
+        fused, covariance = fused_twist(now.twist, now.seen, self.fit.grasps, self.fit.noise)
         moved = np.einsum("nij,tj->tni", self.fit.J, fused)
-        return (part.twist - moved) * part.seen[..., None], fused, covariance
+        told = part.seen & now.seen.any(1, keepdims=True)
+        return (part.twist - moved) * told[..., None], fused, covariance
 
     def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.

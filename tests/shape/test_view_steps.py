@@ -4,21 +4,16 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from views_apart import apart
 
 from steelyard.shape.common_table import levelled
-from steelyard.shape.joint_registration import steps_together
 from steelyard.shape.registration import Seen, agreed
-from steelyard.shape.scene import Scene, scene_of
+from steelyard.shape.scene import scene_of
+from steelyard.shape.view_steps import steps_together
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.catalogue import build
 from steelyard.workshop.finish import painted
-
-
-def apart(scene: Scene, true: Pose) -> float:
-    """Return how far the views have what lies under the cameras apart, rms [m]."""
-    error = Pose(Rotation.nearest(scene.R), scene.p) @ (scene.X_WT.inverse() @ true).inverse()
-    return float(np.sqrt(error.apply(np.zeros(3)).var(0).sum()))
 
 
 @pytest.mark.parametrize("tool", ["box-wrench", "hammer"])

@@ -1,4 +1,4 @@
-"""Views fitted to each other all at once.
+"""Views fitted to a surface: one by one, or all at once.
 
 Fitted to their common surface one by one, each view goes only a small part of the way wherever most of that surface is
 its own: what a camera askew at the wrist does to all views alike, an object that swells or shrinks, then takes hundreds
@@ -16,9 +16,69 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.depth_images import FACING, pixel_of
 
+_STEPS = 3  # of Gauss and Newton, per view
 _ALIKE = 50.0  # neighbours on the surface whose errors are one: an edge that blurs does so on its whole length
 _PAIRS = 90_000  # of a point and a view that are looked at, about: of many views a share of the points is enough
 _FLOOR = 1e-4  # of the surface: it is known no better [m]
+
+
+def moved(
+    depth: Any, unit: float, camera: Array, R: Array, p: Array, xyz: Array, normal: Array, window: float, noise: float,
+    loose: tuple[float, float],
+) -> tuple[Array, Array]:  # fmt: skip
+    """Return poses (V, 3, 3), (V, 3) from which the views measure the surface of patches (N, 3) with normals (N, 3).
+
+    Point-to-plane distances of the pixels that patches fall on, Huber-weighted, three Gauss-Newton steps per view.
+    window  distances beyond it are another surface [m]
+    loose   standard deviations of the reported poses, [m] and [rad]: how freely a view may leave its pose
+    """
+    R, p = R.copy(), p.copy()
+    middle = xyz.mean(0)
+    for k in range(len(R)):
+        for _ in range(_STEPS):
+            H, g = _of_view(depth, unit, camera, R, p, k, xyz, normal, middle, window, noise)
+            H[np.arange(6), np.arange(6)] += 1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2
+            step = np.linalg.solve(H, -g)
+            turn = _rotation(step[:3])
+            R[k] = turn @ R[k]
+            p[k] = middle + turn @ (p[k] - middle) + step[3:]
+    return R, p
+
+
+@numba.njit(cache=True, nogil=True)
+def _rotation(w: Any) -> Any:
+    """Return the rotation (3, 3) by a vector w (3,) [rad]."""
+    angle = np.sqrt((w * w).sum())
+    if angle < 1e-12:
+        return np.eye(3)
+    a = w / angle
+    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+
+
+@numba.njit(cache=True, nogil=True)
+def _of_view(
+    depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, xyz: Any, normal: Any, middle: Any, window: float,
+    noise: float,
+) -> Any:  # fmt: skip
+    """Return the Hessian (6, 6) and gradient (6,) of half the squared distances, in standard deviations of depth."""
+    H, g, row = np.zeros((6, 6)), np.zeros(6), np.empty(6)
+    for i in range(len(xyz)):
+        heard, over, sigma = _measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row, middle, noise)
+        if not heard or abs(over) > window:
+            continue
+        weight = _weight(over, sigma)
+        for r in range(6):
+            g[r] += weight * row[r] * over
+            for c in range(6):
+                H[r, c] += weight * row[r] * row[c]
+    return H, g
+
+
+@numba.njit(cache=True, nogil=True)
+def _weight(over: float, sigma: float) -> float:
+    """Return Huber's weight [1/m^2] of a distance `over` with standard deviation sigma [m]."""
+    return 1 / sigma**2 * min(1.0, 2 * sigma / (abs(over) + 1e-12))
 
 
 def steps_together(
@@ -33,7 +93,7 @@ def steps_together(
     loose   standard deviations of the poses, [m] and [rad]: how freely a view may leave its pose
     """
     step = -(-len(xyz) * len(R) // _PAIRS)
-    H, g = _normal_equations(depth, unit, camera, R, p, xyz[::step], normal[::step], xyz.mean(0), window, noise)
+    H, g = _together(depth, unit, camera, R, p, xyz[::step], normal[::step], xyz.mean(0), window, noise)
     H, g = H * (step / _ALIKE), g * (step / _ALIKE)
     H[np.diag_indices(len(H))] += np.tile(1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2, len(R))
     steps = np.linalg.solve(H, -g).reshape(-1, 6)
@@ -42,7 +102,7 @@ def steps_together(
 
 
 @numba.njit(cache=True, nogil=True)
-def _normal_equations(
+def _together(
     depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
     noise: float,
 ) -> Any:  # fmt: skip
@@ -56,7 +116,7 @@ def _normal_equations(
             if not heard or abs(over) > window:
                 continue
             view[n], height[n] = k, over
-            weight[n] = 1 / sigma**2 * min(1.0, 2 * sigma / (abs(over) + 1e-12))
+            weight[n] = _weight(over, sigma)
             total += weight[n]
             mean += weight[n] * over
             n += 1
