@@ -48,5 +48,7 @@ def test_many_rows_of_one_stamp_are_a_coarse_clock(tick: float) -> None:
 
 def test_a_coarse_clock_that_was_set_is_named_by_the_distance_of_its_rows() -> None:
     stamps = np.floor(EVEN / 0.02) * 0.02
-    with pytest.raises(BadValue, match=r"jumps by 1\.7e\+09 s from row 3000 to row 3001, where rows are 0\.005 s apart"):
+    with pytest.raises(
+        BadValue, match=r"jumps by 1\.7e\+09 s from row 3000 to row 3001, where rows are 0\.005 s apart"
+    ):
         Clock.of(np.r_[stamps[:3000], 1.7e9 + stamps[3000:]], "s", "log.toml, time")

@@ -25,6 +25,7 @@ from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
+from steelyard.team.clipped import without_clipped
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.misread.angle_units import require_one_angle_unit
@@ -59,8 +60,9 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_length_unit(log)
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
-    found = ESTIMATORS[method].identify(log)
-    before = (*stuck_forces(log), *_missing_rows(log), *_missing_wrenches(log, method))
+    whole, clipped = without_clipped(log)
+    found = ESTIMATORS[method].identify(whole)
+    before = (*stuck_forces(log), *clipped, *_missing_rows(log), *_missing_wrenches(log, method))
     found = replace(found, findings=(*before, *found.findings), notes=(*moving, *found.notes))
     return _weighed(_with_gravity(found, log))
 

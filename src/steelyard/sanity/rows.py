@@ -13,6 +13,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.logs.clipping import MOST_LEFT_OUT, NOISE_SHARE, clipped_rows, noise_shares, with_neighbours
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
 from steelyard.spatial import cross_matrix
@@ -23,12 +24,6 @@ REPEATED_SHARE, CHANCE = 0.02, 3.0
 LONGEST_RUN = 8
 # A channel is frozen when it holds still for this long although it never else does.
 FROZEN_ROWS, FROZEN_S = 50, 0.25
-# A channel is clipped when its extreme value comes up this often and at least five times as often as its neighbours.
-CLIPPED_ROWS, CLIPPED_SHARE, CLIPPED_RATIO = 10, 0.003, 5
-# Measured channels carry noise of more than this share of their range; simulated ones without noise do not.
-NOISE_SHARE = 1e-5
-# What is left of a stream that loses more rows than this share is no fair sample: then none is left out.
-MOST_LEFT_OUT = 0.7
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 _NOISY = ("force", "torque", "specific_force")
 
@@ -81,7 +76,7 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     for quantity in (q for q in _NOISY if q in stream.channels):
         values = stream.channels[quantity]
         same = values[1:] == values[:-1]
-        dead, noisy = _dead(values), _noise_shares(values) > NOISE_SHARE
+        dead, noisy = _dead(values), noise_shares(values) > NOISE_SHARE
         for axis in range(3):
             name = f"{quantity} {'xyz'[axis]}"
             others = np.delete(np.arange(3), axis)
@@ -116,7 +111,7 @@ def dead_channels(recording: Recording) -> tuple[bool, ...]:
 def _dead(values: Array) -> Mask:
     """Return which of three channels (N, 3) never change while one beside them carries noise."""
     same = (values[1:] == values[:-1]).mean(0)
-    lively = (same < 0.3) & (_noise_shares(values) > NOISE_SHARE)
+    lively = (same < 0.3) & (noise_shares(values) > NOISE_SHARE)
     return np.asarray((values == values[0]).all(0) & lively.any())
 
 
@@ -145,23 +140,15 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
     clipped = np.zeros(len(stream), bool)
     for quantity in (q for q in _MEASURED if q in stream.channels):
         values = stream.channels[quantity]
-        noisy = _noise_shares(values) > NOISE_SHARE
+        noisy = noise_shares(values) > NOISE_SHARE
         for axis in np.flatnonzero(noisy).tolist():
             for extreme in (values[:, axis].min(), values[:, axis].max()):
-                rows = _clipped_rows(values[:, axis], float(extreme))
+                rows = clipped_rows(values[:, axis], float(extreme))
                 if rows.any():
                     found.append((quantity, axis, float(extreme), int(rows.sum())))
                     clipped |= rows
-    rest, then = _left_out(stream, _with_neighbours(clipped))
+    rest, then = _left_out(stream, with_neighbours(clipped))
     return rest, tuple(_saturated(stream, *each, then) for each in found)
-
-
-def _with_neighbours(rows: Mask) -> Mask:
-    """Return the rows (N,) and those beside them, which are filtered by the same electronics."""
-    wide = rows.copy()
-    wide[1:] |= rows[:-1]
-    wide[:-1] |= rows[1:]
-    return wide
 
 
 def _left_out(stream: Stream, rows: Mask) -> tuple[Stream, str]:
@@ -241,32 +228,6 @@ def _frozen_rows(column: Array, time: Array) -> Mask:
 
 def _rows_needed(time: Array) -> float:
     return max(FROZEN_ROWS, FROZEN_S * (len(time) - 1) / max(float(time[-1] - time[0]), 1e-9))
-
-
-def _noise_shares(values: Array) -> Array:
-    """Return the noise of each column over its range (D,), from third differences, in the median stretch."""
-    squares = np.diff(values, 3, axis=0) ** 2 / 20
-    if len(squares) < 4:
-        return np.zeros(values.shape[1])
-    blocks = np.array_split(squares, max(len(squares) // 50, 1))
-    return np.asarray(np.sqrt(np.median([b.mean(0) for b in blocks], 0)) / np.maximum(np.ptp(values, axis=0), 1e-300))
-
-
-def _clipped_rows(column: Array, extreme: float) -> Mask:
-    """Return rows (N,) at the extreme value, none unless it stands out from the values beside it."""
-    at = column == extreme
-    count, none = int(at.sum()), np.zeros(len(column), bool)
-    if count < max(CLIPPED_ROWS, CLIPPED_SHARE * len(column)):
-        return none
-    # Both ends of the range may be clipped; neither is compared with the other.
-    others, counts = np.unique(column[(column > column.min()) & (column < column.max())], return_counts=True)
-    if not len(others) or counts.max() * CLIPPED_RATIO > count:
-        return none
-    steps = np.abs(np.diff(column))
-    entering = steps[at[1:] != at[:-1]]
-    quantum = float(steps[steps > 0].min())
-    # A coarse channel at rest creeps into its plateau by one quantum; a clipped one runs into its stop.
-    return at if len(entering) and float(np.median(entering)) > 3 * quantum else none
 
 
 def _stuck(stream: Stream, name: str, what: str, then: str) -> Finding:
