@@ -24,6 +24,8 @@ REPEATED_SHARE, CHANCE = 0.02, 3.0
 LONGEST_RUN = 8
 # A channel is frozen when it holds still for this long although it never else does.
 FROZEN_ROWS, FROZEN_S = 50, 0.25
+# Rows in which gravity differs by less than this share of itself along an axis may well read the same there.
+SAME_PULL = 0.01
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 _NOISY = ("force", "torque", "specific_force")
 
@@ -33,7 +35,7 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     tables = all(s.time is None for s in recording.streams)
     if tables:
         recording, findings = _repeated_in_tables(recording)
-        return recording, (*findings, *(f for s in recording.streams for f in _clipped_table(s)))
+        return recording, (*findings, *(f for s in recording.streams for f in _clipped_table(s, _gravity(recording))))
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
@@ -279,13 +281,37 @@ def _repeated_in_tables(recording: Recording) -> tuple[Recording, tuple[Finding,
     return replace(recording, streams=streams), (Finding.of("rows-duplicated", message),)
 
 
-def _clipped_table(stream: Stream) -> list[Finding]:
-    """Return a finding for each wrench channel of a table whose extreme value comes again and no other does."""
+def _clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
+    """Return a finding for each wrench channel of a table whose extreme value comes again and no other does.
+
+    gravity  (N, 3) in S; rows of which it asks the same value are no clipped ones. None where it is not known
+    """
     out = []
     for quantity in (q for q in ("force", "torque") if q in stream.channels and len(stream) >= 8):
         for axis, column in enumerate(stream.channels[quantity].T):
             values, counts = np.unique(column, return_counts=True)
             for end in (0, -1):
-                if len(values) > 4 and counts[end] >= 3 and np.delete(counts, end).max() == 1:
-                    out.append(_saturated(stream, quantity, axis, values[end], int(counts[end]), "check them"))
+                if len(values) > 4 and counts[end] >= 3 and counts[1:-1].max() == 1:
+                    at = column == values[end]
+                    if not _same_pull(stream, quantity, axis, at, gravity):
+                        out.append(_saturated(stream, quantity, axis, values[end], int(at.sum()), "check them"))
     return out
+
+
+def _same_pull(stream: Stream, quantity: str, axis: int, at: Mask, gravity: Array | None) -> bool:
+    """Tell whether gravity (N, 3) asks the same of a channel in the rows `at` (N,): there it may well be the same."""
+    if gravity is None or stream.turn is not None:
+        return False
+    if stream.frames.get(quantity, "S") == "W":
+        return quantity == "force"
+    # The moment about an axis comes from what pulls across it.
+    pulls = gravity[at][:, [axis]] if quantity == "force" else np.delete(gravity[at], axis, axis=1)
+    return bool(np.ptp(pulls, axis=0).max() < SAME_PULL * float(np.abs(gravity).max()))
+
+
+def _gravity(recording: Recording) -> Array | None:
+    """Return gravity in S (N, 3) where rotations or a channel tell it in every row."""
+    found = {q: v for s in recording.streams for q, v in s.channels.items()}
+    if "rotation" in found and np.isfinite(found["rotation"]).all():
+        return np.asarray(np.swapaxes(found["rotation"], 1, 2) @ recording.gravity)
+    return found.get("gravity")
