@@ -24,8 +24,8 @@ REPEATED_SHARE, CHANCE = 0.02, 3.0
 LONGEST_RUN = 8
 # A channel is frozen when it holds still for this long although it never else does.
 FROZEN_ROWS, FROZEN_S = 50, 0.25
-# Rows in which gravity differs by less than this share of itself along an axis may well read the same there.
-SAME_PULL = 0.01
+# Rows in which gravity is the same along an axis, to so small a share of itself, may well read the same there.
+SAME_PULL = 1e-6
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 _NOISY = ("force", "torque", "specific_force")
 
