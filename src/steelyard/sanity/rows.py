@@ -24,7 +24,7 @@ REPEATED_SHARE, CHANCE = 0.02, 3.0
 LONGEST_RUN = 8
 # A channel is frozen when it holds still for this long although it never else does.
 FROZEN_ROWS, FROZEN_S = 50, 0.25
-# Rows in which gravity is the same along an axis, to so small a share of itself, may well read the same there.
+# Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
 SAME_PULL = 1e-6
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 _NOISY = ("force", "torque", "specific_force")
@@ -293,20 +293,17 @@ def _clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
             for end in (0, -1):
                 if len(values) > 4 and counts[end] >= 3 and counts[1:-1].max() == 1:
                     at = column == values[end]
-                    if not _same_pull(stream, quantity, axis, at, gravity):
+                    if not _same_pull(stream, at, gravity):
                         out.append(_saturated(stream, quantity, axis, values[end], int(at.sum()), "check them"))
     return out
 
 
-def _same_pull(stream: Stream, quantity: str, axis: int, at: Mask, gravity: Array | None) -> bool:
-    """Tell whether gravity (N, 3) asks the same of a channel in the rows `at` (N,): there it may well be the same."""
-    if gravity is None or stream.turn is not None:
+def _same_pull(stream: Stream, at: Mask, gravity: Array | None) -> bool:
+    """Tell whether rows `at` (N,) are repeats of one pose without noise: gravity (N, 3) and all forces agree."""
+    if gravity is None or "force" not in stream.channels:
         return False
-    if stream.frames.get(quantity, "S") == "W":
-        return quantity == "force"
-    # The moment about an axis comes from what pulls across it.
-    pulls = gravity[at][:, [axis]] if quantity == "force" else np.delete(gravity[at], axis, axis=1)
-    return bool(np.ptp(pulls, axis=0).max() < SAME_PULL * float(np.abs(gravity).max()))
+    alike = (np.ptp(values[at], axis=0).max() / np.abs(values).max() for values in (gravity, stream.channels["force"]))
+    return all(share < SAME_PULL for share in alike)
 
 
 def _gravity(recording: Recording) -> Array | None:
