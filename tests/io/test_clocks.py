@@ -38,3 +38,17 @@ def test_pauses_of_hours_are_no_leaps(hole: float) -> None:
 
 def test_a_table_of_few_poses_may_take_days() -> None:
     assert len(Clock.of(86400.0 * np.arange(8), "s", "t").stamps) == 8
+
+
+@pytest.mark.parametrize("tick", [0.0156, 0.02, 1.0])
+def test_many_rows_of_one_stamp_are_a_coarse_clock(tick: float) -> None:
+    stamps = np.floor(np.arange(0, 60, 0.002) / tick) * tick
+    assert len(Clock.of(stamps, "s", "log.toml, time").stamps) == 30_000
+
+
+def test_a_coarse_clock_that_was_set_is_named_by_the_distance_of_its_rows() -> None:
+    stamps = np.floor(EVEN / 0.02) * 0.02
+    with pytest.raises(
+        BadValue, match=r"jumps by 1\.7e\+09 s from row 3000 to row 3001, where rows are 0\.005 s apart"
+    ):
+        Clock.of(np.r_[stamps[:3000], 1.7e9 + stamps[3000:]], "s", "log.toml, time")

@@ -15,6 +15,7 @@ from steelyard.sanity.clipped_rows import without_clipped
 from steelyard.sanity.coverage import coverage, directions
 from steelyard.sanity.frozen_rows import without_frozen
 from steelyard.sanity.rows import examine_rows
+from steelyard.spatial import Rotation
 
 
 @pytest.fixture
@@ -167,3 +168,18 @@ def test_a_clipped_last_row_takes_its_neighbour_and_not_the_first() -> None:
     seen, (finding,) = without_clipped(with_force_x(stream, x))
     np.testing.assert_array_equal(seen.time, stream.time[:-21])
     assert finding.message == "Force x of 'a.csv' stops at 9 in 20 of 1000 rows; these rows were left out."
+
+
+@pytest.mark.parametrize("cut", [False, True])
+def test_poses_that_gravity_pulls_alike_are_not_clipped(cut: bool) -> None:
+    rng = np.random.default_rng(2)
+    down = Rotation.from_rpy([[np.pi, 0, yaw] for yaw in (0.0, 0.5, 1.0)]).matrix
+    others = Rotation.exp(rng.normal(size=(9, 3))).matrix
+    turns = np.concatenate([down, others])
+    force = np.round(np.swapaxes(turns, 1, 2) @ [0.0, 0.0, 12.0], 3)
+    if cut:
+        force[:, 2] = np.minimum(force[:, 2], np.sort(force[:, 2])[-4])
+    torque = np.round(np.cross([0.01, 0.02, 0.05], force), 4)
+    table = Stream("poses.csv", {"rotation": turns, "force": force, "torque": torque}, poses=True)
+    _, found = examine_rows(Recording((table,), np.array([0.0, 0.0, -9.81])))
+    assert [one.code for one in found] == ["channel-saturated"] * cut

@@ -66,6 +66,34 @@ def test_streams_need_not_begin_and_end_together(begin: int, end: int) -> None:
     assert "rows-missing" not in identify_team(with_gap(trial().log, begin, end)).codes()
 
 
+def of_rows(log: TeamLog, names: tuple[str, ...], rows: slice) -> TeamLog:
+    """Return the log with some rows only of some robots in the last recording."""
+    *others, motion = log.recordings
+    tracks = {name: track.rows(rows) if name in names else track for name, track in motion.tracks.items()}
+    return log.with_recordings(*others, replace(motion, tracks=tracks))
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_a_robot_that_ends_early_is_said(method: Method) -> None:
+    found = identify_team(of_rows(trial().log, ("robot1",), slice(0, 600)), method)
+    (said,) = [f for f in found.findings if f.code == "rows-missing"]
+    others = "of 'motion-5' that the others have, and nothing was used of them"
+    assert said.message == f"'robot1' lacks 9 of the 15 s {others}."
+
+
+def test_a_recording_of_one_robot_in_a_few_rows_is_said() -> None:
+    (said,) = _missing_rows(of_rows(trial().log, ("robot2",), slice(700, 708)))
+    assert said.message.startswith("'robot2' lacks 14.9 of the 15 s of 'motion-5' that")
+
+
+@pytest.mark.parametrize(
+    ("names", "rows"),
+    [(("robot1",), slice(0, 1300)), (("robot1",), slice(100, None)), (("robot0", "robot1"), slice(0, 600))],
+)
+def test_loggers_need_not_start_and_end_together(names: tuple[str, ...], rows: slice) -> None:
+    assert not list(_missing_rows(of_rows(trial().log, names, rows)))
+
+
 def without(log: TeamLog, number: int, name: str, *channels: str) -> TeamLog:
     """Return the log without one robot's channels in one recording, or without its track where none are named."""
     recordings = list(log.recordings)

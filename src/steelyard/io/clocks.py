@@ -75,7 +75,7 @@ class Clock:
             )
         if len(steps) > _FEW_STEPS:
             self._refuse_days()
-            step = float(np.median(steps)) / self.per_second or _CLOSEST
+            step = _usual_step(steps) / self.per_second
             require_likely_step(step, self.where)
             self._refuse_jumps(steps, step)
 
@@ -109,6 +109,15 @@ class Clock:
     def first_second(self) -> int:
         """The last whole second before the first stamp."""
         return int(self.stamps[0] // self.per_second)
+
+
+def _usual_step(steps: np.ndarray[Any, np.dtype[Any]]) -> float:
+    """Return how far rows are apart by steps (N-1,), not all zero: of a coarse clock, many rows share a stamp."""
+    usual = float(np.median(steps))
+    if usual > 0:
+        return usual
+    ticks = steps[steps > 0]
+    return float(np.median(ticks)) * len(ticks) / len(steps)
 
 
 def common_origin(clocks: Sequence[Clock]) -> int:

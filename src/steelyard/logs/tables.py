@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 
 import numpy as np
 
@@ -36,9 +37,10 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     merged = force if force is torque else Stream(force.name, {**force.channels, "torque": found["torque"][1]})
     wrench = Felt.of(merged, recording.wrench_sign).in_sensor(rotation)
     gravity = _gravity(recording, rotation, wrench)
+    dead = np.array(recording.dead)
     if all(s.poses for s in streams):
-        return MotionLog.of_poses(wrench, gravity), rotation, (), "none"
-    log = _log_of_rows(recording, wrench, gravity, rotation)
+        return replace(MotionLog.of_poses(wrench, gravity), dead=dead), rotation, (), "none"
+    log = replace(_log_of_rows(recording, wrench, gravity, rotation), dead=dead)
     names = ", ".join(f"'{s.name}'" for s in streams)
     given = [q for q in ("linear_acceleration", "angular_acceleration") if q in found]
     what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"

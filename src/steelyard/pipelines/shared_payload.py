@@ -25,6 +25,7 @@ from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
+from steelyard.team.clipped import without_clipped
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.misread.angle_units import require_one_angle_unit
@@ -38,6 +39,8 @@ METHODS: tuple[Method, ...] = get_args(Method)
 
 # Share of its rows from which on a robot is said to have lost some.
 ABSENT = 0.1
+# A robot is said to have begun late or ended early where that costs so much, and so long [s], of what all others have.
+SHORT, SHORT_S = 0.25, 1.0
 # Streams of one robot begin and end within this time [s].
 ENDS_S = 0.25
 # joint  every grasp, home and clock at once, then one fit of the ten parameters to still and moving rows together
@@ -59,8 +62,9 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_length_unit(log)
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
-    found = ESTIMATORS[method].identify(log)
-    before = (*stuck_forces(log), *_missing_rows(log), *_missing_wrenches(log, method))
+    whole, clipped = without_clipped(log)
+    found = ESTIMATORS[method].identify(whole)
+    before = (*stuck_forces(log), *clipped, *_missing_rows(log), *_missing_wrenches(log, method))
     found = replace(found, findings=(*before, *found.findings), notes=(*moving, *found.notes))
     return _weighed(_with_gravity(found, log))
 
@@ -88,9 +92,9 @@ def _missing_rows(log: TeamLog) -> Iterator[Finding]:
     """Yield a finding for every robot that misses rows, or numbers in some rows, of recordings."""
     for name in log.names:
         said = [
-            f"{words} of '{recording.name}'{channels}"
+            f"{words} of '{recording.name}'{which}"
             for recording in log.recordings
-            for words, channels in _missing(recording.tracks.get(name))
+            for words, which in (*_missing(recording.tracks.get(name)), *_short(recording, name))
         ]
         if said:
             yield Finding.of("rows-missing", f"'{name}' lacks {'; '.join(said)}.")
@@ -109,6 +113,18 @@ def _missing(track: Track | None) -> Iterator[tuple[str, str]]:
     absent = 1 - np.quantile(step, 0.6) / np.mean(step) if len(step) else 0.0
     if absent > ABSENT:
         yield f"about {100 * absent:.0f} % of the rows", ""
+
+
+def _short(recording: TeamRecording, name: str) -> Iterator[tuple[str, str]]:
+    """Yield how long a robot's track lacks of the time that all others cover: nothing is used there."""
+    others = [track.time for other, track in recording.tracks.items() if other != name]
+    if not others or name not in recording.tracks:
+        return
+    begin, end = recording.span
+    whole = float(min(time[-1] for time in others) - max(time[0] for time in others))
+    lost = whole - (end - begin)
+    if lost > max(SHORT_S, SHORT * whole):
+        yield f"{lost:.3g} of the {whole:.3g} s", " that the others have, and nothing was used of them"
 
 
 def _inside(track: Track, good: Mask) -> slice:

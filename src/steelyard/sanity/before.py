@@ -13,6 +13,7 @@ from steelyard.sanity.conventions import examine_conventions, examine_turns
 from steelyard.sanity.frozen_rows import dead_channels
 from steelyard.sanity.leaps import examine_sparse
 from steelyard.sanity.memory import examine_memory
+from steelyard.sanity.no_torque import without_zero_torque
 from steelyard.sanity.rows import examine_rows
 from steelyard.sanity.silent import without_silent
 from steelyard.sanity.units import examine_units
@@ -31,7 +32,7 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     recording = examine_sparse(recording)
     _require_rows(recording)
     read, recording = recording.findings, replace(recording, findings=())
-    recording, rows = examine_rows(recording)
+    recording, rows = examine_rows(without_zero_torque(recording))
     recording = replace(recording, dead=dead_channels(recording))
     recording, units = examine_units(recording)
     recording, offset = examine_offset(recording)

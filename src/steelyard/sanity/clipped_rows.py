@@ -6,11 +6,12 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.recording import Stream
-from steelyard.sanity.row_values import NOISE_SHARE, left_out, noise_shares
+from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, noise_shares, with_neighbours
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.row_values import left_out
 
-# A channel is clipped when its extreme value comes up this often and at least five times as often as its neighbours.
-CLIPPED_ROWS, CLIPPED_SHARE, CLIPPED_RATIO = 10, 0.003, 5
+# Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
+SAME_PULL = 1e-6
 _MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 
 
@@ -23,37 +24,12 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
         noisy = noise_shares(values) > NOISE_SHARE
         for axis in np.flatnonzero(noisy).tolist():
             for extreme in (values[:, axis].min(), values[:, axis].max()):
-                rows = _clipped_rows(values[:, axis], float(extreme))
+                rows = clipped_rows(values[:, axis], float(extreme))
                 if rows.any():
                     found.append((quantity, axis, float(extreme), int(rows.sum())))
                     clipped |= rows
-    rest, then = left_out(stream, _with_neighbours(clipped))
+    rest, then = left_out(stream, with_neighbours(clipped))
     return rest, tuple(_saturated(stream, *each, then) for each in found)
-
-
-def _with_neighbours(rows: Mask) -> Mask:
-    """Return the rows (N,) and those beside them, which are filtered by the same electronics."""
-    wide = rows.copy()
-    wide[1:] |= rows[:-1]
-    wide[:-1] |= rows[1:]
-    return wide
-
-
-def _clipped_rows(column: Array, extreme: float) -> Mask:
-    """Return rows (N,) at the extreme value, none unless it stands out from the values beside it."""
-    at = column == extreme
-    count, none = int(at.sum()), np.zeros(len(column), bool)
-    if count < max(CLIPPED_ROWS, CLIPPED_SHARE * len(column)):
-        return none
-    # Both ends of the range may be clipped; neither is compared with the other.
-    others, counts = np.unique(column[(column > column.min()) & (column < column.max())], return_counts=True)
-    if not len(others) or counts.max() * CLIPPED_RATIO > count:
-        return none
-    steps = np.abs(np.diff(column))
-    entering = steps[at[1:] != at[:-1]]
-    quantum = float(steps[steps > 0].min())
-    # A coarse channel at rest creeps into its plateau by one quantum; a clipped one runs into its stop.
-    return at if len(entering) and float(np.median(entering)) > 3 * quantum else none
 
 
 def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: int, then: str) -> Finding:
@@ -64,13 +40,34 @@ def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: i
     )
 
 
-def clipped_table(stream: Stream) -> list[Finding]:
-    """Return a finding for each wrench channel of a table whose extreme value comes again and no other does."""
+def clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
+    """Return a finding for each wrench channel of a table whose extreme value comes again and no other does.
+
+    gravity  (N, 3) in S; rows of which it asks the same value are no clipped ones. None where it is not known
+    """
     out = []
     for quantity in (q for q in ("force", "torque") if q in stream.channels and len(stream) >= 8):
         for axis, column in enumerate(stream.channels[quantity].T):
             values, counts = np.unique(column, return_counts=True)
             for end in (0, -1):
-                if len(values) > 4 and counts[end] >= 3 and np.delete(counts, end).max() == 1:
-                    out.append(_saturated(stream, quantity, axis, values[end], int(counts[end]), "check them"))
+                if len(values) > 4 and counts[end] >= 3 and counts[1:-1].max() == 1:
+                    at = column == values[end]
+                    if not _same_pull(stream, at, gravity):
+                        out.append(_saturated(stream, quantity, axis, values[end], int(at.sum()), "check them"))
     return out
+
+
+def _same_pull(stream: Stream, at: Mask, gravity: Array | None) -> bool:
+    """Tell whether rows `at` (N,) are repeats of one pose without noise: gravity (N, 3) and all forces agree."""
+    if gravity is None or "force" not in stream.channels:
+        return False
+    alike = (np.ptp(values[at], axis=0).max() / np.abs(values).max() for values in (gravity, stream.channels["force"]))
+    return all(share < SAME_PULL for share in alike)
+
+
+def known_gravity(recording: Recording) -> Array | None:
+    """Return gravity in S (N, 3) where rotations or a channel tell it in every row."""
+    found = {q: v for s in recording.streams for q, v in s.channels.items()}
+    if "rotation" in found and np.isfinite(found["rotation"]).all():
+        return np.asarray(np.swapaxes(found["rotation"], 1, 2) @ recording.gravity)
+    return found.get("gravity")

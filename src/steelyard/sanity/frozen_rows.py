@@ -6,9 +6,10 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.logs.clipping import NOISE_SHARE, noise_shares
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
-from steelyard.sanity.row_values import NOISE_SHARE, NOISY, columns_of, left_out, noise_shares, run_lengths
+from steelyard.sanity.row_values import NOISY, columns_of, left_out, run_lengths
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.

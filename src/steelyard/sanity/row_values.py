@@ -7,13 +7,10 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array, Mask
+from steelyard.logs.clipping import MOST_LEFT_OUT
 from steelyard.logs.recording import Stream
 from steelyard.logs.runs import runs
 
-# Measured channels carry noise of more than this share of their range; simulated ones without noise do not.
-NOISE_SHARE = 1e-5
-# What is left of a stream that loses more rows than this share is no fair sample: then none is left out.
-MOST_LEFT_OUT = 0.7
 NOISY = ("force", "torque", "specific_force")
 
 
@@ -36,12 +33,3 @@ def run_lengths(mask: Mask) -> np.ndarray[Any, np.dtype[np.int64]]:
     out = np.zeros(len(mask), np.int64)
     out[mask] = np.repeat(lengths, lengths)
     return out
-
-
-def noise_shares(values: Array) -> Array:
-    """Return the noise of each column over its range (D,), from third differences, in the median stretch."""
-    squares = np.diff(values, 3, axis=0) ** 2 / 20
-    if len(squares) < 4:
-        return np.zeros(values.shape[1])
-    blocks = np.array_split(squares, max(len(squares) // 50, 1))
-    return np.asarray(np.sqrt(np.median([b.mean(0) for b in blocks], 0)) / np.maximum(np.ptp(values, axis=0), 1e-300))

@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.clipped_rows import clipped_table, without_clipped
+from steelyard.sanity.clipped_rows import clipped_table, known_gravity, without_clipped
 from steelyard.sanity.frozen_rows import without_frozen
 from steelyard.sanity.repeated_rows import repeated_in_tables, without_repeats
 
@@ -22,7 +22,7 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     tables = all(s.time is None for s in recording.streams)
     if tables:
         recording, findings = repeated_in_tables(recording)
-        return recording, (*findings, *(f for s in recording.streams for f in clipped_table(s)))
+        return recording, (*findings, *(f for s in recording.streams for f in clipped_table(s, known_gravity(recording))))
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
