@@ -22,7 +22,8 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     tables = all(s.time is None for s in recording.streams)
     if tables:
         recording, findings = repeated_in_tables(recording)
-        return recording, (*findings, *(f for s in recording.streams for f in clipped_table(s, known_gravity(recording))))
+        gravity = known_gravity(recording)
+        return recording, (*findings, *(f for s in recording.streams for f in clipped_table(s, gravity)))
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
