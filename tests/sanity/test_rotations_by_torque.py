@@ -69,8 +69,26 @@ def test_torques_that_would_fit_badly_in_s_are_only_named() -> None:
     assert read.streams[0].frames == given.streams[0].frames
 
 
+def kuka(R: Rotation) -> Rotation:
+    """Return rotations whose yaw, pitch, roll are read as roll, pitch, yaw."""
+    return Rotation.from_rpy(R.rpy()[:, ::-1])
+
+
+def test_angles_in_the_order_of_kuka_are_put_right(made: Recording) -> None:
+    """Seen from other axes of the sensor, since a pitch of a quarter turn leaves roll and yaw open."""
+    askew = reread(made, lambda R: R @ Rotation.from_rpy([0.2, 0.3, 0.4]))
+    read, (found,) = examine(reread(askew, kuka))
+    assert found.code == "gravity-frame"
+    assert "as KUKA's A, B, C" in found.message
+    put, right = (log.streams[0].channels["rotation"] for log in (read, askew))
+    np.testing.assert_allclose(put, right, atol=1e-9)
+
+
 def test_readings_that_fit_alike_are_all_named_and_none_is_assumed(made: Recording) -> None:
-    wrong = reread(made, lambda R: Rotation.from_rpy(R.rpy()[:, ::-1]))
+    """Noise of a quarter of the torque hides which of two readings is the right one."""
+    rng = np.random.default_rng(0)
+    noisy = edited(made, torque=lambda t: t + 0.25 * t.std() * rng.normal(size=t.shape))
+    wrong = reread(noisy, kuka)
     read, (found,) = examine(wrong)
     assert found.code == "wrench-unexplained"
     assert "as KUKA's A, B, C" in found.message
