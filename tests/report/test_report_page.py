@@ -22,11 +22,12 @@ from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia.solids import box
 from steelyard.report import Report, Residuals, Truth, render, scene_of_solid, write_report
 from steelyard.report.markup import script_json, tag, text
-from steelyard.report.numbers import measured, spread
+from steelyard.report.numbers import measured
 from steelyard.report.scene import MOST_TRIANGLES
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
+from steelyard.tables.numbers import spread
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>\"'&<!-- ]]> ${title} $title \u202e\u2028\x00"
 VOID = {"meta", "link", "input", "br"}

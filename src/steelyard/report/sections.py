@@ -9,9 +9,10 @@ from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import fixed, general, inertia_unit, mass_unit, measured, places_of, principal
+from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, interval_signs, residual_plot
+from steelyard.tables.numbers import fixed, general, inertia_unit, mass_unit, places_of, principal
 from steelyard.team.estimate import TeamEstimate
 
 _ENTRIES = ("mass", "x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")
