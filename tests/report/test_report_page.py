@@ -277,6 +277,14 @@ def test_inertia_that_is_not_fixed_is_not_shown(full: Report, estimate: Estimate
     assert "Inertia ellipsoid" not in words
 
 
+def test_the_card_says_which_entries_of_the_inertia_are_fixed(full: Report, estimate: Estimate) -> None:
+    partly = replace(estimate, identified=np.array([True] * 7 + [False, True, False]))
+    words = Page(render(replace(full, estimate=partly, rivals={}))).words
+    assert "These data determine Ixx, Ixy, Ixz, Iyz (in the table), and not Iyy, Izz; see the findings." in words
+    assert "do not determine the inertia" not in words
+    assert words.count("not fixed by these data") == 2
+
+
 def test_the_sensor_frame_keeps_its_name(full: Report) -> None:
     words = Page(render(full)).words
     assert "In the sensor frame S; inertia about the centre of mass." in words
