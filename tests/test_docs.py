@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 from pathlib import Path
 
@@ -10,6 +11,8 @@ from click.testing import CliRunner
 
 from steelyard.cli.main import cli
 from steelyard.findings import AT_REST, REMEDIES, UNMEASURED, Finding
+from steelyard.io import write_team
+from steelyard.simulate.three_omnids import three_omnids
 
 ROOT = Path(__file__).parents[1]
 FAQ = (ROOT / "docs" / "findings.md").read_text()
@@ -62,3 +65,19 @@ def test_code_of_a_page_runs(page: str, tmp_path: Path, monkeypatch: pytest.Monk
     assert blocks
     for block in blocks:
         exec(block.replace("cloud.ply", "points.npz"), {})
+
+
+def test_code_of_the_python_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Its blocks are one story, in the folder of a tool with the files of a team."""
+    made = CliRunner().invoke(cli, ["workshop", "build", str(tmp_path), "--tools", "hammer", "--noise", "moderate"])
+    assert made.exit_code == 0, made.output
+    monkeypatch.chdir(tmp_path / "hammer")
+    gripper = {"mass_kg": 0.1, "com_m": [0, 0, 0], "inertia_com_kgm2": [[1e-4, 0, 0], [0, 1e-4, 0], [0, 0, 1e-4]]}
+    Path("gripper.json").write_text(json.dumps(gripper))
+    team = three_omnids(0)
+    write_team(team.log, Path("team.toml"), team.joints)
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "python.md").read_text(), re.MULTILINE | re.DOTALL)
+    names: dict[str, object] = {}
+    for block in blocks:
+        exec(block.replace("cloud.ply", "points.npz"), names)
+    assert {"recording", "again", "team"} <= names.keys()

@@ -35,7 +35,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "shape": {"inertia", "spatial"},
     "parts": {"shape", "inertia", "spatial"},
     "robots": {"spatial"},
-    "identify": {"parts.parts", "parts.material", "logs", "inertia", "spatial"},
+    "tables": {"identify.evidence", "inertia", "spatial"},
+    "identify": {"parts.parts", "parts.material", "logs", "tables", "inertia", "spatial"},
     "team": {"identify.estimate", "identify.evidence", "identify.regressor", "logs", "inertia", "spatial"},
     "sanity": {"identify", "logs", "inertia", "spatial"},
     "excite": {"robots", "identify", "logs"},
@@ -43,7 +44,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "simulate": UPPER,
     "evaluate": UPPER,
     "live": UPPER,
-    "report": UPPER | {"evaluate", "whole_files"},
+    "report": UPPER | {"evaluate", "tables", "whole_files"},
     "pipelines": UPPER | {"simulate", "evaluate", "sanity"},
     "io": {
         "spatial", "inertia", "logs.log", "logs.moments", "logs.recording", "logs.team_log", "logs.team_track",
@@ -52,7 +53,7 @@ MAY_IMPORT: dict[str, set[str]] = {
         "parts.known", "parts.hierarchy", "identify.estimate", "whole_files",
     },
 }  # fmt: skip
-MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live"}
+MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live", "tables"}
 MAY_IMPORT["bench"] = MAY_IMPORT["api"] | {"api", "threads"}
 MAY_IMPORT["cli"] = MAY_IMPORT["bench"] | {"bench", ""}
 MAY_IMPORT[""] = MAY_IMPORT["cli"] | {"cli"}  # the package itself: `import steelyard as sy`

@@ -17,11 +17,13 @@ __version__ = "0.1.0"
 _HOME = {
     "identify": "steelyard.api",
     "identify_team": "steelyard.api",
+    "recording": "steelyard.io.arrays",
     "read_recording": "steelyard.io",
     "read_team": "steelyard.io",
     "write_result": "steelyard.io",
     "read_result": "steelyard.io",
     "Recording": "steelyard.logs.recording",
+    "Stream": "steelyard.logs.recording",
     "MotionLog": "steelyard.logs.log",
     "Noise": "steelyard.logs.log",
     "TeamLog": "steelyard.logs.team_log",
@@ -64,10 +66,12 @@ if TYPE_CHECKING:
     from steelyard.io import read_result as read_result
     from steelyard.io import read_team as read_team
     from steelyard.io import write_result as write_result
+    from steelyard.io.arrays import recording as recording
     from steelyard.logs.log import MotionLog as MotionLog
     from steelyard.logs.log import Noise as Noise
     from steelyard.logs.moments import Moments as Moments
     from steelyard.logs.recording import Recording as Recording
+    from steelyard.logs.recording import Stream as Stream
     from steelyard.logs.team_log import TeamLog as TeamLog
     from steelyard.pipelines.options import Options as Options
     from steelyard.spatial import Acceleration as Acceleration

@@ -46,8 +46,9 @@ def identify(
 ) -> Estimate:
     """Return mass, centre of mass and inertia of what the robot holds, with covariance, evidence and findings.
 
-    log      a log description (.toml), a bare data file, a Recording, or a MotionLog made by the caller (which is
-             fitted as it is, without alignment and sanity checks; its object's frame is S unless pose_in_sensor says)
+    log      a log description (.toml), a bare data file, a Recording (of arrays: `sy.recording`), or a MotionLog made
+             by the caller (which is fitted as it is, without alignment and sanity checks; its object's frame is S
+             unless pose_in_sensor says)
     options  method, bias and prior size
     tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared
     parts    the object's homogeneous parts in its own frame; or a mesh (.ply) whose faces carry part numbers, or parts
@@ -73,6 +74,11 @@ def identify(
         seen, notes = _parts(parts) if scan is None else (shape_of(scan), ())
         where = () if place is None else (place.pose, place.std)
         return held_object.identify_rows(log, options, known, seen, *where).noted(*notes)
+    if not isinstance(log, str | Path | Recording):
+        raise BadValue(
+            f"log must be a path, a Recording or a MotionLog; got {type(log).__name__}. Arrays become one with "
+            "sy.recording(time=.., force=.., torque=.., rotation=.., ..)."
+        )
     recording = log if isinstance(log, Recording) else read_recording(log, data)
     if place is not None:
         recording = replace(recording, object_pose=place.pose, object_pose_std=place.std)

@@ -18,13 +18,13 @@ import numpy as np
 import pytest
 
 from steelyard.cli.main import VERBS, main
-from steelyard.cli.table import plus_minus
 from steelyard.inertia import InertialParameters
 from steelyard.io import read_result
 from steelyard.io.recording_files import write_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate import hammer
 from steelyard.spatial import Rotation
+from steelyard.tables.numbers import plus_minus
 
 ENTRY = Path(sys.executable).with_name("steelyard")
 BODY = hammer.body()

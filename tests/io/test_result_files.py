@@ -69,6 +69,17 @@ def test_inertia_is_null_where_the_data_do_not_fix_it(estimate: Estimate) -> Non
     assert result["inertia_com_kgm2"] is None
 
 
+def test_entries_that_are_identified_follow_from_the_result_though_the_inertia_is_null(estimate: Estimate) -> None:
+    result = result_dict(replace(estimate, identified=np.arange(10) < 9))
+    mass, com = result["mass_kg"], np.array(result["com_m"])
+    xx, xy, xz, yy, yz, zz = result["parameters"][4:]
+    about_origin = np.array([[xx, xy, xz], [xy, yy, yz], [xz, yz, zz]])
+    about_com = about_origin - mass * (com @ com * np.eye(3) - np.outer(com, com))
+    assert result["identified"]["inertia"] == [True] * 5 + [False]
+    np.testing.assert_allclose(about_com, estimate.parameters.inertia_com, rtol=1e-12, atol=1e-15)
+    assert np.all(np.array(result["std"]["inertia_com_kgm2"]) > 0)
+
+
 def test_round_trip(estimate: Estimate, tmp_path: Path) -> None:
     for identified in (np.ones(10, np.bool_), np.arange(10) < 4):
         write_result(replace(estimate, identified=identified), tmp_path / "r.json")

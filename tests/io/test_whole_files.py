@@ -85,8 +85,11 @@ def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
 
 def test_a_recording_with_a_quantity_that_cannot_be_written_leaves_nothing(tmp_path: Path) -> None:
     time = np.arange(3.0)
-    good, bad = Stream("a.csv", {"force": np.ones((3, 3))}, time), Stream("b.csv", {"heat": np.ones((3, 3))}, time)
-    with pytest.raises(BadFile, match=r"^b\.csv: cannot write heat"):
+    good, bad = (
+        Stream("a.csv", {"force": np.ones((3, 3))}, time),
+        Stream("b.csv", {"angular_velocity": np.ones((3, 3))}, time),
+    )
+    with pytest.raises(BadFile, match=r"^b\.csv: cannot write angular_velocity"):
         write_recording(Recording((good, bad), np.array([0, 0, -9.81])), tmp_path / "new")
     assert names(tmp_path) == []
 

@@ -22,11 +22,12 @@ from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia.solids import box
 from steelyard.report import Report, Residuals, Truth, render, scene_of_solid, write_report
 from steelyard.report.markup import script_json, tag, text
-from steelyard.report.numbers import measured, spread
+from steelyard.report.numbers import measured
 from steelyard.report.scene import MOST_TRIANGLES
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
+from steelyard.tables.numbers import spread
 
 HOSTILE = "</script><script>alert(1)</script><img src=x onerror=alert(1)>\"'&<!-- ]]> ${title} $title \u202e\u2028\x00"
 VOID = {"meta", "link", "input", "br"}
@@ -274,6 +275,14 @@ def test_inertia_that_is_not_fixed_is_not_shown(full: Report, estimate: Estimate
     assert "do not determine the inertia" in words
     assert words.count("not fixed by these data") == 6
     assert "Inertia ellipsoid" not in words
+
+
+def test_the_card_says_which_entries_of_the_inertia_are_fixed(full: Report, estimate: Estimate) -> None:
+    partly = replace(estimate, identified=np.array([True] * 7 + [False, True, False]))
+    words = Page(render(replace(full, estimate=partly, rivals={}))).words
+    assert "These data determine Ixx, Ixy, Ixz, Iyz (in the table), and not Iyy, Izz; see the findings." in words
+    assert "do not determine the inertia" not in words
+    assert words.count("not fixed by these data") == 2
 
 
 def test_the_sensor_frame_keeps_its_name(full: Report) -> None:

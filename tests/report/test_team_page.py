@@ -10,7 +10,6 @@ from functools import cache
 import numpy as np
 import pytest
 
-from steelyard.cli.team_table import team_table
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
@@ -22,6 +21,7 @@ from steelyard.report.team_scene import team_scene
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamScene
 from steelyard.spatial import Pose, Rotation
+from steelyard.tables.team import team_table
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 

@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from steelyard.check import Array
-from steelyard.cli.team_table import team_table
 from steelyard.errors import BadFile, BadValue, CannotAnswer
 from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters, forms
@@ -22,6 +21,7 @@ from steelyard.report.team_page import team_page
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
+from steelyard.tables.team import team_table
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge.bodies import FROM_TEN, least_mass
 from steelyard.team.hinge.rows import COUNT, EXCHANGED, SEVEN, about_z, equations

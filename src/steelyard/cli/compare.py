@@ -19,9 +19,9 @@ from steelyard.errors import BadValue
 @JSON
 def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
     """Say whether two results can be the same object, held the same way."""
-    from steelyard.cli.table import plus_minus
     from steelyard.identify import same
     from steelyard.io import read_result
+    from steelyard.tables.numbers import plus_minus
 
     a, b = read_result(first), read_result(second)
     if a.frame != b.frame and not any_grasp:

@@ -6,13 +6,16 @@ import json
 import shlex
 import sys
 from collections.abc import Callable, Sequence
-from functools import cache
+from functools import cache, partial
 from pathlib import Path
 from typing import Any
 
 import click
 
 from steelyard.errors import BadFile, BadValue
+from steelyard.tables.marks import Marks
+
+STYLED = Marks(partial(click.style, bold=True), partial(click.style, fg="yellow", bold=True))
 
 
 def command_line(*words: object) -> str:

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from steelyard.cli.console import command_line, print_json, require_output, say, say_if_compiling
+from steelyard.cli.console import STYLED, command_line, print_json, require_output, say, say_if_compiling
 from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
@@ -58,7 +58,6 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     """Scan a made hammer, cut the scan into parts, identify it from a made log, and compare with the truth."""
     say_if_compiling()
     from steelyard import api
-    from steelyard.cli.table import estimate_table
     from steelyard.cli.versus import summary, versus_table
     from steelyard.io import read_recording, result_dict, write_result
     from steelyard.io.cloud_files import write_cloud
@@ -68,6 +67,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     from steelyard.report import write_report
     from steelyard.shape.scan import fuse
     from steelyard.simulate import hammer
+    from steelyard.tables.estimate import estimate_table
 
     seen = hammer.scanned(seed)
     scan = fuse(seen.views)
@@ -93,7 +93,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
         print_json(result_dict(best) | extra | others)
         return
     title = f"A hammer, scanned from {len(seen.views)} views and turned slowly, made data (seed {seed})"
-    click.echo(estimate_table(best, title, seen.truth.people, _names(best, shape, seen)))
+    click.echo(estimate_table(best, title, seen.truth.people, _names(best, shape, seen), STYLED))
     click.echo("\n" + click.style("The same log in four ways", bold=True) + "\n" + versus_table(answers, seen.truth))
     say(f"The page with the parts in 3D: {output}")
     _say_what_is_kept(keep, log, views)

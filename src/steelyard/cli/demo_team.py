@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import command_line, print_json, say, say_if_compiling
+from steelyard.cli.console import STYLED, command_line, print_json, say, say_if_compiling
 
 if TYPE_CHECKING:
     from steelyard.logs.team_log import TeamLog
@@ -23,11 +23,11 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
     """Make a team's files, read them back, answer in two ways and compare with the truth."""
     say_if_compiling()
     from steelyard import api
-    from steelyard.cli.team_table import Known, team_table
     from steelyard.cli.versus import summary, versus_table
     from steelyard.io import read_team, result_dict, write_result, write_team
     from steelyard.report import write_report
     from steelyard.simulate.three_omnids import three_omnids, told
+    from steelyard.tables.team import Known, team_table
 
     made = three_omnids(seed)
     with tempfile.TemporaryDirectory() as scratch:
@@ -43,7 +43,9 @@ def demo_team(seed: int, output: Path, keep: Path | None, as_json: bool) -> None
         print_json(result_dict(best) | extra | {"paper": summary(paper, truth) | {"errors": _errors(paper, made)}})
         return
     known = Known(truth.people, made.grasps, made.late_s)
-    click.echo(team_table(best, f"Three Omnids with one payload, one clock 13 ms late; made data (seed {seed})", known))
+    click.echo(
+        team_table(best, f"Three Omnids with one payload, one clock 13 ms late; made data (seed {seed})", known, STYLED)
+    )
     click.echo("\n" + click.style("The same files in two ways", bold=True))
     click.echo(versus_table({"joint": best, "paper": paper}, truth))
     for name, found in (("joint", best), ("paper", paper)):

@@ -8,7 +8,7 @@ from typing import Any, cast
 
 import click
 
-from steelyard.cli.console import print_json, require_output, say, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, require_output, say, say_if_compiling
 from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 from steelyard.errors import BadValue
 
@@ -78,10 +78,10 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     require_output(output, "a result", [".json"], log, tool, parts, scan, place)
     say_if_compiling()
     from steelyard import api
-    from steelyard.cli.table import estimate_table
     from steelyard.io import read_pendant, result_dict, write_result
     from steelyard.parts.material import materials_of
     from steelyard.pipelines.options import Options
+    from steelyard.tables.estimate import estimate_table
 
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
     given = {"tool": tool, "parts": parts, "scan": scan, "pose_in_sensor": pose_in_sensor, "data": data}
@@ -92,7 +92,8 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     if as_json:
         print_json(result_dict(estimate))
     else:
-        click.echo(estimate_table(estimate, f"{log or 'pendant'}: what the robot holds, in the sensor frame"))
+        title = f"{log or 'pendant'}: what the robot holds, in the sensor frame"
+        click.echo(estimate_table(estimate, title, marks=STYLED))
 
 
 def _typed() -> list[str]:

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, progress_bar, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, progress_bar, require_output, say_if_compiling
 from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
@@ -66,7 +66,7 @@ def _plain(fused: Scan, output: Path | None, seconds: float) -> dict[str, Any]:
 
 
 def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str:
-    from steelyard.cli.table import finding_lines
+    from steelyard.tables.estimate import finding_lines
 
     cloud, n = fused.cloud, fused.table.normal
     size = " x ".join(f"{1e3 * length:.0f}" for length in cloud.xyz.max(0) - cloud.xyz.min(0))
@@ -86,4 +86,4 @@ def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str
     lines = [f"{views}: the object on the table", ""] + [f"  {name:12s} {text}" for name, text in rows]
     if output is not None:
         lines += ["", f"Cloud written to {output}."]
-    return "\n".join([*lines, "", *finding_lines(fused.findings)])
+    return "\n".join([*lines, "", *finding_lines(fused.findings, STYLED)])

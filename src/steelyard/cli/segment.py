@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import print_json, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling
 from steelyard.cli.options import HELP, JSON
 from steelyard.findings import counted
 
@@ -68,7 +68,7 @@ def _plain(shape: Shape, output: Path | None) -> dict[str, Any]:
 
 
 def _table(shape: Shape, scan: Path, output: Path | None) -> str:
-    from steelyard.cli.table import finding_lines
+    from steelyard.tables.estimate import finding_lines
 
     made, parts, volume = shape.segmentation, shape.parts, shape.solid.mesh.volume
     count = counted(len(made), "part")
@@ -92,4 +92,4 @@ def _table(shape: Shape, scan: Path, output: Path | None) -> str:
         lines += ["", *(f"  note   {note}" for note in shape.notes)]
     if output is not None:
         lines += ["", f"Parts written to {output}. Look at them: steelyard report RESULT --parts {output}"]
-    return "\n".join([*lines, "", *finding_lines(shape.findings)])
+    return "\n".join([*lines, "", *finding_lines(shape.findings, STYLED)])

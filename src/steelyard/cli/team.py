@@ -6,7 +6,7 @@ from pathlib import Path
 
 import click
 
-from steelyard.cli.console import print_json, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, print_json, require_output, say_if_compiling
 from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
 
 METHODS = ("joint", "paper")
@@ -26,8 +26,8 @@ def team(team: Path, data: Path | None, method: str, output: Path | None, as_jso
     require_output(output, "a result", [".json"], team)
     say_if_compiling()
     from steelyard import api
-    from steelyard.cli.team_table import team_table
     from steelyard.io import result_dict, write_result
+    from steelyard.tables.team import team_table
 
     estimate = api.identify_team(team, method, data=data)  # type: ignore[arg-type]
     if output is not None:
@@ -35,4 +35,5 @@ def team(team: Path, data: Path | None, method: str, output: Path | None, as_jso
     if as_json:
         print_json(result_dict(estimate))
     else:
-        click.echo(team_table(estimate, f"{team}: what the team carries, in the grasp frame of {estimate.reference}"))
+        title = f"{team}: what the team carries, in the grasp frame of {estimate.reference}"
+        click.echo(team_table(estimate, title, marks=STYLED))

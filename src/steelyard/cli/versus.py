@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.cli.table import columns
 from steelyard.findings import about
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
-from steelyard.report.numbers import LARGE_INERTIA
+from steelyard.tables.estimate import columns
+from steelyard.tables.numbers import LARGE_INERTIA
 
 _GROUPS = (("mass", slice(0, 1), 1e3, "g"), ("CoM", slice(1, 4), 1e3, "mm"), ("inertia", slice(4, 10), 1e6, "kg mm²"))
 _UNITS = {"mass": "mass_kg", "CoM": "com_m", "inertia": "inertia_com_kgm2"}

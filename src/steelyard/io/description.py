@@ -97,7 +97,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
         streams=streams,
         gravity=gravity,
         wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
-        noise=_noise(top.section("noise")),
+        noise=parse_noise(top.section("noise")),
         tool=log.text("tool"),
         placed=placed,
         arm=arm,
@@ -120,7 +120,8 @@ def _short(values: Array) -> str:
     return f"[{', '.join(f'{v:g}' for v in values)}]"
 
 
-def _noise(entry: Entry) -> dict[str, float]:
+def parse_noise(entry: Entry) -> dict[str, float]:
+    """Return the standard deviations that `entry` gives, SI; raises BadDescription."""
     entry.only(*NOISE)
     return {key: entry.positive(key, _LOUDEST) for key in NOISE if key in entry}
 

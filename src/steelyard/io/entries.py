@@ -87,6 +87,13 @@ class Entry:
             raise self.error(f'unknown {key} "{value}".{near} Possible here: {listed(choices)}.')
         return str(value)
 
+    def flag(self, key: str) -> bool:
+        """Return true or false, false where it is left out."""
+        value = self.values.get(key, False)
+        if not isinstance(value, bool):
+            raise self.error(f'"{key}" must be true or false; got {value!r}.')
+        return value
+
     def number(self, key: str) -> float:
         """Return one finite number."""
         value: Any = self.values.get(key)

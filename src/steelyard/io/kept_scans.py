@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile
+from steelyard.errors import BadFile, BadValue
 from steelyard.findings import REMEDIES, Finding
 from steelyard.io.in_file import in_file
 from steelyard.shape.known_space import Kept, KeptSpace
@@ -43,7 +43,7 @@ def kept_of(path: Path, said: Any, fifths: Any) -> Kept | None:
         numbers = {name: float(values[name]) for name in _NUMBERS}
         shift, turn = map(float, values["place_std"])
         findings = tuple(_finding(each) for each in values["findings"])
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, KeyError, RecursionError, BadValue) as error:
         raise BadFile(
             f'{path}: "{SCAN}" is not what `steelyard scan` writes ({error!r}). Scan the object again.'
         ) from None
@@ -54,5 +54,5 @@ def _finding(said: Any) -> Finding:
     code, message, remedy = (said[name] for name in ("code", "message", "remedy"))
     texts = (message, remedy)
     if code not in REMEDIES or not all(isinstance(t, str) and t.isprintable() and len(t) < _LONGEST for t in texts):
-        raise KeyError(str(code)[:80])
+        raise BadValue(f'no finding of ours: "{str(code)[:80]}"')
     return Finding(code, message, remedy)

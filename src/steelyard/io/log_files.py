@@ -45,7 +45,7 @@ def _read(path: Path, data: Path | None) -> Recording:
         joined = [table] * len(description.streams)
         own = [cells] if len(joined) == 1 else read_cells(description.streams, joined)
         rows = own_rows(description.streams, joined, own)
-        return replace(_recording(description, joined, rows, path), described=False)
+        return replace(recording_of(description, joined, rows, path.name), name=path.stem, described=False)
     description = read_description(path)
     tables = open_tables(description.streams, path.parent, data)
     arm = None if description.arm is None else arm_of(description.arm, path, data)
@@ -53,33 +53,36 @@ def _read(path: Path, data: Path | None) -> Recording:
         streams = [with_joints_in_order(*each, arm) for each in zip(description.streams, tables, strict=True)]
         description = replace(description, streams=tuple(streams))
     rows = own_rows(description.streams, tables, read_cells(description.streams, tables))
-    return _recording(description, tables, rows, path, data, arm)
+    recording = recording_of(description, tables, rows, path.name, arm)
+    tool = description.tool
+    tool = None if tool is None else str(find_file(tool, path.parent, data, f"{path.name}, [log], tool"))
+    return replace(recording, name=path.stem, tool=tool)
 
 
-def _recording(
+def recording_of(
     description: Description,
     tables: Sequence[Table],
     cells: Sequence[Cells],
-    path: Path,
-    data: Path | None = None,
+    name: str,
     arm: SerialArm | None = None,
 ) -> Recording:
-    require_answerable(description.streams, path.name)
-    streams, findings = _streams(description, tables, cells, path.name)
+    """Return the recording that a description makes of its tables, checked, without the tool that it names.
+
+    Raises BadDescription or BadValue; `name` stands in messages.
+    """
+    require_answerable(description.streams, name)
+    streams, findings = _streams(description, tables, cells, name)
     if arm is not None:
         streams = tuple(posed(*each, arm) for each in zip(description.streams, streams, strict=True))
-    tool = description.tool
-    tool = None if tool is None else str(find_file(tool, path.parent, data, f"{path.name}, [log], tool"))
     placed = description.placed
     return Recording(
         streams,
         gravity=check.frozen(description.gravity),
         wrench_sign=description.wrench_sign,
         noise=description.noise,
-        tool=tool,
         object_pose=None if placed is None else placed.pose,
         object_pose_std=None if placed is None else placed.std,
-        name=path.stem,
+        name=name,
         findings=findings,
         notes=description.notes,
         gravity_std=description.gravity_std,

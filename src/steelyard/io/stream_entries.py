@@ -26,11 +26,11 @@ FRAMED = (
 )
 
 # [s] between clocks with different origins; [m] from S to anything that is fixed to it.
-_LONGEST_DELAY, _FURTHEST = 1e10, 10.0
+LONGEST_DELAY, _FURTHEST = 1e10, 10.0
 _JOINT = ("joint_position", "joint_torque")
 # What a robot of a team may tell beside QUANTITIES: the joints of an Omnid, and whether it holds the payload.
 ROBOT: dict[str, int] = {"joint_position": 6, "joint_torque": 3, "carrying": 1}
-_MOUNTED = {"force", "torque", "specific_force"}  # what is read in the stream's own frame
+MOUNTED = {"force", "torque", "specific_force"}  # what is read in the stream's own frame
 _KEYS = ("path", "topic", "frames", "kind", "time", "delay", "mount", *QUANTITIES)
 
 
@@ -233,14 +233,14 @@ def _delay(stream: Entry) -> float | None:
     entry = stream.table("delay")
     entry.only("value", "unit")
     value = entry.number("value") / TIME[entry.choice("unit", list(TIME), "s")]
-    return entry.bounded("value", value, _LONGEST_DELAY)
+    return entry.bounded("value", value, LONGEST_DELAY)
 
 
 def _mount(stream: Entry, names: set[str]) -> Mount | None:
     if "mount" not in stream:
         return None
     entry = stream.table("mount")
-    if not names & _MOUNTED:
+    if not names & MOUNTED:
         raise entry.error(
             "of use beside force, torque or specific_force only; this stream has none of them. If its poses are those "
             "of another frame, call that frame S: then the mount of the wrench's stream is the sensor's pose in it."

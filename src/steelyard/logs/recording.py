@@ -5,10 +5,16 @@ Streams keep their own clocks and frames; units are SI.
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
+from functools import cached_property
+from typing import Any
 
+import numpy as np
+
+from steelyard import check
 from steelyard.check import Array, Mask, frozen
+from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.spatial import Pose, Rotation
 
@@ -34,6 +40,10 @@ QUANTITIES: dict[str, int] = {
     "specific_force": 3,
     "gravity": 3,
 }
+
+# What a robot of a team may tell beside QUANTITIES: joints, and whether it holds the payload.
+_OF_ROBOTS = ("joint_position", "joint_torque", "carrying")
+_REMEDY = "sy.recording(time=.., force=.., ..) makes recordings of arrays, lists and rotations."
 
 
 @dataclass(frozen=True)
@@ -71,6 +81,33 @@ class Stream:
     poses: bool = False
     said: str = "s"
     moved: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise BadValue at a quantity, frame or shape that is none; numbers become read-only float64."""
+        if not isinstance(self.channels, Mapping) or not self.channels:
+            raise BadValue(f"{self.name}: channels must be a dict of quantity and array. {_REMEDY}")
+        channels = {quantity: _channel(self.name, quantity, values) for quantity, values in self.channels.items()}
+        object.__setattr__(self, "channels", channels)
+        rows = {quantity: len(values) for quantity, values in channels.items()}
+        if self.time is not None:
+            time = _numbers(f"{self.name}, time", self.time)
+            if time.ndim != 1:
+                raise BadValue(f"{self.name}, time: expected shape (N,) [s]; found {time.shape}. {_REMEDY}")
+            object.__setattr__(self, "time", time)
+            rows["time"] = len(time)
+        if len(set(rows.values())) > 1:
+            shown = ", ".join(f"{name} {count}" for name, count in rows.items())
+            raise BadValue(f"{self.name}: the lengths differ: {shown} rows. Each quantity needs one row per sample.")
+        for quantity, frame in self.frames.items():
+            if frame not in ("S", "W"):
+                raise BadValue(f'{self.name}: the frame of {quantity} must be "S" or "W"; got {frame!r}.')
+
+    @cached_property
+    def finite(self) -> bool:
+        """Whether every row holds numbers; a sum that is one shows at once that all do."""
+        columns = [*self.channels.values(), *(() if self.time is None else (self.time,))]
+        with np.errstate(over="ignore", invalid="ignore"):
+            return all(np.isfinite(column.sum()) or bool(np.isfinite(column).all()) for column in columns)
 
     def __len__(self) -> int:
         return len(next(iter(self.channels.values())))
@@ -121,3 +158,41 @@ class Recording:
     notes: tuple[str, ...] = ()
     described: bool = True
     gravity_std: float = 0.0
+
+    def __post_init__(self) -> None:
+        """Raise BadValue where what is given is no recording, or rows miss a number."""
+        streams = self.streams
+        if not isinstance(streams, Sequence) or not streams or not all(isinstance(s, Stream) for s in streams):
+            raise BadValue(f"a Recording takes a tuple of Streams; got {type(streams).__name__}. {_REMEDY}")
+        object.__setattr__(self, "streams", tuple(streams))
+        gravity = check.vectors("gravity", self.gravity)
+        if gravity.shape != (3,):
+            raise BadValue(f"gravity must be one vector (3,) [m/s^2] in W; got shape {gravity.shape}.")
+        object.__setattr__(self, "gravity", gravity)
+        if self.wrench_sign not in (1, -1):
+            raise BadValue(f"wrench_sign must be 1 (on-object) or -1 (on-sensor); got {self.wrench_sign!r}.")
+        for stream in streams:
+            if not stream.finite:
+                raise BadValue(f"{stream.name}: rows miss numbers (NaN, infinity); sy.recording leaves such rows out.")
+
+
+def _channel(name: str, quantity: str, values: Any) -> Array:
+    """Return the rows of a quantity as read-only float64; raises BadValue."""
+    if quantity not in QUANTITIES and quantity not in _OF_ROBOTS:
+        raise BadValue(f'{name}: unknown quantity "{quantity}"; there are {", ".join(QUANTITIES)}.')
+    array = _numbers(f"{name}, {quantity}", values)
+    shape = (3, 3) if quantity == "rotation" else (3,) if quantity in QUANTITIES else array.shape[1:2]
+    if array.ndim != 1 + len(shape) or array.shape[1:] != shape:
+        wanted = ", ".join(map(str, shape))
+        raise BadValue(f"{name}, {quantity}: expected shape (N, {wanted}); found {array.shape}. {_REMEDY}")
+    return array
+
+
+def _numbers(where: str, values: Any) -> Array:
+    """Return numbers as read-only float64, as they are where they are that already."""
+    if isinstance(values, np.ndarray) and values.dtype == np.float64 and not values.flags.writeable:
+        return values
+    try:
+        return check.frozen(values)
+    except (TypeError, ValueError):
+        raise BadValue(f"{where}: expected an array of numbers; got {type(values).__name__}. {_REMEDY}") from None

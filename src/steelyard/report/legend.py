@@ -9,11 +9,12 @@ from steelyard.identify.estimate import PartMass
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import fixed, general, mass_unit, measured, places_of
+from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal, scale_stops
 from steelyard.report.plots import share_bar
 from steelyard.report.projection import picture
 from steelyard.report.scene import Scene
+from steelyard.tables.numbers import fixed, general, mass_unit, places_of
 from steelyard.team.estimate import TeamEstimate
 
 MOST_PARTS = 200

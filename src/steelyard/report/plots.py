@@ -12,8 +12,8 @@ from steelyard.check import Array
 from steelyard.logs.runs import runs
 from steelyard.report.contents import Residuals
 from steelyard.report.markup import Html, tag
-from steelyard.report.numbers import general, round_step
 from steelyard.shape.mesh import Integers
+from steelyard.tables.numbers import general, round_step
 
 COLUMNS = 420
 RUN = 6

@@ -9,9 +9,10 @@ from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import fixed, general, inertia_unit, mass_unit, measured, places_of, principal
+from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, interval_signs, residual_plot
+from steelyard.tables.numbers import fixed, general, inertia_unit, mass_unit, places_of, principal
 from steelyard.team.estimate import TeamEstimate
 
 _ENTRIES = ("mass", "x", "y", "z", "xx", "xy", "xz", "yy", "yz", "zz")
@@ -84,11 +85,7 @@ def _moments_card(report: Report) -> Html:
     """Return the principal moments, or that the data do not fix them."""
     seen, truth = report.estimate, report.truth
     if seen.inertia_com is None or not seen.mass > 0:
-        return _card(
-            "Principal inertia",
-            tag("p", "not fixed", class_="big quiet"),
-            tag("p", "These data do not determine the inertia; see the findings.", class_="aside"),
-        )
+        return _open_card(seen)
     moments, std, _ = principal(seen)
     true = None if truth is None else truth.body.principal()[0]
     factor, unit = inertia_unit(float(moments.max()))
@@ -97,6 +94,22 @@ def _moments_card(report: Report) -> Html:
         for k in range(3)
     ]
     return _card("Principal inertia", tag("dl", *rows), tag("p", "about the centre of mass", class_="aside"))
+
+
+def _open_card(seen: Estimate) -> Html:
+    """Return that the data do not fix the principal moments, and which entries of the inertia they do fix."""
+    known = [bool(fixed) and seen.mass > 0 for fixed in seen.identified[4:]]
+    told, missing = (
+        ", ".join(f"I{entry}" for entry, fixed in zip(_ENTRIES[4:], known, strict=True) if fixed is which)
+        for which in (True, False)
+    )
+    state, said = "not fixed", "These data do not determine the inertia; see the findings."
+    if told:
+        state, said = (
+            "partly fixed",
+            f"These data determine {told} (in the table), and not {missing}; see the findings.",
+        )
+    return _card("Principal inertia", tag("p", state, class_="big quiet"), tag("p", said, class_="aside"))
 
 
 def _card(title: str, *children: object) -> Html:

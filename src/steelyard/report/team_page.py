@@ -9,10 +9,10 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.report.contents import Report, Truth
 from steelyard.report.drawing import PAYLOAD
-from steelyard.report.numbers import fixed, general
 from steelyard.report.team_residuals import team_residuals
 from steelyard.report.team_scene import labels_of, team_scene
 from steelyard.spatial import Pose
+from steelyard.tables.numbers import fixed, general
 from steelyard.team.estimate import TeamEstimate
 
 

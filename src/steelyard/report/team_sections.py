@@ -7,10 +7,11 @@ import numpy as np
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import decimals, fixed, general, measured, rpy_deg
+from steelyard.report.numbers import measured
 from steelyard.report.palette import hexadecimal
 from steelyard.report.sections import section, table
 from steelyard.spatial import Pose
+from steelyard.tables.numbers import decimals, fixed, general, rpy_deg
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 

@@ -4,34 +4,23 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-import click
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Estimate
-from steelyard.report.numbers import LARGE_INERTIA, fixed, places_of, spread
+from steelyard.tables.marks import PLAIN, Marks
+from steelyard.tables.numbers import LARGE_INERTIA, places_of, plain, plus_minus, spread
+from steelyard.tables.shown import Weighed
 
 INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
-def plus_minus(value: float, std: float, unit: str) -> str:
-    """Return 'value ± std unit' with two figures of the standard deviation."""
-    if not np.isfinite(std):
-        return f"{value:.4g} ± ? {unit}"
-    return _plain(f"{fixed(value, places_of(value, std))} ± {spread(std)} {unit}")
-
-
-def _plain(text: str) -> str:
-    """Return a text with the minus of keyboards: what a terminal shows is searched and pasted."""
-    return text.replace("−", "-")
-
-
 def estimate_table(
-    estimate: Estimate,
+    estimate: Weighed,
     title: str,
     truth: Array | None = None,
     parts_truth: Mapping[int, tuple[str, float]] | None = None,
+    marks: Marks = PLAIN,
 ) -> str:
     """Return the table: what is held with ±, sensor bias, evidence, findings with remedies.
 
@@ -39,19 +28,19 @@ def estimate_table(
     where they are known.
     """
     blocks = [
-        click.style(title, bold=True),
+        marks.title(title),
         columns(_body_rows(estimate, truth)),
         *_inertia_note(estimate),
         *_part_lines(estimate, parts_truth or {}),
         "",
         *_evidence_lines(estimate),
         "",
-        *finding_lines(estimate.findings),
+        *finding_lines(estimate.findings, marks),
     ]
     return "\n".join(blocks)
 
 
-def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, str]]:
+def _body_rows(estimate: Weighed, truth: Array | None) -> list[tuple[str, str, str]]:
     """Return the rows name, value ± std, and truth."""
     values = estimate.parameters.people
     names = ["mass", "com x", "com y", "com z", *INERTIA]
@@ -68,7 +57,7 @@ def _body_rows(estimate: Estimate, truth: Array | None) -> list[tuple[str, str, 
         if truth is not None:
             beside = f"truth {truth[k] * scales[k]:.{places_of(value, std)}f}"
         elif jackknife is not None:
-            beside = _plain(f"leave-one-out ± {spread(float(jackknife[k] * scales[k]))}")
+            beside = plain(f"leave-one-out ± {spread(float(jackknife[k] * scales[k]))}")
         rows.append((name, plus_minus(value, std, units[k]), beside))
     return rows
 
@@ -79,7 +68,7 @@ def columns(rows: Sequence[tuple[str, ...]]) -> str:
     return "\n".join("  " + "   ".join(c.ljust(w) for c, w in zip(row, widths, strict=True)).rstrip() for row in rows)
 
 
-def _inertia_note(estimate: Estimate) -> list[str]:
+def _inertia_note(estimate: Weighed) -> list[str]:
     """Return which entries of the inertia are not told, if any."""
     weak = [name for name, known in zip(INERTIA, estimate.identified[4:], strict=True) if not known]
     if not weak:
@@ -87,7 +76,7 @@ def _inertia_note(estimate: Estimate) -> list[str]:
     return [f"  {'inertia' if len(weak) == len(INERTIA) else ', '.join(weak)}    not identified by these data"]
 
 
-def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> list[str]:
+def _part_lines(estimate: Weighed, truth: Mapping[int, tuple[str, float]]) -> list[str]:
     """Return the parts with their masses and densities, and where it is known the truth."""
     if not estimate.parts:
         return []
@@ -107,7 +96,7 @@ def _part_lines(estimate: Estimate, truth: Mapping[int, tuple[str, float]]) -> l
     return ["", columns(rows)]
 
 
-def _evidence_lines(estimate: Estimate) -> list[str]:
+def _evidence_lines(estimate: Weighed) -> list[str]:
     """Return bias, residuals, hold-out and method in a few lines."""
     seen = estimate.evidence
     torque, force = np.split(estimate.wrench_bias, 2)
@@ -140,12 +129,12 @@ def _vector(values: Array) -> str:
     return "(" + ", ".join(f"{v:.4g}" for v in values) + ")"
 
 
-def finding_lines(findings: Sequence[Finding]) -> list[str]:
+def finding_lines(findings: Sequence[Finding], marks: Marks = PLAIN) -> list[str]:
     """Return the findings, each with its remedy."""
     if not findings:
         return ["  no findings"]
     lines = []
     for finding in findings:
-        lines.append(f"  {click.style(finding.code, fg='yellow', bold=True)}: {finding.message}")
+        lines.append(f"  {marks.code(finding.code)}: {finding.message}")
         lines.append(f"      -> {finding.remedy}")
     return lines

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-import click
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.cli.table import columns, estimate_table, plus_minus
-from steelyard.report.numbers import decimals, general, principal, rpy_deg
 from steelyard.spatial import Pose
-from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.tables.estimate import columns, estimate_table
+from steelyard.tables.marks import PLAIN, Marks
+from steelyard.tables.numbers import decimals, general, plus_minus, principal, rpy_deg
+from steelyard.tables.shown import Carried
 
 
 @dataclass(frozen=True, eq=False)
@@ -23,15 +24,21 @@ class Known:
     late_s: dict[str, float]
 
 
-def team_table(estimate: TeamEstimate, title: str, known: Known | None = None) -> str:
+def team_table(estimate: Carried, title: str, known: Known | None = None, marks: Marks = PLAIN) -> str:
     """Return the table: the payload with ±, where every robot holds it, clocks, evidence, findings with remedies."""
-    whole = estimate_table(estimate, title, None if known is None else known.people)
+    whole = estimate_table(estimate, title, None if known is None else known.people, marks=marks)
     head, gap, rest = whole.partition("\n\n")
-    blocks = [head, *_principal_lines(estimate), *_hinge_lines(estimate), "", *_grasp_lines(estimate, known)]
+    blocks = [
+        head,
+        *_principal_lines(estimate),
+        *_hinge_lines(estimate, marks),
+        "",
+        *_grasp_lines(estimate, known, marks),
+    ]
     return "\n".join(blocks) + gap + rest
 
 
-def _principal_lines(estimate: TeamEstimate) -> list[str]:
+def _principal_lines(estimate: Carried) -> list[str]:
     """Return the principal moments."""
     if estimate.inertia_com is None:
         return []
@@ -40,7 +47,7 @@ def _principal_lines(estimate: TeamEstimate) -> list[str]:
     return ["", "  principal moments of inertia", columns([(f"  {name}", said) for name, said in rows])]
 
 
-def _hinge_lines(estimate: TeamEstimate) -> list[str]:
+def _hinge_lines(estimate: Carried, marks: Marks) -> list[str]:
     """Return what is known of each of two bodies with a hinge between them."""
     if estimate.hinge is None:
         return []
@@ -56,14 +63,14 @@ def _hinge_lines(estimate: TeamEstimate) -> list[str]:
                 f"{general(low)} and {general(high)} kg" if np.isfinite(low) else "not shown",
             )
         )
-    return ["", click.style("  two bodies with a hinge", bold=True), columns(rows)]
+    return ["", marks.title("  two bodies with a hinge"), columns(rows)]
 
 
 def _or_open(value: float, std: float, unit: str) -> str:
     return plus_minus(value, std, unit) if np.isfinite(value) else "not shown"
 
 
-def _grasp_lines(estimate: TeamEstimate, known: Known | None) -> list[str]:
+def _grasp_lines(estimate: Carried, known: Known | None, marks: Marks) -> list[str]:
     """Return one row per robot: place and rotation of its grasp in the reference's, and how late its clock is."""
     heads = ["", "x", "y", "z", "roll, pitch, yaw", "clock late by"]
     if known is not None:
@@ -78,10 +85,10 @@ def _grasp_lines(estimate: TeamEstimate, known: Known | None) -> list[str]:
     if not estimate.clock_offsets_s:
         place = heads.index("clock late by")
         rows = [row[:place] + row[place + 1 :] for row in rows]
-    return [click.style("  grasps, from the reference", bold=True), columns(rows)]
+    return [marks.title("  grasps, from the reference"), columns(rows)]
 
 
-def _pose_cells(grasp: GraspEstimate) -> list[str]:
+def _pose_cells(grasp: Any) -> list[str]:
     place = [plus_minus(1e3 * p, 1e3 * s, "mm") for p, s in zip(grasp.pose.position, grasp.std_m, strict=True)]
     std = float(grasp.std_deg.max())
     places = decimals(std)
@@ -90,14 +97,14 @@ def _pose_cells(grasp: GraspEstimate) -> list[str]:
     return [*place, f"({angles}) ± {std:.{places}f}°"]
 
 
-def _clock(estimate: TeamEstimate, name: str) -> str:
+def _clock(estimate: Carried, name: str) -> str:
     late = estimate.clock_offsets_s.get(name)
     if late is None or name == estimate.reference:
         return ""
     return plus_minus(1e3 * late, 1e3 * estimate.clock_offset_std_s.get(name, float("nan")), "ms")
 
 
-def _off(grasp: GraspEstimate, truth: Pose) -> str:
+def _off(grasp: Any, truth: Pose) -> str:
     """Return distance and angle from the true grasp."""
     gap, turn = grasp.away_from(truth)
     return f"{gap:.2f} mm, {turn:.3f}°"
