@@ -97,6 +97,13 @@ UNEXPLAINED: dict[str, str] = {
     "inertia-not-identified": "See to the findings above first, then identify again.",
     "stream-delayed": "See to the findings above first: until then, this delay is a guess.",
 }
+# And where a shape lies elsewhere than its pose says, so that it was left out.
+OTHER_FRAME: dict[str, str] = {
+    "part-not-homogeneous": "Give the pose of the shape's own frame with --pose-in-sensor FILE: a cloud of `steelyard "
+    "scan` lies in the frame W of its views, not in that of a mesh, which the log's [object] may be for. Check that it "
+    "is of the object in the sensor, not its inverse, and in the right unit (m, mm). If it is right but rough, state "
+    "std_mm and std_deg with it.",
+}
 # And where a bare data file was read, or rows were typed: no description is there to be corrected.
 BARE: dict[str, str] = {
     "wrench-sign-flipped": "Nothing to do if z of the world points up: the answer has the sign found. To say the sign, "
