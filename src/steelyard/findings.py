@@ -6,7 +6,7 @@ One table gives every code its remedy; `docs/findings.md` has an entry for each.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 REMEDIES: dict[str, str] = {
@@ -135,6 +135,32 @@ class Finding:
     def instead(self, remedies: Mapping[str, str]) -> Finding:
         """Return the finding with the remedy that `remedies` have for its code, if they have one."""
         return replace(self, remedy=remedies.get(self.code, self.remedy))
+
+
+# What touched or changed the load while it was recorded, and what the data then cannot show. All else comes before
+# both: what was read wrongly, and what of the sensor or the shape is wrong.
+_OF_THE_RUN = {"outliers", "contact", "load-changed", "bias-drift", "grasp-slipped", "robot-left", "robot-joined"}
+_CANNOT_SHOW = {
+    "too-few-poses",
+    "nearly-planar",
+    "inertia-not-identified",
+    "prior-dominated",
+    "noise-level-off",
+    "part-zero-mass",
+    "centroids-coplanar",
+    "more-parts-than-rank",
+    "materials-tied",
+    "tool-included",
+    "common-gain-unseen",
+}
+
+
+def by_cause(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return findings with causes before what follows from them, else as they came.
+
+    First what was read wrongly, then what touched or changed during the run, then what the data cannot show.
+    """
+    return tuple(sorted(findings, key=lambda f: 2 if f.code in _CANNOT_SHOW else int(f.code in _OF_THE_RUN)))
 
 
 def percent(share: float) -> str:

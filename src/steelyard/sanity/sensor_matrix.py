@@ -184,7 +184,7 @@ def wrench_stream(recording: Recording) -> Stream | None:
 def in_world(stream: Stream) -> bool:
     """Tell whether the wrench of a stream is given in W: whoever turned it there knew the mount of the sensor.
 
-    Its gains are still those of the axes of S, and show once it is turned back. Poses in the same stream always are in W.
+    Its gains are still those of the axes of S, and show once it is turned back. Poses beside it always are in W.
     """
     return "W" in {stream.frames.get(quantity, "S") for quantity in ("force", "torque")}
 
