@@ -137,9 +137,10 @@ class Finding:
         return replace(self, remedy=remedies.get(self.code, self.remedy))
 
 
-# What touched or changed the load while it was recorded, and what the data then cannot show. All else comes before
-# both: what was read wrongly, and what of the sensor or the shape is wrong.
-_OF_THE_RUN = {"outliers", "contact", "load-changed", "bias-drift", "grasp-slipped", "robot-left", "robot-joined"}
+# What touched or changed the load while it was recorded, single rows beside that, and what the data then cannot show.
+# All else comes before these: what was read wrongly, and what of the sensor or the shape is wrong.
+_OF_THE_RUN = {"contact", "load-changed", "bias-drift", "grasp-slipped", "robot-left", "robot-joined"}
+_LEFT_OUT = {"outliers"}
 _CANNOT_SHOW = {
     "too-few-poses",
     "nearly-planar",
@@ -160,7 +161,8 @@ def by_cause(findings: Iterable[Finding]) -> tuple[Finding, ...]:
 
     First what was read wrongly, then what touched or changed during the run, then what the data cannot show.
     """
-    return tuple(sorted(findings, key=lambda f: 2 if f.code in _CANNOT_SHOW else int(f.code in _OF_THE_RUN)))
+    later = (_OF_THE_RUN, _LEFT_OUT, _CANNOT_SHOW)
+    return tuple(sorted(findings, key=lambda f: next((k for k, codes in enumerate(later, 1) if f.code in codes), 0)))
 
 
 def percent(share: float) -> str:

@@ -19,7 +19,7 @@ def named(*codes: str) -> list[Finding]:
 
 def test_what_was_read_wrongly_comes_before_what_touched_and_both_before_what_the_data_cannot_show() -> None:
     found = by_cause(
-        named("inertia-not-identified", "contact", "force-unit", "nearly-planar", "outliers", "gains-differ")
+        named("inertia-not-identified", "outliers", "contact", "force-unit", "nearly-planar", "gains-differ")
     )
     assert [f.code for f in found] == [
         "force-unit", "gains-differ", "contact", "outliers", "inertia-not-identified", "nearly-planar",
