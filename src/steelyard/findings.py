@@ -6,7 +6,7 @@ One table gives every code its remedy; `docs/findings.md` has an entry for each.
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
 
 REMEDIES: dict[str, str] = {
@@ -97,6 +97,13 @@ UNEXPLAINED: dict[str, str] = {
     "inertia-not-identified": "See to the findings above first, then identify again.",
     "stream-delayed": "See to the findings above first: until then, this delay is a guess.",
 }
+# And where a shape lies elsewhere than its pose says, so that it was left out.
+OTHER_FRAME: dict[str, str] = {
+    "part-not-homogeneous": "Give the pose of the shape's own frame with --pose-in-sensor FILE: a cloud of `steelyard "
+    "scan` lies in the frame W of its views, not in that of a mesh, which the log's [object] may be for. Check that it "
+    "is of the object in the sensor, not its inverse, and in the right unit (m, mm). If it is right but rough, state "
+    "std_mm and std_deg with it.",
+}
 # And where a bare data file was read, or rows were typed: no description is there to be corrected.
 BARE: dict[str, str] = {
     "wrench-sign-flipped": "Nothing to do if z of the world points up: the answer has the sign found. To say the sign, "
@@ -128,6 +135,34 @@ class Finding:
     def instead(self, remedies: Mapping[str, str]) -> Finding:
         """Return the finding with the remedy that `remedies` have for its code, if they have one."""
         return replace(self, remedy=remedies.get(self.code, self.remedy))
+
+
+# What touched or changed the load while it was recorded, single rows beside that, and what the data then cannot show.
+# All else comes before these: what was read wrongly, and what of the sensor or the shape is wrong.
+_OF_THE_RUN = {"contact", "load-changed", "bias-drift", "grasp-slipped", "robot-left", "robot-joined"}
+_LEFT_OUT = {"outliers"}
+_CANNOT_SHOW = {
+    "too-few-poses",
+    "nearly-planar",
+    "inertia-not-identified",
+    "prior-dominated",
+    "noise-level-off",
+    "part-zero-mass",
+    "centroids-coplanar",
+    "more-parts-than-rank",
+    "materials-tied",
+    "tool-included",
+    "common-gain-unseen",
+}
+
+
+def by_cause(findings: Iterable[Finding]) -> tuple[Finding, ...]:
+    """Return findings with causes before what follows from them, else as they came.
+
+    First what was read wrongly, then what touched or changed during the run, then what the data cannot show.
+    """
+    later = (_OF_THE_RUN, _LEFT_OUT, _CANNOT_SHOW)
+    return tuple(sorted(findings, key=lambda f: next((k for k, codes in enumerate(later, 1) if f.code in codes), 0)))
 
 
 def percent(share: float) -> str:

@@ -55,6 +55,19 @@ def test_views_become_a_cloud_and_the_cloud_parts(capsys: pytest.CaptureFixture[
     assert parts.is_file()
 
 
+def test_a_cloud_is_said_to_lie_in_the_frame_of_its_views(capsys: pytest.CaptureFixture[str], views: Path) -> None:
+    cloud, place = views.parent / "said.ply", views / "object.toml"
+    _, out, _ = run(capsys, "scan", views, "-o", cloud, "--points", 600)
+    assert "It lies in W of the views, not in a mesh's frame.\n" in out
+    assert "Try:" not in out
+    place.write_text("[object]\n")
+    try:
+        _, out, _ = run(capsys, "scan", views, "-o", cloud, "--points", 600)
+    finally:
+        place.unlink()
+    assert f"Try: steelyard identify log.toml --scan {cloud} --pose-in-sensor {place}\n" in out
+
+
 def test_tables_for_people_say_what_was_written(capsys: pytest.CaptureFixture[str], views: Path) -> None:
     cloud = views.parent / "again.npz"
     status, out, _ = run(capsys, "scan", views, "-o", cloud, "--points", 600)

@@ -208,6 +208,32 @@ def test_gains_that_differ_are_told_and_in_the_bars(
     assert said == pytest.approx(100 * (max(gains) - min(gains)), rel=0.15)
 
 
+def in_base_axes(recording: Recording) -> Recording:
+    """Return the recording as UR and Franka write it: one file, forces and torques in W."""
+    (both,) = in_one_stream(recording).streams
+    R = Rotation(both.channels["rotation"])
+    felt = {quantity: R.apply(both.channels[quantity]) for quantity in ("force", "torque")}
+    frames = {"position": "W", "force": "W", "torque": "W"}
+    return replace(recording, streams=(replace(both, channels={**both.channels, **felt}, frames=frames),))
+
+
+def test_gains_of_a_wrench_in_base_axes_are_those_of_the_sensor(recording: Recording) -> None:
+    right = identify(in_base_axes(recording))
+    assert not right.codes() & {"sensor-turned", "gains-differ"}
+    unlike = misread(recording, np.zeros(3), (1.0, 1.0, 1.05))
+    found, in_sensor = identify(in_base_axes(unlike)), identify(in_one_stream(unlike))
+    (finding,) = (f for f in found.findings if f.code == "gains-differ")
+    assert float(finding.message.split(" read ")[1].split(" %")[0]) == pytest.approx(5, rel=0.15)
+    assert off(found, right) < 2.5
+    np.testing.assert_allclose(found.std[:4], in_sensor.std[:4], rtol=0.2)
+
+
+@pytest.mark.parametrize("seed", range(1, 5))
+def test_a_good_sensor_shows_nothing_in_base_axes(seed: int) -> None:
+    found = identify(in_base_axes(hammer.recording(seed).recording))
+    assert not found.codes() & {"sensor-turned", "gains-differ"}
+
+
 def about_one_axis(tilt: float, sign: int = 1, seed: int = 0) -> Recording:
     """Return a mass point felt by a sensor that turns about x alone, gravity off by degrees about it, too."""
     time, rng = np.arange(0, 30, 0.01), np.random.default_rng(seed)

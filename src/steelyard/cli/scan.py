@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from steelyard.cli.console import STYLED, print_json, progress_bar, require_output, say_if_compiling
+from steelyard.cli.console import STYLED, command_line, print_json, progress_bar, require_output, say_if_compiling
 from steelyard.cli.options import HELP, JSON
 
 if TYPE_CHECKING:
@@ -85,5 +85,7 @@ def _table(fused: Scan, views: Path, output: Path | None, seconds: float) -> str
     ]
     lines = [f"{views}: the object on the table", ""] + [f"  {name:12s} {text}" for name, text in rows]
     if output is not None:
-        lines += ["", f"Cloud written to {output}."]
+        lines += ["", f"Cloud written to {output}. It lies in W of the views, not in a mesh's frame."]
+        if (place := views / "object.toml").is_file():
+            lines += ["Try: " + command_line("identify", "log.toml", "--scan", output, "--pose-in-sensor", place)]
     return "\n".join([*lines, "", *finding_lines(fused.findings, STYLED)])

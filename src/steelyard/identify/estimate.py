@@ -10,7 +10,7 @@ from typing import Any, Self
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, by_cause
 from steelyard.identify.evidence import Evidence as Evidence
 from steelyard.identify.evidence import PartMass as PartMass
 from steelyard.identify.people import people_jacobian
@@ -106,6 +106,10 @@ class Estimate:
     def with_remedies(self, remedies: Mapping[str, str]) -> Estimate:
         """Return the estimate with the remedies that `remedies` have for the codes of its findings."""
         return replace(self, findings=tuple(finding.instead(remedies) for finding in self.findings))
+
+    def by_cause(self) -> Self:
+        """Return the estimate with causes before what follows from them among its findings."""
+        return replace(self, findings=by_cause(self.findings))
 
     def noted(self, *notes: str) -> Self:
         """Return the estimate with more notes."""

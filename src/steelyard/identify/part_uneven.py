@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import dataclass
 
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.findings import Finding
 from steelyard.identify.effective import Effective
 from steelyard.identify.part_findings import misfit_limit
 from steelyard.identify.part_gradients import Freed, Search, freed, total
@@ -19,6 +21,8 @@ SUSPICIOUS = 1e-2
 # Freed parts must be so many times likelier than homogeneous ones, what is common among tools counted: strong evidence
 # by the usual word (Kass and Raftery 1995).
 ODDS = 20.0
+# How the words go on that say which density explains a log.
+_CENTRE = "its centre of mass lies"
 # A part is named where it is freed with at least this probability, and as sure where with that.
 NAMED, SURE = 0.2, 0.9
 
@@ -54,6 +58,11 @@ def uneven(data: Effective, parts: Parts) -> Uneven | None:
     return Uneven(vector, covariance, masses, _message(parts, search, models, weight))
 
 
+def explains(findings: Iterable[Finding]) -> bool:
+    """Tell whether one of the findings is a density that changes within a part, which explains the log."""
+    return any(f.code == "part-not-homogeneous" and _CENTRE in f.message for f in findings)
+
+
 def _message(parts: Parts, search: Search, models: list[Freed], weight: Array) -> str:
     """Return which parts are not homogeneous, and how."""
     chance = np.array([sum(w for m, w in zip(models, weight, strict=True) if k in m.free) for k in range(len(parts))])
@@ -87,6 +96,6 @@ def _fall(profile: Profile, shift: Array) -> str:
     toward = ", ".join(f"{value:.2f}" for value in moved / max(distance, 1e-12))
     fall = f"by {100 * share:.0f} %" if share < 1.5 else "to a small part"
     return (
-        f"its centre of mass lies {1e3 * distance:.1f} mm from its centroid toward ({toward}) in the sensor's axes, "
+        f"{_CENTRE} {1e3 * distance:.1f} mm from its centroid toward ({toward}) in the sensor's axes, "
         f"as if its density fell {fall} from one end to the other"
     )

@@ -2,20 +2,25 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import NoMasses
-from steelyard.findings import Finding
+from steelyard.findings import OTHER_FRAME, Finding
 from steelyard.identify.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.linear import inverse_scaled
 from steelyard.identify.nonnegative import nonnegative_masses
+from steelyard.identify.shape_error import ShapeError
 from steelyard.inertia import InertialParameters, forms
 from steelyard.parts.parts import Parts
 
 # A gap counts where it is so many standard deviations wide, and wider than meshes are exact [m].
 CLEAR, LEAST = 4.0, 1e-4
+# Parts whose masses do not explain a log lie elsewhere from such a gap on [m]; below it they are only drawn badly.
+ELSEWHERE = 3e-3
 # Half the length of a rod over its radius of gyration: no convex part reaches much farther from its centroid.
 REACH = float(np.sqrt(3.0))
 # Weight of "the shares add up to one" beside distances over the size of the object.
@@ -33,9 +38,33 @@ def misplaced(data: Effective, parts: Parts, least: float = LEAST) -> str:
 
 def off(phi: Array, covariance: Array, parts: Parts, least: float = LEAST) -> str:
     """Return the sentence of `misplaced` for a body phi (10,) that is known up to `covariance` (10, 10)."""
+    gap = gap_of(phi, covariance, parts)
+    if gap is None or gap.distance < least:
+        return ""
+    if gap.outside:
+        return (
+            f"The log puts the centre of mass {1e3 * gap.outside:.1f} mm outside the object: pose_in_sensor is wrong "
+            "by at least that much."
+        )
+    return (
+        f"The log puts the centre of mass {1e3 * gap.distance:.1f} mm from where any masses of even parts would: "
+        "unless one is uneven, pose_in_sensor is wrong by at least that much."
+    )
+
+
+@dataclass(frozen=True)
+class Gap:
+    """How far a centre of mass lies from where even parts can have it, and outside them, 0.0 where that is open [m]."""
+
+    distance: float
+    outside: float
+
+
+def gap_of(phi: Array, covariance: Array, parts: Parts) -> Gap | None:
+    """Return the gap of a body phi (10,) that is known up to `covariance` (10, 10), None where it may be none."""
     mass = float(phi[0])
     if mass <= 0:
-        return ""
+        return None
     com = phi[1:4] / mass
     nearest = _among(parts.centroid, com)
     gap = com - nearest
@@ -43,18 +72,10 @@ def off(phi: Array, covariance: Array, parts: Parts, least: float = LEAST) -> st
     ahead = gap / max(distance, 1e-12)
     slope = np.einsum("i,ij->j", ahead, forms.com_jacobian(phi)[:3])[:4]  # none of it is of the inertia
     std = float(np.sqrt(max(slope @ covariance[:4, :4] @ slope, 0.0)))
-    if distance < max(CLEAR * std, least):
-        return ""
+    if distance < CLEAR * std:
+        return None
     outside = float(ahead @ com) - float((parts.centroid @ ahead + REACH * _gyration(parts, ahead)).max())
-    if outside > CLEAR * std:
-        return (
-            f"The log puts the centre of mass {1e3 * outside:.1f} mm outside the object: pose_in_sensor is wrong by at "
-            "least that much."
-        )
-    return (
-        f"The log puts the centre of mass {1e3 * distance:.1f} mm from where any masses of even parts would: unless "
-        "one is uneven, pose_in_sensor is wrong by at least that much."
-    )
+    return Gap(distance, outside if outside > CLEAR * std else 0.0)
 
 
 def no_masses(mass: float, parts: Parts) -> str:
@@ -69,7 +90,19 @@ def contradicted(estimate: Estimate, parts: Parts) -> Finding:
     """Return the finding on parts that cannot follow a log, of which `estimate` is the answer without them."""
     where = off(estimate.parameters.vector, estimate.covariance, parts) or no_masses(estimate.mass, parts)
     text = f"{where} The shape cannot follow this log, and was left out: the answer is the log's alone."
-    return Finding.of("part-not-homogeneous", text)
+    return Finding.of("part-not-homogeneous", text).instead(OTHER_FRAME)
+
+
+def lies_elsewhere(alone: Estimate, explained: bool, parts: Parts, error: ShapeError) -> bool:
+    """Tell whether the log contradicts the place of the parts beyond doubt, by more than shape and grasp may be wrong.
+
+    alone      what the log says by itself of the object
+    explained  whether a density that changes within parts explains the log: then only a centre of mass that lies
+               outside the object cannot be
+    """
+    body = alone.parameters
+    gap = gap_of(body.vector, alone.covariance + error.with_grasp(body), parts)
+    return gap is not None and (gap.outside > 0 or (not explained and gap.distance >= ELSEWHERE))
 
 
 def with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) -> InertialParameters:

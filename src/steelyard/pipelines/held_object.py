@@ -66,7 +66,7 @@ def identify(
             estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
     moved = {stream.name: stream.moved for stream in recording.streams}
     delays_s = {name: late + moved.get(name, 0.0) for name, late in rows.aligned.delays_s.items()}
-    estimate = replace(remedied(estimate, rows), delays_s=delays_s).with_findings(*of_tool)
+    estimate = replace(remedied(estimate, rows), delays_s=delays_s).with_findings(*of_tool).by_cause()
     aligning = () if rows.unmeasured else rows.aligned.notes
     return _with_bias_as(estimate.noted(*recording.notes, *aligning, *uncalibrated(estimate)), recording)
 
@@ -99,9 +99,9 @@ def identify_rows(
     load = Load(log, Bias(options.bias, drift=options.drift), options, shape, tool)
     load, estimate = load.followed()
     estimate = load.without_tool(estimate).with_findings(*(() if tool is None else of_tools_run(tool)))
-    if parts is None or shape is None:
-        return estimate
-    return looked_at(estimate, parts, shape, load.shape is not None)
+    if parts is not None and shape is not None:
+        estimate = looked_at(estimate, parts, shape, load.shape is not None)
+    return estimate.by_cause()
 
 
 def _with_bias_as(estimate: Estimate, recording: Recording) -> Estimate:

@@ -11,7 +11,8 @@ from steelyard.check import BREAKDOWNS
 from steelyard.errors import BadValue, CannotAnswer, NoMasses
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
-from steelyard.identify.placement import contradicted
+from steelyard.identify.part_uneven import explains
+from steelyard.identify.placement import contradicted, lies_elsewhere
 from steelyard.identify.shape_error import MEASURED
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.log import MotionLog
@@ -64,7 +65,7 @@ class Load:
     def followed(self) -> tuple[Load, Estimate]:
         """Return what was held, with the load, which has lost a shape that cannot follow what the log alone can say."""
         try:
-            return self, self.estimate()
+            return self._unless_elsewhere(self.estimate())
         except (NoMasses, *BREAKDOWNS):
             if self.shape is None:
                 raise
@@ -74,6 +75,21 @@ class Load:
             if self.freed() is None:
                 raise
             raise CannotAnswer(f"{error} With a bias estimated the data answer: leave out --bias none.") from None
+
+    def _unless_elsewhere(self, estimate: Estimate) -> tuple[Load, Estimate]:
+        """Return load and estimate, both of the log alone where that shows the shape to lie elsewhere beyond doubt."""
+        if self.shape is None or "part-not-homogeneous" not in estimate.codes():
+            return self, estimate
+        alone = replace(self, shape=None)
+        try:
+            found = alone.estimate()
+        except CannotAnswer:
+            return self, estimate
+        held = found if self.tool is None else without_tool(found, self.tool, shared=False)
+        cuts, _, error = self.shape
+        if lies_elsewhere(held, explains(estimate.findings), max(cuts, key=len), error):
+            return alone, found
+        return self, estimate
 
     def freed(self) -> Estimate | None:
         """Return what was held by the log alone, with the bias of a sensor estimated that is said to be tared.

@@ -90,7 +90,9 @@ def remedied(estimate: Estimate, rows: FitRows) -> Estimate:
     """Return the estimate with remedies that help where motion or wrench are no body's, unmeasured, or all at rest."""
     if "weight-compensated" in estimate.codes():
         estimate = estimate.without_inertia("What a controller leaves of a weight has no inertia of its own.")
-    if estimate.codes() & (MISREAD if rows.place is None else MISREAD - {"motion-mismatch"}):
+    if any(f.left_in for f in estimate.findings) or estimate.codes() & (
+        MISREAD if rows.place is None else MISREAD - {"motion-mismatch"}
+    ):
         return estimate.with_remedies(UNEXPLAINED)
     if rows.unmeasured and not estimate.parts:
         estimate = estimate.without_inertia(

@@ -51,6 +51,7 @@ ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
     "a payload that the controller compensates. If all are right, keep hands and fixtures off the object."
 )
+TARED = "If the sensor was tared within the log, cut the log there and identify each piece with its own bias. Else:"
 
 
 @dataclass(frozen=True, eq=False)
@@ -269,15 +270,18 @@ def _contact(slices: Slices, found: Consensus, touches: Sequence[Touch], kept: M
         f"{what} at {named} s, with up to {max(t.force for t in touches):.2g} N and "
         f"{max(t.torque for t in touches):.2g} N m; {end}."
     )
+    tared = False
     if _swappable(slices, found, touches):
         text += (
             " A constant wrench fits as well, so it may be these times that were free and the others that were touched;"
             " mass and centre of mass are the same either way, the bias is not."
         )
-        if len(touches) == 1 and (touches[0].first == 0 or touches[0].last == len(slices.y)):
+        tared = len(touches) == 1 and (touches[0].first == 0 or touches[0].last == len(slices.y))
+        if tared:
             text += " It reaches an end of the log, as where the sensor was tared in between."
     finding = Finding.of("contact", text)
-    return replace(finding, remedy=ALL_ELSE) if unlike_hands else finding
+    finding = replace(finding, remedy=ALL_ELSE) if unlike_hands else finding
+    return replace(finding, remedy=f"{TARED} {finding.remedy}") if tared else finding
 
 
 def _unlike_hands(kept: Mask, moving: Mask) -> bool:

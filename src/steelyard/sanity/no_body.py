@@ -54,7 +54,8 @@ def examine_wrench_unit(
         f"{'; '.join(f'{times:.3g} times, as when {words}' for times, words in explain)}. The answer does not assume "
         "this: mass or centre of mass is wrong by as much."
     )
-    return (Finding.of("force-unit", text), *(f for f in late if f.code != "wrench-unexplained"))
+    unit = replace(Finding.of("force-unit", text), left_in=True)
+    return (unit, *(f for f in late if f.code != "wrench-unexplained"))
 
 
 def examine_body(

@@ -12,7 +12,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.sanity.contact import untouched
 from steelyard.sanity.misplaced import misplaced
-from steelyard.sanity.sensor_matrix import felt_in_sensor, sensor_matrix
+from steelyard.sanity.sensor_matrix import in_world, sensor_matrix, wrench_stream
 
 
 def one_body(
@@ -37,8 +37,9 @@ def _put_right(log: MotionLog, recording: Recording, drift: bool) -> MotionLog:
 
     A point where only a wrong unit or sign puts it serves as well: with it, one body explains all rows.
     """
-    sensor = None if felt_in_sensor(recording) is None else sensor_matrix(log, drift)
-    if sensor is not None and (sensor.turned or sensor.unlike):
+    stream, sensor = wrench_stream(recording), sensor_matrix(log, drift)
+    turns = stream is not None and not in_world(stream)
+    if sensor is not None and (sensor.unlike or (turns and sensor.turned)):
         log = sensor.put_right(log)
     place = misplaced(log, drift)
     return place.put_right(log) if place is not None and place.seen else log

@@ -140,10 +140,11 @@ def examine_sensor(
     known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
     drift     whether the bias was taken to grow with time
     """
-    stream, found = felt_in_sensor(recording), _looked_at(log, recording, known, drift)
+    stream, found = wrench_stream(recording), _looked_at(log, recording, known, drift)
     if stream is None or found is None:
         return estimate, ()
-    findings = (*_turn(found, stream) * found.turned, *_gains(found) * found.unlike)
+    turned = found.turned and not in_world(stream)
+    findings = (*_turn(found, stream) * turned, *_gains(found) * found.unlike)
     return (_widened(estimate, found), findings) if findings else (estimate, ())
 
 
@@ -157,29 +158,35 @@ def turn_of(
     log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[float, float, float] | None:
     """Return the rotation vector [rad] by which the wrench is turned beyond doubt, None where it is not."""
-    found = _looked_at(log, recording, known, drift)
-    if found is None or not found.turned:
+    stream, found = wrench_stream(recording), _looked_at(log, recording, known, drift)
+    if stream is None or in_world(stream) or found is None or not found.turned:
         return None
     x, y, z = (float(v) for v in found.turn)
     return x, y, z
 
 
 def _looked_at(log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
-    """Return what a wrench in S says of the sensor, None where it is not in S or something else is wrong with it.
+    """Return what the wrench, turned back into S, says of the sensor; None where something else is wrong with it.
 
     Where a large turn was told, it begins with the turn that the force shows at once.
     """
     codes = {f.code for f in known}
-    if felt_in_sensor(recording) is None or codes & ELSEWHERE:
+    if codes & ELSEWHERE:
         return None
     return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes else None)
 
 
-def felt_in_sensor(recording: Recording) -> Stream | None:
-    """Return the stream of the wrench, None where it is given in W; poses in the same stream always are."""
-    stream = next((s for s in recording.streams if "force" in s.channels), None)
-    in_world = stream is not None and "W" in {stream.frames.get(q, "S") for q in ("force", "torque")}
-    return None if in_world else stream
+def wrench_stream(recording: Recording) -> Stream | None:
+    """Return the stream of the wrench, None where the recording has none."""
+    return next((s for s in recording.streams if "force" in s.channels), None)
+
+
+def in_world(stream: Stream) -> bool:
+    """Tell whether the wrench of a stream is given in W: whoever turned it there knew the mount of the sensor.
+
+    Its gains are still those of the axes of S, and show once it is turned back. Poses beside it always are in W.
+    """
+    return "W" in {stream.frames.get(quantity, "S") for quantity in ("force", "torque")}
 
 
 def _sure(value: Array, std: Array, least: float) -> bool:
