@@ -81,6 +81,11 @@ class Recordings:
         """Return [phi, bias] (P + B,) of one recording."""
         return np.concatenate([self.phi, self.mean[recording] - self.blind[recording].T @ self.phi])
 
+    @property
+    def biases(self) -> Array:
+        """The bias of every recording (R, B) beside phi."""
+        return np.asarray(self.mean - np.einsum("rpb,p->rb", self.blind, self.phi))
+
     def doubt(self, recording: int) -> Array:
         """Return their covariance (P + B, P + B)."""
         blind = self.blind[recording]

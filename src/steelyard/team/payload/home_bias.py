@@ -83,6 +83,7 @@ class _Tried:
             gain=float(np.sqrt(gain)),
             gain_squares=(anew, lasting),
             gainless=float(self.share @ [one.gainless for one in self.models]),
+            biases=beside.biases,
             blind=tuple(tuple(beside.blind[own]) for own in places),
             levers=levers if number else fit.levers,
         )
