@@ -115,6 +115,14 @@ def test_residuals_hold_no_bias_and_the_page_one_rms_within_its_axes() -> None:
     assert max(lines) >= float(np.abs(left.force).max())
 
 
+def test_rests_within_a_motion_are_not_called_moving() -> None:
+    seen = around(3)
+    assert "500 rows of which 100 in still recordings" in team_table(seen, "a team")
+    page = html.unescape(render(team_page("a team", seen)))
+    assert "500 samples, 100 in still recordings" in page
+    assert "500, of which 100 in still recordings" in page
+
+
 def test_the_log_must_be_that_of_the_result() -> None:
     with pytest.raises(BadValue, match="the log must be that of the result; it is of robot0, robot1, robot2"):
         team_residuals(exact().log, around(3))

@@ -10,7 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
-from steelyard.report.numbers import LARGE_INERTIA, fixed, places_of, spread
+from steelyard.report.numbers import LARGE_INERTIA, fixed, places_of, spread, still_rows
 
 INERTIA = ("Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
@@ -119,7 +119,7 @@ def _evidence_lines(estimate: Estimate) -> list[str]:
     )
     lines = [
         f"  ±          one standard deviation{explained}",
-        f"  method     {estimate.method}, rank {seen.rank}, {seen.samples} rows of which {seen.still_samples} at rest",
+        f"  method     {estimate.method}, rank {seen.rank}, {seen.samples} rows of which {still_rows(estimate)}",
         f"  residual   {seen.residual_force_N:.3g} N, {seen.residual_torque_Nm:.3g} N m rms"
         + ("" if seen.chi2_per_dof is None else f"; chi² per degree of freedom {seen.chi2_per_dof:.2f}"),
     ]

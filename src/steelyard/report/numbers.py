@@ -9,6 +9,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.inertia import forms
 from steelyard.report.markup import Html, tag
 from steelyard.spatial import Rotation
+from steelyard.team.estimate import TeamEstimate
 
 LARGE_INERTIA = 0.1  # [kg m^2] from here on it is given in kg m²
 _MILLIONTH = 1e-6
@@ -21,6 +22,12 @@ def decimals(std: float) -> int:
         return 3
     rounded = float(f"{std:.1e}")  # 0.0999 is shown as 0.10, not as 0.100
     return int(np.clip(1 - np.floor(np.log10(rounded)), 0, 9))
+
+
+def still_rows(estimate: Estimate) -> str:
+    """Return how many rows are at rest; of a team they are those of still recordings, rests in motions not counted."""
+    where = "in still recordings" if isinstance(estimate, TeamEstimate) else "at rest"
+    return f"{estimate.evidence.still_samples} {where}"
 
 
 def round_step(top: float) -> float:

@@ -17,6 +17,7 @@ from steelyard.report.contents import Report
 from steelyard.report.drawing import drawing
 from steelyard.report.legend import viewer
 from steelyard.report.markup import joined, script_json, tag, text
+from steelyard.report.numbers import still_rows
 from steelyard.whole_files import write_text
 
 
@@ -62,7 +63,7 @@ def _subtitle(report: Report) -> str:
     seen = report.estimate
     said = [f"method {seen.method}"]
     if seen.evidence.samples:
-        said.append(f"{seen.evidence.samples} samples, {seen.evidence.still_samples} at rest")
+        said.append(f"{seen.evidence.samples} samples, {still_rows(seen)}")
     if seen.parts:
         said.append(counted(len(seen.parts), "part"))
     count = len(seen.findings)

@@ -9,7 +9,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag
-from steelyard.report.numbers import fixed, general, inertia_unit, mass_unit, measured, places_of, principal
+from steelyard.report.numbers import fixed, general, inertia_unit, mass_unit, measured, places_of, principal, still_rows
 from steelyard.report.palette import hexadecimal
 from steelyard.report.plots import interval, interval_signs, residual_plot
 from steelyard.team.estimate import TeamEstimate
@@ -237,7 +237,7 @@ def evidence(report: Report) -> Html:
     of_what = ", of all robots together, unsmoothed" if isinstance(report.estimate, TeamEstimate) else ""
     if seen.samples:
         rows += [
-            ("samples", f"{seen.samples}, of which {seen.still_samples} at rest", ""),
+            ("samples", f"{seen.samples}, of which {still_rows(report.estimate)}", ""),
             ("rank", *_rank(report.estimate)),
             ("condition", general(seen.condition), "1 would be the best motion possible"),
             ("residual", f"{general(seen.residual_force_N)} N, {general(seen.residual_torque_Nm)} N m",
