@@ -105,6 +105,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     def fitted(rows: list[tuple[BodyRows, Array]]) -> _Fitted:
         groups = _groups(rows, seen.path, highest_hz, seen.order)
+        groups = tuple(replace(group, sighted=known) for group in groups)
         groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
         return _Fitted(groups, D, C, tuple(read), fit_payload(groups, D, C, size, with_gain))

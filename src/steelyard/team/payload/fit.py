@@ -103,7 +103,7 @@ class _Equations:
         return group.weights(phi)
 
     def normals(self, group: Group, W: Array) -> list[Normal]:
-        return [normal(part, self.D, W, group.motion_noise, group.wrench_noise) for part in group.parts]
+        return [normal(part, self.D, W, group.motion_noise, group.noise_of_gains) for part in group.parts]
 
     def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
         """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""

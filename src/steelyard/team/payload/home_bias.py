@@ -128,8 +128,8 @@ class _Homes:
         plain, wide = [], []
         for group, weights in zip(fit.groups, fit.weights, strict=True):
             for part in group.parts:
-                plain.append(normal(part, D, weights, group.motion_noise, group.wrench_noise))
-                gains = gain_sight(part, D, weights, group.wrench_noise, levers)
+                plain.append(normal(part, D, weights, group.motion_noise, group.noise_of_gains))
+                gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else plain[-1].gains
                 wide.append(replace(beside_home(plain[-1], part, D, weights, levers), gains=gains))
         return cls(plain, wide, levers, C, fit.scale)
 

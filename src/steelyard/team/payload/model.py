@@ -42,11 +42,18 @@ class Group:
 
     motion_noise  (K, 6, 6) of angular acceleration and acceleration less gravity
     wrench_noise  (K, 6) of the summed moment and force, beyond what the motion's noise makes
+    sighted       whether changes of forces are asked for gains: not where grasps are turned as nobody knows
     """
 
     parts: tuple[Spectra, ...]
     motion_noise: Array
     wrench_noise: Array
+    sighted: bool = True
+
+    @property
+    def noise_of_gains(self) -> Array | None:
+        """Noise of the wrench (K, 6) beside which gains are asked; None where they are not."""
+        return self.wrench_noise if self.sighted else None
 
     def weights(self, phi: Array) -> Array:
         """Return the inverse (K, 6, 6) of the noise of a row of the wrench equation."""
@@ -112,7 +119,7 @@ def normal(part: Spectra, D: Array, W: Array, motion_noise: Array, wrench_noise:
     force, unit = gain_columns(D)
     total = S.sum(0)
     mean = total[12 + force, -1] / max(float(total[-1, -1]), 1e-300)
-    gains = None if wrench_noise is None else gain_sight(part, D, W, wrench_noise)
+    gains = GainSight.none(len(force)) if wrench_noise is None else gain_sight(part, D, W, wrench_noise)
     return Normal(H, g, noise, constant, unit * mean, gains)
 
 
