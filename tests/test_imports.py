@@ -49,7 +49,7 @@ MAY_IMPORT: dict[str, set[str]] = {
     "io": {
         "spatial", "inertia", "logs.log", "logs.moments", "logs.recording", "logs.team_log", "logs.team_track",
         "logs.team_streams", "robots.omnid", "robots.serial", "team.estimate", "shape.mesh", "shape.tets",
-        "shape.nesting", "shape.cloud", "shape.eight_bits", "shape.views", "parts.parts", "parts.from_mesh",
+        "shape.nesting", "shape.cloud", "shape.known_space", "shape.eight_bits", "shape.views", "parts.parts", "parts.from_mesh",
         "parts.known", "parts.hierarchy", "identify.estimate", "whole_files",
     },
 }  # fmt: skip

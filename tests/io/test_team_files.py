@@ -371,6 +371,7 @@ def result() -> TeamEstimate:
             "right": GraspEstimate(Pose(Rotation.exp(np.array([0.1, 0.2, 2.0])), np.array([1.0, -0.5, 0.1])), loose @ loose.T, np.eye(6)[:1]),
         },
         clock_offsets_s={"left": 0.0, "right": 0.013}, clock_offset_std_s={"left": 0.0, "right": 1e-4},
+        wrench_biases={"moves": np.arange(6.0)},
     )  # fmt: skip
 
 
@@ -382,6 +383,9 @@ def test_results_come_back(tmp_path: Path) -> None:
     assert (back.frame, back.reference, back.method) == ("left", "left", "joint")
     assert back.clock_offsets_s == made.clock_offsets_s
     assert back.clock_offset_std_s == made.clock_offset_std_s
+    assert {name: bias.tolist() for name, bias in back.wrench_biases.items()} == {
+        "moves": [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
+    }
     for name, grasp in made.grasps.items():
         np.testing.assert_allclose(back.grasps[name].pose.matrix(), grasp.pose.matrix(), atol=1e-15)
         np.testing.assert_array_equal(back.grasps[name].covariance, grasp.covariance)

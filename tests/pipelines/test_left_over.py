@@ -59,6 +59,16 @@ def test_residuals_are_those_of_the_answer(made: Recording, mistake: str) -> Non
     assert not of_another_fit(estimate, left)
 
 
+def test_times_are_since_the_first_row_of_the_wrench(made: Recording) -> None:
+    estimate = sy.identify(made)
+    late = replace(made, streams=tuple(replace(s, time=s.time + 1050.0) for s in made.streams if s.time is not None))
+    first, second = (left_over(recording, estimate)[0].time for recording in (made, late))
+    assert first is not None
+    assert second is not None
+    assert second[0] < 5.0
+    assert np.allclose(second, first, atol=1e-6)
+
+
 def test_a_drift_too_small_to_be_named_does_not_move_the_answer(made: Recording) -> None:
     right = sy.identify(made)
     found = sy.identify(changed(made, "force", np.array([0.1, -0.08, 0.05])))

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import html
 import json
+import re
 from dataclasses import replace
 from functools import cache
 
@@ -15,14 +16,16 @@ from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.report import render
 from steelyard.report.drawing import drawing
+from steelyard.report.numbers import general
 from steelyard.report.team_page import team_page
 from steelyard.report.team_residuals import team_residuals
 from steelyard.report.team_scene import team_scene
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import EXACT, TeamScene
+from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.team import team_table
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
+from steelyard.team.joint import JointTeam
 
 
 def answer(body: InertialParameters, grasps: dict[str, Pose]) -> TeamEstimate:
@@ -96,6 +99,28 @@ def test_residuals_of_the_truth_are_small_and_of_another_body_are_not() -> None:
     more = team_residuals(made.log, answer(heavier, grasps))
     assert more is not None
     assert float(np.linalg.norm(more.force, axis=1).mean()) == pytest.approx(0.1 * 12 * 9.81, rel=0.05)
+
+
+def test_residuals_hold_no_bias_and_the_page_one_rms_within_its_axes() -> None:
+    noise = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.2, torque_white_Nm=0.02, force_bias_N=3.0)
+    made = simulate_team(TeamScene(noise, sensing="poses", kinds=("motion",), motion_samples=1500), 4)
+    seen = JointTeam().identify(made.log)
+    left = team_residuals(made.log, seen)
+    assert left is not None
+    assert float(np.linalg.norm(seen.wrench_biases[made.log.recordings[0].name][3:])) > 1.0
+    assert float(np.abs(left.force.mean(0)).max()) < 0.05
+    page = html.unescape(render(team_page("a team", seen, made.log)))
+    assert page.count(f"{general(seen.evidence.residual_force_N)} N per axis, unsmoothed") == 1
+    lines = [float(n) for n in re.findall(r">[+]([0-9.]+) N<", page)]
+    assert max(lines) >= float(np.abs(left.force).max())
+
+
+def test_rests_within_a_motion_are_not_called_moving() -> None:
+    seen = around(3)
+    assert "500 rows of which 100 in still recordings" in team_table(seen, "a team")
+    page = html.unescape(render(team_page("a team", seen)))
+    assert "500 samples, 100 in still recordings" in page
+    assert "500, of which 100 in still recordings" in page
 
 
 def test_the_log_must_be_that_of_the_result() -> None:

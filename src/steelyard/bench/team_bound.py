@@ -24,7 +24,7 @@ from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.joint import JointTeam
 from steelyard.team.payload.body_rows import balance_frame, summing
-from steelyard.team.payload.model import of_force
+from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.poses.fit import information
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.solver import Solver

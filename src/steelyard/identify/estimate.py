@@ -64,6 +64,11 @@ class Estimate:
         return np.sqrt(np.maximum(np.diag(self.people_covariance), 0))
 
     @property
+    def at_rest(self) -> str:
+        """How many rows are at rest, in words."""
+        return f"{self.evidence.still_samples} at rest"
+
+    @property
     def wrench_bias_std(self) -> Array:
         """Standard deviations (6,) of the wrench bias [N m, N]."""
         return np.sqrt(np.maximum(np.diag(self.bias_covariance), 0))

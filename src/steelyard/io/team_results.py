@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.errors import BadFile, BadInput
 from steelyard.identify.estimate import Estimate
 from steelyard.io.hinge_results import hinge_entries, hinge_of
@@ -26,6 +27,7 @@ def team_entries(estimate: TeamEstimate) -> dict[str, Any]:
         "grasps": {name: _grasp_entry(grasp) for name, grasp in estimate.grasps.items()},
         "clock_offsets_s": dict(estimate.clock_offsets_s),
         "clock_offset_std_s": dict(estimate.clock_offset_std_s),
+        "wrench_biases": dict(estimate.wrench_biases),
         "principal_moments_kgm2": estimate.principal_moments,
         "principal_frame": {
             name: {"rotation": pose.rotation.matrix, "position_m": pose.position}
@@ -61,6 +63,7 @@ def team_of(path: Path, values: Mapping[str, Any], plain: Estimate) -> TeamEstim
         grasps={str(name): _grasp(path, str(name), entry) for name, entry in grasps.items()},
         clock_offsets_s=_seconds(path, values, "clock_offsets_s"),
         clock_offset_std_s=_seconds(path, values, "clock_offset_std_s"),
+        wrench_biases=_biases(path, values),
         hinge=hinge_of(path, values),
     )
 
@@ -85,6 +88,14 @@ def _grasp(path: Path, name: str, entry: Any) -> GraspEstimate:
     if entry.get("lost"):
         lost = array_of(path, entry, "lost", (None, 6), of)
     return GraspEstimate(Pose(turn, place), covariance, lost)
+
+
+def _biases(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the bias (6,) of every recording, none where a result says nothing of it."""
+    entry = values.get("wrench_biases") or {}
+    if not isinstance(entry, dict):
+        raise BadFile(f'{path}: "wrench_biases" must be one object with six numbers for every recording.')
+    return {str(name): array_of(path, entry, name, (6,), " of wrench_biases") for name in entry}
 
 
 def _seconds(path: Path, values: Mapping[str, Any], key: str) -> dict[str, float]:

@@ -10,7 +10,7 @@ from steelyard.identify.problem import scaled_time
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.options import DRIFT_ALLOWED, Options
-from steelyard.pipelines.rows import GRAVITY_FOUND, rows_to_fit
+from steelyard.pipelines.rows import GRAVITY_FOUND, rows_to_fit, since_start
 from steelyard.sanity import examine
 
 # Residuals this many times those of the answer are not what it was made from.
@@ -21,6 +21,8 @@ MEDIAN = 0.6745
 
 def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = None) -> tuple[MotionLog, Array]:
     """Return the rows of the recording, put right as `identify` does, and what is left (N, 6) of their wrenches.
+
+    Times are since the first row of the wrench, as findings tell them.
 
     Channels that do not measure leave nothing.
 
@@ -33,7 +35,7 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
     if any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) and log.time is not None:
         left = left - _line(scaled_time(log), left)
-    return log, np.where(log.dead, 0.0, left)
+    return since_start(log, recording), np.where(log.dead, 0.0, left)
 
 
 def of_another_fit(estimate: Estimate, left: Array) -> bool:

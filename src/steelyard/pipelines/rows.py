@@ -120,12 +120,12 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     # Where a cause is left in, nothing fits one body: rows that are left out as touched would be chance.
     whole = not unmeasured and not any(f.left_in for f in before)
     if whole:
-        keep, touched = one_body(_from_start(log, recording), recording, options.bias == "free", options.drift)
+        keep, touched = one_body(since_start(log, recording), recording, options.bias == "free", options.drift)
     if codes & {"motion-mismatch", "weight-compensated"}:
         touched = ()  # moving rows carry another mass, and only look touched
     log = without_dead(with_declared(log.rows(keep), recording.noise))
     if whole and not touched:
-        since = _from_start(log, recording)
+        since = since_start(log, recording)
         slip = small_slip(since, rotation_of(log, aligned), recording.gravity)
         if slip is not None:
             keep, finding = slip.longer_side(since)
@@ -133,7 +133,7 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     return FitRows(log, aligned, level, unmeasured, touched)
 
 
-def _from_start(log: MotionLog, recording: Recording) -> MotionLog:
+def since_start(log: MotionLog, recording: Recording) -> MotionLog:
     """Return the log with times [s] since the first row of the wrench, as findings tell them."""
     start = next((s.time[0] for s in recording.streams if "force" in s.channels and s.time is not None), 0.0)
     return log if log.time is None else replace(log, time=log.time - start)

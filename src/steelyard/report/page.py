@@ -62,7 +62,7 @@ def _subtitle(report: Report) -> str:
     seen = report.estimate
     said = [f"method {seen.method}"]
     if seen.evidence.samples:
-        said.append(f"{seen.evidence.samples} samples, {seen.evidence.still_samples} at rest")
+        said.append(f"{seen.evidence.samples} samples, {seen.at_rest}")
     if seen.parts:
         said.append(counted(len(seen.parts), "part"))
     count = len(seen.findings)

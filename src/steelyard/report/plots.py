@@ -20,8 +20,11 @@ RUN = 6
 _HEIGHT, _TOP, _BOTTOM = 190, 12, 24
 
 
-def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) -> Html:
-    """Return the three axes of values (N, 3) over time: lowest and highest of each column, and means as a line."""
+def residual_plot(residuals: Residuals, values: Array, unit: str, title: str, rms: float | None = None) -> Html:
+    """Return the three axes of values (N, 3) over time: lowest and highest of each column, and means as a line.
+
+    rms  what is said of their size, where that is not the root mean square of `values` per axis
+    """
     time = residuals.time
     start, length = float(time[0]), max(float(time[-1] - time[0]), 1e-9)
     column = np.clip(((time - start) / length * COLUMNS).astype(np.int64), 0, COLUMNS - 1)
@@ -31,7 +34,7 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) ->
     np.maximum.at(high, place, values)
     top = max(float(np.abs([low, high]).max()), 1e-12)
     step = round_step(top)
-    reach = max(top, step) * 1.06
+    reach = step * np.ceil(top / step - 1e-9) * 1.06
     x = used + 0.5
 
     def y(v: Array) -> Array:
@@ -48,14 +51,13 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str) ->
         "svg", *layers, x=0, y=_TOP, width="100%", height=_HEIGHT - _TOP - _BOTTOM,
         viewBox=f"0 0 {COLUMNS} 100", preserveAspectRatio="none",
     )  # fmt: skip
-    rms = np.sqrt((values**2).mean(0))
-    named = [
-        tag("li", tag("b", axis, class_=axis), f" {general(r)} {unit}") for axis, r in zip("xyz", rms, strict=True)
-    ]
+    each = [f" {general(r)} {unit}" if rms is None else "" for r in np.sqrt((values**2).mean(0))]
+    named = [tag("li", tag("b", axis, class_=axis), said) for axis, said in zip("xyz", each, strict=True)]
+    size = "rms" if rms is None else f"rms {general(rms)} {unit} per axis, unsmoothed"
     return tag(
         "figure",
         tag("figcaption", tag("h3", title),
-            tag("ul", tag("li", "rms"), *named, class_="key", aria_label="root mean square per axis")),
+            tag("ul", tag("li", size), *named, class_="key", aria_label="root mean square per axis")),
         tag(
             "svg", *_grid(step, reach, unit), inner, *_time_axis(start, length),
             width="100%", height=_HEIGHT, class_="plot", role="img",
@@ -91,11 +93,12 @@ def _grid(step: float, reach: float, unit: str) -> list[Html]:
     """Return lines and numbers of the upright axis."""
     inner = _HEIGHT - _TOP - _BOTTOM
     rows = []
-    for k in (-1, 0, 1):
+    most = int(np.floor(reach / step))
+    for k in range(-most, most + 1):
         y = _TOP + inner * (0.5 - 0.5 * k * step / reach)
         rows.append(tag("line", x1=0, x2="100%", y1=f"{y:.1f}", y2=f"{y:.1f}", class_="grid" if k else "grid zero"))
         if k:
-            said = f"{'+' if k > 0 else '−'}{step:g} {unit}"
+            said = f"{'+' if k > 0 else '−'}{abs(k) * step:g} {unit}"
             rows.append(tag("text", said, x=0, y=f"{y - 4:.1f}", class_="tick"))
     return rows
 

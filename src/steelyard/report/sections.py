@@ -183,12 +183,18 @@ def residuals(report: Report) -> Html:
     seen = report.residuals
     if seen is None:
         return Html("")
-    shown = ", below 3 Hz, of all robots together" if isinstance(report.estimate, TeamEstimate) else ""
+    team, evidence = isinstance(report.estimate, TeamEstimate), report.estimate.evidence
+    shown = ", below 3 Hz, of all robots together, without the bias of each recording" if team else ""
     lead = (
         f"Measured less predicted{shown}. The band holds every sample, the line is a running mean; shaded stretches "
         "are at rest. A good answer leaves only noise about zero."
     )
-    plots = (residual_plot(seen, seen.force, "N", "Force"), residual_plot(seen, seen.torque, "N m", "Torque"))
+    # Of a team the rows are smoothed, and its moments are told elsewhere: the answer's own rms is said, as everywhere.
+    force, torque = (evidence.residual_force_N, evidence.residual_torque_Nm) if team else (None, None)
+    plots = (
+        residual_plot(seen, seen.force, "N", "Force", force),
+        residual_plot(seen, seen.torque, "N m", "Torque", torque),
+    )
     return section("What is left over", *plots, name="residuals", lead=lead)
 
 
@@ -244,7 +250,7 @@ def evidence(report: Report) -> Html:
     of_what = ", of all robots together, unsmoothed" if isinstance(report.estimate, TeamEstimate) else ""
     if seen.samples:
         rows += [
-            ("samples", f"{seen.samples}, of which {seen.still_samples} at rest", ""),
+            ("samples", f"{seen.samples}, of which {report.estimate.at_rest}", ""),
             ("rank", *_rank(report.estimate)),
             ("condition", general(seen.condition), "1 would be the best motion possible"),
             ("residual", f"{general(seen.residual_force_N)} N, {general(seen.residual_torque_Nm)} N m",

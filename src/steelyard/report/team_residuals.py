@@ -11,6 +11,7 @@ from steelyard.logs.team_conditioning import condition
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.report.contents import Residuals
 from steelyard.spatial import classical_acceleration, cross
+from steelyard.team.clocks.errors import ClockError, punctual
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.grasps import Grasps
 
@@ -20,6 +21,8 @@ _PAUSE_S = 0.1
 
 def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     """Return the residuals in the reference grasp of all rows with complete wrenches, below 3 Hz; None without any.
+
+    The bias that the result says each recording has is taken out, and clocks are put right by it.
 
     None also for two bodies with a hinge: what one rigid body would need leaves their motion over.
 
@@ -34,11 +37,12 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     if estimate.hinge is not None:
         return None
     grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
+    late = {name: ClockError(seconds) for name, seconds in estimate.clock_offsets_s.items() if seconds}
     start, parts = 0.0, []
     for recording in log.recordings:
         if recording.kind == "grasp" and len(log.recordings) > 1:
             continue
-        time, left = _left(log, recording, grasps, estimate)
+        time, left = _left(log, punctual(recording, late), grasps, estimate)
         if len(time):
             still = np.full(len(time), recording.kind == "still")
             parts.append((time - time[0] + start, left, still))
@@ -63,6 +67,7 @@ def _left(log: TeamLog, recording: TeamRecording, grasps: Grasps, estimate: Team
     acceleration = classical_acceleration(change, twist)
     moved = MotionLog(wrench, down, acceleration, twist[:, :3], change[:, :3])
     left = wrench - moved.predicted(estimate.parameters.vector) - estimate.wrench_bias
+    left = left - estimate.wrench_biases.get(recording.name, np.zeros(6))
     return rows.time[keep], left
 
 

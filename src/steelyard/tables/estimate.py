@@ -108,7 +108,7 @@ def _evidence_lines(estimate: Weighed) -> list[str]:
     )
     lines = [
         f"  ±          one standard deviation{explained}",
-        f"  method     {estimate.method}, rank {seen.rank}, {seen.samples} rows of which {seen.still_samples} at rest",
+        f"  method     {estimate.method}, rank {seen.rank}, {seen.samples} rows of which {estimate.at_rest}",
         f"  residual   {seen.residual_force_N:.3g} N, {seen.residual_torque_Nm:.3g} N m rms"
         + ("" if seen.chi2_per_dof is None else f"; chi² per degree of freedom {seen.chi2_per_dof:.2f}"),
     ]

@@ -57,6 +57,10 @@ class Weighed(Protocol):
         """What the data had to say."""
 
     @property
+    def at_rest(self) -> str:
+        """How many rows are at rest, in words."""
+
+    @property
     def delays_s(self) -> Mapping[str, float]:
         """By stream [s]."""
 

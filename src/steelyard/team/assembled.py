@@ -62,7 +62,16 @@ def assembled(
         grasps=estimates,
         clock_offsets_s=dict(late) if spread.late is not None else {},
         clock_offset_std_s=spread.delays(log.names),
+        wrench_biases=_biases_at(balance, payload),
     )  # fmt: skip
+
+
+def _biases_at(balance: Pose, payload: PayloadFit) -> dict[str, Array]:
+    """Return the bias (6,) of the summed wrench of every recording, at the reference and in its axes."""
+    parts = [part for group in payload.groups for part in group.parts]
+    moment, force = (balance.rotation.apply(each) for each in np.split(payload.biases, 2, axis=1))
+    moment = moment + np.cross(balance.position, force)
+    return {part.name: np.concatenate(both) for part, *both in zip(parts, moment, force, strict=True)}
 
 
 def known(body: InertialParameters, covariance: Array, units: Array) -> Mask:

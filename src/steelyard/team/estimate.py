@@ -85,7 +85,7 @@ class HingeEstimate:
     bodies: tuple[BodyEstimate, BodyEstimate]
 
 
-@dataclass(frozen=True, eq=False)
+@dataclass(frozen=True, eq=False, repr=False)
 class TeamEstimate(Estimate):
     """What the team found: the ten parameters about the origin of the reference grasp R, and where everybody holds.
 
@@ -93,6 +93,8 @@ class TeamEstimate(Estimate):
     grasps              pose of every grasp in R, by name; the reference's own is exact
     clock_offsets_s     by how much each robot's stamps are late, against the reference; empty where not estimated
     clock_offset_std_s  their standard deviations
+    wrench_biases       by recording: moment and force (6,) [N m, N] in R that the sensors of all robots together read
+                        too much; none where the bias is not estimated
     hinge               where the payload is two bodies with a hinge: then everything above is for both together, with
                         the hinge at the mean of its angles; None for one body
     """
@@ -101,7 +103,13 @@ class TeamEstimate(Estimate):
     grasps: Mapping[str, GraspEstimate] = field(default_factory=dict)
     clock_offsets_s: Mapping[str, float] = field(default_factory=dict)
     clock_offset_std_s: Mapping[str, float] = field(default_factory=dict)
+    wrench_biases: Mapping[str, Array] = field(default_factory=dict)
     hinge: HingeEstimate | None = None
+
+    @property
+    def at_rest(self) -> str:
+        """How many rows are of still recordings, in words; rests in motions are not counted."""
+        return f"{self.evidence.still_samples} in still recordings"
 
     def poses_of(self, names: Sequence[str]) -> Pose:
         """Return the poses (N,) of these robots' grasps in R."""

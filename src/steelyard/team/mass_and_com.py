@@ -55,7 +55,8 @@ def require_lift(mass_kg: float, forces: str) -> None:
     if not mass_kg > 0:
         raise CannotAnswer(
             f"{forces} must hold the payload up; they add up to a mass of {mass_kg:.3g} kg. Check the sign of the "
-            "forces (what the robot applies to the payload) and gravity in the home frames."
+            'forces: set wrench = "on-sensor" in [team] or a [[robot]] ("on-object" if that is "on-sensor"); and '
+            "gravity in the home frames."
         )
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.misread.forces import likely_factor
 from steelyard.team.misread.torques import torque_factor
 from steelyard.team.payload.fit import PayloadFit
@@ -27,6 +28,8 @@ FLAT, SLOW = 1.5, 5.0
 UNLIKE = 0.05
 # Rows of a band that show its noise.
 FEWEST = 20
+# [m] No team holds a payload by grasps so near their middle: lengths are in another unit than was said.
+NEAR = 0.01
 
 
 def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
@@ -34,8 +37,32 @@ def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Fin
 
     D  (6, 6 N) sums the pushes at B
     """
-    forces = list(_forces(fit, D, names))
-    yield from forces or _moments(fit, D, names)
+    size = float(fit.scale[1] / fit.scale[0])
+    for found in list(_forces(fit, D, names)) or _moments(fit, D, names):
+        yield _with_lengths(found, size) if size < NEAR else found
+
+
+def _with_lengths(found: Finding, size: float) -> Finding:
+    """Return the finding with the doubt that lengths are in another unit, for a team of `size` [m]."""
+    text = f"The grasps lie within {1e3 * size:.2g} mm of their middle. {found.message}"
+    remedy = (
+        'Check the unit of lengths first: are the positions of all robots in "m" where "mm" is said? If grasps are as '
+        f"near as that: {found.remedy}"
+    )
+    return Finding(found.code, text, remedy)
+
+
+def covariance_of_unexplained(fit: PayloadFit) -> Array:
+    """Return the covariance (10, 10) that what no payload explains adds: any of the parameters may be made of it.
+
+    The fit takes it for noise, which many rows average out; what is wrong in a force averages to nothing known.
+    """
+    size = float(fit.scale[1] / fit.scale[0])
+    left = (_worst(fit.groups, axes)[1:] for axes in (slice(3, 6), slice(0, 3)))
+    # What the highest band has as well is noise.
+    force, moment = (rms * np.sqrt(max(1 - coloured**-2.0, 0.0)) for rms, coloured in left)
+    mass, first = force / ROUNDED_GRAVITY, (force * size + moment) / ROUNDED_GRAVITY
+    return np.asarray(np.diag(np.repeat([mass, first, first * size], [1, 3, 6])) ** 2)
 
 
 def _forces(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:

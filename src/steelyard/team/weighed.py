@@ -44,7 +44,7 @@ from steelyard.team.team_findings import (
     unseen_gains,
     unsettled,
 )
-from steelyard.team.unexplained import unexplained
+from steelyard.team.unexplained import covariance_of_unexplained, unexplained
 
 # Below this chi^2 per degree of freedom the motion is no measurement.
 LEAST_CHI2 = -0.1
@@ -105,6 +105,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     def fitted(rows: list[tuple[BodyRows, Array]]) -> _Fitted:
         groups = _groups(rows, seen.path, highest_hz, seen.order)
+        groups = tuple(replace(group, sighted=known) for group in groups)
         groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
         return _Fitted(groups, D, C, tuple(read), fit_payload(groups, D, C, size, with_gain))
@@ -117,15 +118,18 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     if not any(one.code == "payload-not-rigid" for one in seen.findings):
         _require_mass(payload)
         require_lift(float(payload.parameters[0]), "the forces")
+    told = any(one.code in TOLD for one in (*seen.findings, *read))
+    wrong = () if told else tuple(unexplained(payload, D, log.names))
+    if wrong:
+        payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))
-    told = any(one.code in TOLD for one in (*seen.findings, *read))
     found = (
         *seen.findings,
         *read,
         *(one.finding() for one in touched),
         *odd,
-        *(() if told else unexplained(payload, D, log.names)),
+        *wrong,
         *lost_directions(team.grasps, seen.down, seen.apart),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *seen.begun.findings(log),

@@ -30,7 +30,7 @@ from steelyard.team.hinge.start import first_hinged
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.payload.body_rows import BodyRows, reach, require_runs
 from steelyard.team.payload.doubt import turned_by_step
-from steelyard.team.payload.model import of_force
+from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.motion_noise import shares_of, tilt_noise
 from steelyard.team.payload.spectra import band_edges
 from steelyard.team.poses.measured import TeamMotion

@@ -16,6 +16,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.log import Integers
 from steelyard.team.definite import definite, inverses, logarithms
+from steelyard.team.payload.gain_sight import GainSight
 from steelyard.team.payload.model import Normal
 from steelyard.team.payload.shown import RANK, SHOWN, Shown
 
@@ -80,6 +81,11 @@ class Recordings:
         """Return [phi, bias] (P + B,) of one recording."""
         return np.concatenate([self.phi, self.mean[recording] - self.blind[recording].T @ self.phi])
 
+    @property
+    def biases(self) -> Array:
+        """The bias of every recording (R, B) beside phi."""
+        return np.asarray(self.mean - np.einsum("rpb,p->rb", self.blind, self.phi))
+
     def doubt(self, recording: int) -> Array:
         """Return their covariance (P + B, P + B)."""
         blind = self.blind[recording]
@@ -99,6 +105,7 @@ class Models:
     narrow  (L', R, B, B) inverse spread of the biases drawn anew, one per kind, `kind` (L,) says which
     common  (L, B, B) V of the common bias, where there is more than one recording
     noise   (P, P) what noise in the motion adds to the information
+    gains   (R,) what changes of the forces say of the gains of every recording, where that was asked
     """
 
     ladder: Array
@@ -114,6 +121,7 @@ class Models:
     kind: Integers
     common: Array
     noise: Array
+    gains: tuple[GainSight, ...]
 
     @classmethod
     def of(cls, normals: Sequence[Normal], C: Array, ladder: Array, scale: Array) -> Models:
@@ -148,7 +156,9 @@ class Models:
         ridge = 1e-12 * np.trace(full, axis1=1, axis2=2)[:, None, None] * np.eye(size)
         seen = (inverses(full + ridge)[0] @ (scale * right)[..., None])[..., 0]
         chi2 = sum(n.constant for n in normals) - taken - np.einsum("lp,lp->l", seen, scale * right)
-        chance = ladder_chances(-0.5 * (chi2 + logarithms(np.eye(size) + full) + told), ladder)
+        gains = tuple(n.gains for n in normals if n.gains is not None)
+        seen_gains = _gain_evidence(gains, ladder)
+        chance = ladder_chances(-0.5 * (chi2 + logarithms(np.eye(size) + full) + told) + seen_gains, ladder)
         share, evidence = shares(chance), float(np.logaddexp.reduce(chance))
         told_of = np.flatnonzero(share)
         noise = sum((n.noise for n in normals), np.zeros((size, size)))
@@ -156,7 +166,7 @@ class Models:
         phi[told_of], covariance[told_of] = _answers(full[told_of], noise * unit, (scale * right)[told_of])
         return cls(
             ladder, scale * phi, unit * covariance, plain, share, evidence, np.asarray(chi2), H, g, narrow, kind,
-            common[which], noise,
+            common[which], noise, gains,
         )  # fmt: skip
 
     @property
@@ -168,6 +178,20 @@ class Models:
     def gain(self) -> float:
         """Rms share by which gains err, drawn anew or lasting: mean over sizes by their evidence."""
         return float(np.sqrt(self.share @ np.square(self.ladder[:, 2:]).sum(1)))
+
+    @property
+    def gain_squares(self) -> tuple[Array, Array]:
+        """Mean products of the gains' errors given what is seen: drawn anew (R, F, F), and lasting (F, F)."""
+        axes = len(self.gains[0].right)
+        anew, lasting = np.zeros((len(self.gains), axes, axes)), np.zeros((axes, axes))
+        every = _all_of(self.gains)
+        for size in GAIN[1:]:
+            own, lasts = (float(self.share[self.ladder[:, column] == size].sum()) for column in (2, 3))
+            if own:
+                anew += own * np.array([one.squares(size) for one in self.gains])
+            if lasts:
+                lasting += lasts * every.squares(size)
+        return anew, lasting
 
     @property
     def gainless(self) -> float:
@@ -212,6 +236,20 @@ def _distinct(ladder: bytes) -> tuple[tuple[Array, Integers], tuple[Array, Integ
     rows = np.frombuffer(ladder).reshape(-1, 4)
     own, common = (np.unique(rows[:, chosen], axis=0, return_inverse=True) for chosen in ([1, 2, 3], [0, 3]))
     return (own[0], own[1]), (common[0], common[1])
+
+
+def _gain_evidence(gains: Sequence[GainSight], ladder: Array) -> Array:
+    """Return how likely (L,), as a logarithm, the changes of forces are at every size against gains without error."""
+    if not gains or not ladder[:, 2:].any():
+        return np.zeros(len(ladder))
+    own, lasts = (np.unique(ladder[:, column], return_inverse=True) for column in (2, 3))
+    anew = np.sum([one.evidence(own[0]) for one in gains], axis=0)
+    return np.asarray(anew[own[1]] + _all_of(gains).evidence(lasts[0])[lasts[1]])
+
+
+def _all_of(gains: Sequence[GainSight]) -> GainSight:
+    """Return what all recordings together say of gains that last."""
+    return GainSight(np.sum([one.information for one in gains], axis=0), np.sum([one.right for one in gains], axis=0))
 
 
 def _common(H: Array, g: Array, share: Array) -> tuple[Array, Array, Array]:

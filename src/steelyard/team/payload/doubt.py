@@ -11,7 +11,8 @@ from steelyard.identify.regressor import basis
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit
-from steelyard.team.payload.model import Group, gain_columns
+from steelyard.team.payload.gain_sight import gain_columns
+from steelyard.team.payload.model import Group
 from steelyard.team.payload.spectra import Spectra
 
 # The features of the motion and the one of a bias among all that `Spectra` scatters.
@@ -69,19 +70,20 @@ def _moved(fit: PayloadFit, changes: Array) -> Array:
 
 
 def moved_by_gains(fit: PayloadFit, D: Array) -> Array:
-    """Return the covariance (10, 10) that gain errors of `fit.gain` add beyond their mean, which acts as a bias."""
+    """Return the covariance (10, 10) that `fit.gain_squares` add beyond the gains' mean pull, which acts as a bias."""
     force, unit = gain_columns(D)
-    back, out = _kept(fit), np.zeros((10, 10))
+    back, each = _kept(fit), list[Array]()
     for group, weights, blinds in zip(fit.groups, fit.weights, fit.blind, strict=True):
         for part, blind in zip(group.parts, blinds, strict=True):
             S = part.scatter
             mean = S[:, :, -1].sum(0) / max(float(S[:, -1, -1].sum()), 1e-300)
             seen = _seen(fit, part)
             varying = seen[:, :, 12 + force] - seen[:, :, S.shape[2] - 1, None] * mean[12 + force]
-            each = np.einsum("kau,kxu->axu", weights @ unit, varying)
-            moved = back @ _levers(fit, blind).reshape(back.shape[1], -1) @ each.reshape(-1, len(force))
-            out += fit.gain**2 * moved @ moved.T
-    return out
+            turned = np.einsum("kau,kxu->axu", weights @ unit, varying)
+            each.append(back @ _levers(fit, blind).reshape(back.shape[1], -1) @ turned.reshape(-1, len(force)))
+    moved, (anew, lasting) = np.array(each), fit.gain_squares
+    every = moved.sum(0)
+    return np.asarray((moved @ anew @ moved.swapaxes(1, 2)).sum(0) + every @ lasting @ every.T)
 
 
 def weight_by_gains(groups: Sequence[Group], D: Array) -> float:

@@ -15,13 +15,13 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
+from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.model import (
     LEAST_MASS,
     Group,
     Normal,
     least_noise,
     normal,
-    of_force,
     residual_scatter,
     units_of_body,
 )
@@ -41,7 +41,9 @@ class PayloadFit:
     scale        (10,) those units
     information  (10, 10) F, so that a change of the rows that moves F phi by d moves phi by F^-1 d
     gain         spread of the force axes' gains that the recordings show
+    gain_squares mean products of the gains' errors: drawn anew (R, 3 N, 3 N), and lasting (3 N, 3 N)
     gainless     share of the evidence that gains do not err at all
+    biases       (R, 6) that every recording is taken to have
     weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
     unsure       factor by which weights that come from the rows widen the covariance
     levers       (U, 6, Q) of biases that keep their direction in the room (`home_bias`); none in this module. Where
@@ -55,8 +57,10 @@ class PayloadFit:
     information: Array
     condition: float
     gain: float
+    gain_squares: tuple[Array, Array]
     gainless: float
     groups: tuple[Group, ...]
+    biases: Array
     weights: tuple[Array, ...]
     blind: tuple[tuple[Array, ...], ...]
     residual: Array
@@ -83,7 +87,8 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     shown = models.shown(scale)
     return PayloadFit(
         phi, models.covariance_about(phi) * unsure, shown.lost, scale, models.information[models.best],
-        shown.condition, models.gain, models.gainless, groups, found.weights, found.blind, _residual(groups),
+        shown.condition, models.gain, models.gain_squares, models.gainless, groups,
+        models.recordings(models.best).biases, found.weights, found.blind, _residual(groups),
         float(models.chi2[models.best]) / max(6 * rows - 10, 1.0), unsure,
     )  # fmt: skip
 
@@ -98,7 +103,7 @@ class _Equations:
         return group.weights(phi)
 
     def normals(self, group: Group, W: Array) -> list[Normal]:
-        return [normal(part, self.D, W, group.motion_noise) for part in group.parts]
+        return [normal(part, self.D, W, group.motion_noise, group.noise_of_gains) for part in group.parts]
 
     def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
         """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""

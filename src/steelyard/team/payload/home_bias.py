@@ -22,6 +22,7 @@ from steelyard.identify.regressor import basis
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.payload.gain_sight import gain_sight
 from steelyard.team.payload.model import Normal, normal
 from steelyard.team.payload.spectra import Spectra
 from steelyard.team.stacked import row_slices
@@ -71,13 +72,18 @@ class _Tried:
         beside = likely.recordings(likely.best)
         places = row_slices([group.parts for group in fit.groups])
         gain = self.share @ [one.gain**2 for one in self.models]
+        anew, lasting = (
+            np.tensordot(self.share, each, 1) for each in zip(*(one.gain_squares for one in self.models), strict=True)
+        )
         return replace(
             fit,
             parameters=phi,
             covariance=covariance * fit.unsure,
             information=likely.information[likely.best],
             gain=float(np.sqrt(gain)),
+            gain_squares=(anew, lasting),
             gainless=float(self.share @ [one.gainless for one in self.models]),
+            biases=beside.biases,
             blind=tuple(tuple(beside.blind[own]) for own in places),
             levers=levers if number else fit.levers,
         )
@@ -122,8 +128,9 @@ class _Homes:
         plain, wide = [], []
         for group, weights in zip(fit.groups, fit.weights, strict=True):
             for part in group.parts:
-                plain.append(normal(part, D, weights, group.motion_noise))
-                wide.append(beside_home(plain[-1], part, D, weights, levers))
+                plain.append(normal(part, D, weights, group.motion_noise, group.noise_of_gains))
+                gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else plain[-1].gains
+                wide.append(replace(beside_home(plain[-1], part, D, weights, levers), gains=gains))
         return cls(plain, wide, levers, C, fit.scale)
 
     def likely(self, ladder: Array) -> Array:

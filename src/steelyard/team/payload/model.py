@@ -15,8 +15,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.regressor import basis, motion_map
-from steelyard.logs.log import Integers, Mask
+from steelyard.logs.log import Mask
 from steelyard.logs.recording import ROUNDED_GRAVITY
+from steelyard.team.payload.gain_sight import GainSight, gain_columns, gain_sight, of_force
 from steelyard.team.payload.spectra import Spectra
 
 # Noise is never judged smaller than this share of what the payload weighs: no force sensor resolves it.
@@ -41,11 +42,18 @@ class Group:
 
     motion_noise  (K, 6, 6) of angular acceleration and acceleration less gravity
     wrench_noise  (K, 6) of the summed moment and force, beyond what the motion's noise makes
+    sighted       whether changes of forces are asked for gains: not where grasps are turned as nobody knows
     """
 
     parts: tuple[Spectra, ...]
     motion_noise: Array
     wrench_noise: Array
+    sighted: bool = True
+
+    @property
+    def noise_of_gains(self) -> Array | None:
+        """Noise of the wrench (K, 6) beside which gains are asked; None where they are not."""
+        return self.wrench_noise if self.sighted else None
 
     def weights(self, phi: Array) -> Array:
         """Return the inverse (K, 6, 6) of the noise of a row of the wrench equation."""
@@ -61,6 +69,7 @@ class Normal:
 
     H, g      of what was measured          noise  (10, 10) what the motion's noise adds to H on average
     constant  the weighted square of the wrench     pulls  (6, 3 N) bias per gain of every force axis
+    gains     what changes of the forces say of these gains, where that was asked
     """
 
     H: Array
@@ -68,22 +77,12 @@ class Normal:
     noise: Array
     constant: float
     pulls: Array
+    gains: GainSight | None = None
 
 
 def units_of_body(mass: float, size: float) -> Array:
     """Return units (10,) of a body's parameters: mass, mass times size, mass times size squared."""
     return np.repeat([mass, mass * size, mass * size**2], [1, 3, 6])
-
-
-def of_force(axes: int) -> Mask:
-    """Return which of so many axes (6 N,) of pushes, the moment of each before its force, are those of forces."""
-    return np.asarray(np.arange(axes) % 6 >= 3)
-
-
-def gain_columns(D: Array) -> tuple[Integers, Array]:
-    """Return which of the 6 N pushes are forces (3 N,), and the unit wrench at B of each (6, 3 N)."""
-    force: Integers = np.flatnonzero(of_force(D.shape[1])).astype(np.int64)
-    return force, D[:, force]
 
 
 def unit_bias(D: Array, six_axis: Mask, size: float) -> Array:
@@ -97,8 +96,11 @@ def unit_bias(D: Array, six_axis: Mask, size: float) -> Array:
     return np.asarray(out)
 
 
-def normal(part: Spectra, D: Array, W: Array, motion_noise: Array) -> Normal:
-    """Return the normal equations of one recording from its scatter; W (K, 6, 6)."""
+def normal(part: Spectra, D: Array, W: Array, motion_noise: Array, wrench_noise: Array | None = None) -> Normal:
+    """Return the normal equations of one recording from its scatter; W (K, 6, 6).
+
+    wrench_noise  (K, 6) as of `Group`, where gains are asked
+    """
     E = basis()
     S = part.scatter
     H, g = np.zeros((16, 16)), np.zeros(16)
@@ -117,7 +119,8 @@ def normal(part: Spectra, D: Array, W: Array, motion_noise: Array) -> Normal:
     force, unit = gain_columns(D)
     total = S.sum(0)
     mean = total[12 + force, -1] / max(float(total[-1, -1]), 1e-300)
-    return Normal(H, g, noise, constant, unit * mean)
+    gains = GainSight.none(len(force)) if wrench_noise is None else gain_sight(part, D, W, wrench_noise)
+    return Normal(H, g, noise, constant, unit * mean, gains)
 
 
 def residual_scatter(part: Spectra, D: Array, solution: Array, covariance: Array) -> Array:
