@@ -49,8 +49,8 @@ MAY_IMPORT: dict[str, set[str]] = {
     "io": {
         "spatial", "inertia", "logs.log", "logs.moments", "logs.recording", "logs.team_log", "logs.team_track",
         "logs.team_streams", "robots.omnid", "robots.serial", "team.estimate", "shape.mesh", "shape.tets",
-        "shape.nesting", "shape.cloud", "shape.known_space", "shape.eight_bits", "shape.views", "parts.parts", "parts.from_mesh",
-        "parts.known", "parts.hierarchy", "identify.estimate", "whole_files",
+        "shape.nesting", "shape.cloud", "shape.known_space", "shape.eight_bits", "shape.views", "parts.parts",
+        "parts.from_mesh", "parts.known", "parts.hierarchy", "identify.estimate", "whole_files",
     },
 }  # fmt: skip
 MAY_IMPORT["api"] = UPPER | {"simulate", "evaluate", "sanity", "pipelines", "io", "report", "live", "tables"}
