@@ -112,7 +112,7 @@ def test_a_view_without_a_table_is_left_out_where_others_are_moved() -> None:
 
 
 def volume(scan: Scan) -> float:
-    return carved(enclose(scan.cloud), scan.empty).mesh.volume
+    return carved(enclose(scan.cloud), scan.space).mesh.volume
 
 
 def test_a_scan_from_poses_one_degree_off_keeps_its_volume_and_says_so() -> None:

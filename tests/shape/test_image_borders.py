@@ -49,7 +49,7 @@ def test_a_bar_that_many_images_cut_off_comes_whole_where_half_of_them_hold_its_
 ) -> None:
     scan = aimed(lens, aside, distance)
     assert missing(scan) < 0.007
-    assert 0.95 < carved(enclose(scan.cloud), scan.empty).mesh.volume / VOLUME < 1.05
+    assert 0.95 < carved(enclose(scan.cloud), scan.space).mesh.volume / VOLUME < 1.05
     assert scan.findings == ()
 
 

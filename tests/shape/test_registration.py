@@ -35,7 +35,7 @@ def wrong_by(views: Views, mm: float, deg: float) -> Views:
 
 
 def volume(scan: Scan) -> float:
-    return carved(enclose(scan.cloud), scan.empty).mesh.volume
+    return carved(enclose(scan.cloud), scan.space).mesh.volume
 
 
 def test_to_seek_the_object_changes_nothing() -> None:
