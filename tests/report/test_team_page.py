@@ -16,13 +16,13 @@ from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.report import render
 from steelyard.report.drawing import drawing
-from steelyard.report.numbers import general
 from steelyard.report.team_page import team_page
 from steelyard.report.team_residuals import team_residuals
 from steelyard.report.team_scene import team_scene
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
+from steelyard.tables.numbers import general
 from steelyard.tables.team import team_table
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 from steelyard.team.joint import JointTeam
