@@ -43,7 +43,7 @@ def kept_of(path: Path, said: Any, fifths: Any) -> Kept | None:
         numbers = {name: float(values[name]) for name in _NUMBERS}
         shift, turn = map(float, values["place_std"])
         findings = tuple(_finding(each) for each in values["findings"])
-    except (ValueError, TypeError, KeyError, RecursionError, BadValue) as error:
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError, BadValue) as error:
         raise BadFile(
             f'{path}: "{SCAN}" is not what `steelyard scan` writes ({error!r}). Scan the object again.'
         ) from None

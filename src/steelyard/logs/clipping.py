@@ -16,6 +16,7 @@ CLIPPED_ROWS, CLIPPED_SHARE, CLIPPED_RATIO = 10, 0.003, 5
 NOISE_SHARE = 1e-5
 # What is left of a stream that loses more rows than this share is no fair sample: then none is left out.
 MOST_LEFT_OUT = 0.7
+LEFT_OUT, TOO_MANY = "these rows were left out", "so many cannot be left out, and these were used as they are"
 ONE_PIECE: Integers = np.zeros(0, np.int64)
 
 

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.logs.clipping import MOST_LEFT_OUT
+from steelyard.logs.clipping import LEFT_OUT, MOST_LEFT_OUT, TOO_MANY
 from steelyard.logs.recording import Stream
 from steelyard.logs.runs import runs
 
@@ -17,8 +17,8 @@ NOISY = ("force", "torque", "specific_force")
 def left_out(stream: Stream, rows: Mask) -> tuple[Stream, str]:
     """Return the stream without `rows` (N,), or all of it where they are too many, and what was done in words."""
     if rows.mean() > MOST_LEFT_OUT:
-        return stream, "so many cannot be left out, and these were used as they are"
-    return stream.rows(~rows) if rows.any() else stream, "these rows were left out"
+        return stream, TOO_MANY
+    return stream.rows(~rows) if rows.any() else stream, LEFT_OUT
 
 
 def columns_of(stream: Stream) -> Array:

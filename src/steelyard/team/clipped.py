@@ -13,7 +13,15 @@ import numpy as np
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
-from steelyard.logs.clipping import MOST_LEFT_OUT, NOISE_SHARE, clipped_rows, noise_shares, with_neighbours
+from steelyard.logs.clipping import (
+    LEFT_OUT,
+    MOST_LEFT_OUT,
+    NOISE_SHARE,
+    TOO_MANY,
+    clipped_rows,
+    noise_shares,
+    with_neighbours,
+)
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 
@@ -56,7 +64,7 @@ def _clipped(name: str, tracks: Sequence[Track]) -> tuple[list[Finding], dict[in
                     said.append((f"{quantity.capitalize()} {'xyz'[axis]} of '{name}' stops", int(rows.sum()), extreme))
                     gone |= rows
     many = gone.mean() > MOST_LEFT_OUT
-    then = "so many cannot be left out, and these were used as they are" if many else "these rows were left out"
+    then = TOO_MANY if many else LEFT_OUT
     found = [
         Finding.of("channel-saturated", f"{what} at {extreme:.6g} in {rows} of {len(gone)} rows; {then}.")
         for what, rows, extreme in said
