@@ -25,7 +25,7 @@ from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 
 if TYPE_CHECKING:
-    from steelyard.io.parts_files import SavedParts
+    from steelyard.io.shapes.parts_files import SavedParts
     from steelyard.pipelines.shape_in_parts import Shape
     from steelyard.pipelines.shared_payload import Method
     from steelyard.shape.cloud import Cloud
@@ -110,7 +110,7 @@ def _parts(parts: str | Path | Parts | None) -> tuple[Parts | None, tuple[str, .
         return parts, ()
     path = Path(parts)
     if path.suffix.lower() == ".npz":
-        from steelyard.io.parts_files import read_parts
+        from steelyard.io.shapes.parts_files import read_parts
 
         return read_parts(path).parts, ()
     mesh, notes = read_mesh_noting(path)
@@ -126,7 +126,7 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
 
     Raises BadInput or CannotAnswer, with the file's name, where nothing closed can be made of it.
     """
-    from steelyard.io.foreign_cells import in_cells_of
+    from steelyard.io.shapes.foreign_cells import in_cells_of
     from steelyard.pipelines.shape_in_parts import Shape, shape_of
 
     if isinstance(scan, Shape):
@@ -143,14 +143,14 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
 
 def save_parts(shape: Shape, path: str | Path) -> None:
     """Write a shape in parts to `path` (parts.npz), with how wrong it may be; raises BadFile."""
-    from steelyard.io.parts_files import write_parts
+    from steelyard.io.shapes.parts_files import write_parts
 
     write_parts(saved_parts(shape), path)
 
 
 def saved_parts(shape: Shape) -> SavedParts:
     """Return a shape in parts as parts.npz holds it."""
-    from steelyard.io.parts_files import SavedParts
+    from steelyard.io.shapes.parts_files import SavedParts
 
     made, error = shape.segmentation, shape.error
     unsure = (error.com_m, error.stretch, error.turn_rad)

@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from steelyard.io.object_writing import write_object
+from steelyard.io.shapes.object_writing import write_object
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.known import KnownObject, Track
 from steelyard.shape.cloud import Cloud

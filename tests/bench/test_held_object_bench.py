@@ -12,7 +12,7 @@ from steelyard.bench.held_object_cases import PART_METHODS, RIVALS
 from steelyard.bench.held_object_table import held_object_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.object_writing import write_object
+from steelyard.io.shapes.object_writing import write_object
 from steelyard.simulate.workshop import known_object
 from steelyard.workshop import catalogue
 

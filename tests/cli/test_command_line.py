@@ -20,7 +20,7 @@ import pytest
 from steelyard.cli.main import VERBS, main
 from steelyard.inertia import InertialParameters
 from steelyard.io import read_result
-from steelyard.io.recording_files import write_recording
+from steelyard.io.recordings.recording_files import write_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate import hammer
 from steelyard.spatial import Rotation

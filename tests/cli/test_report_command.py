@@ -17,10 +17,10 @@ from scipy.spatial import Delaunay
 from steelyard.cli.main import main
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.io import write_result
-from steelyard.io.object_writing import write_object
-from steelyard.io.parts_files import SavedParts, write_parts
 from steelyard.io.ply_files import write_mesh
-from steelyard.io.recording_files import write_recording
+from steelyard.io.recordings.recording_files import write_recording
+from steelyard.io.shapes.object_writing import write_object
+from steelyard.io.shapes.parts_files import SavedParts, write_parts
 from steelyard.shape.tets import TetMesh
 from steelyard.simulate import hammer
 from steelyard.simulate.workshop import known_object

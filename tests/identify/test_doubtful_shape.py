@@ -5,10 +5,10 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
+from steelyard.identify.masses.shape_error import CORE, MEASURED, ShapeError
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.people import people_jacobian
-from steelyard.identify.shape_error import CORE, MEASURED, ShapeError
 from steelyard.inertia import InertialParameters, solids
 from steelyard.inertia.parameters import frame_change
 from steelyard.parts.parts import Parts

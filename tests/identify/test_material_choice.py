@@ -8,10 +8,10 @@ from math import log
 import numpy as np
 import pytest
 
-from steelyard.identify import material_choice
-from steelyard.identify.material_choice import Choices, choose
-from steelyard.identify.material_sampling import material_prior
-from steelyard.identify.part_models import Masses
+from steelyard.identify.masses import material_choice
+from steelyard.identify.masses.material_choice import Choices, choose
+from steelyard.identify.masses.material_sampling import material_prior
+from steelyard.identify.masses.models import Masses
 from steelyard.parts.material import Material
 
 LIST = (

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from steelyard.identify.masses.shape_error import EXACT
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.rest import without_noise_of_rest
-from steelyard.identify.shape_error import EXACT
 from steelyard.inertia import solids
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts

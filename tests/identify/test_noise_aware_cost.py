@@ -7,7 +7,7 @@ import pytest
 from bench_logs import BIAS, bench_log, truth
 from hypothesis import given, settings
 
-from steelyard.identify import newton, noise_cost
+from steelyard.identify.cost import newton, noise_cost
 from steelyard.identify.problem import Problem
 from steelyard.identify.regressor import basis, design, motion_map
 from steelyard.inertia import InertialParameters, forms

@@ -10,10 +10,10 @@ import pytest
 from bent_rows import bent_row
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.problem import Problem
-from steelyard.identify.shape_error import ShapeError
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log

@@ -8,8 +8,8 @@ from functools import cache
 import numpy as np
 import pytest
 
+from steelyard.identify.masses.profiles import Profile
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.part_profiles import Profile
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts

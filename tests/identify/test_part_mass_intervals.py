@@ -7,8 +7,8 @@ import pytest
 from scipy.optimize import nnls
 from scipy.stats import halfnorm
 
-from steelyard.identify.density_priors import averaged
-from steelyard.identify.nonnegative import nonnegative_masses, spread_about
+from steelyard.identify.masses.density_priors import averaged
+from steelyard.identify.masses.nonnegative import nonnegative_masses, spread_about
 
 
 def data(seed: int, P: int, rank: int) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:

@@ -9,8 +9,8 @@ import pytest
 
 from steelyard.errors import BadValue
 from steelyard.identify.articulated import moved
+from steelyard.identify.masses.shape_error import EXACT, ShapeError
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.shape_error import EXACT, ShapeError
 from steelyard.inertia import InertialParameters, forms, solids
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from steelyard.identify import part_tilts
-from steelyard.identify.part_profiles import FEATURES, Profile
+from steelyard.identify.masses import tilting
+from steelyard.identify.masses.profiles import FEATURES, Profile
 from steelyard.shape.inside import inside
 from steelyard.workshop.catalogue import build
 
@@ -46,7 +46,7 @@ def test_the_mode_is_that_of_a_general_minimiser() -> None:
         )
 
     points = (profile.weight[None], profile.features[None], profile.per_mass[None])
-    y, tilts, found, *_ = part_tilts.fitted(
+    y, tilts, found, *_ = tilting.fitted(
         information, pull, parts.per_mass, parts.volume, precision, CENTRE, np.array([1]), variance, *points, y0,
         np.zeros(FEATURES),
     )  # fmt: skip
@@ -74,7 +74,7 @@ def test_the_score_is_the_evidence_of_a_linear_model() -> None:
     masses = np.array([2.0])
     both = np.block([[prior, np.zeros((3, FEATURES))], [np.zeros((FEATURES, 3)), np.diag(width**-2)]])
     expected = evidence(np.hstack([J, 2 * slope[0]]), both) - evidence(J, prior)
-    found = part_tilts.scores(information, pull, phi, J, H, masses, slope, width[None])
+    found = tilting.scores(information, pull, phi, J, H, masses, slope, width[None])
     assert found[0, 0] == pytest.approx(expected, rel=1e-9)
 
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from steelyard.errors import NoMasses
-from steelyard.identify.effective import Effective
+from steelyard.identify.bars.effective import Effective
+from steelyard.identify.masses.placement import misplaced
+from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.placement import misplaced
-from steelyard.identify.shape_error import ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log

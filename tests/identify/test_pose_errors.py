@@ -140,5 +140,5 @@ def test_rows_joined_say_what_all_rows_say(monkeypatch: pytest.MonkeyPatch) -> N
     log, _ = slow_log(rng, 6000, 100)
     log = with_more(log, slow_noise(rng, 6000, 100, 0.5))
     whole = NoiseAware().identify(log).std
-    monkeypatch.setattr("steelyard.identify.correlated.LONGEST", 700)
+    monkeypatch.setattr("steelyard.identify.bars.correlated.LONGEST", 700)
     assert NoiseAware().identify(log).std[:4] == pytest.approx(whole[:4], rel=0.1)

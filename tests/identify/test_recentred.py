@@ -7,11 +7,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from steelyard.identify.effective import Effective
+from steelyard.identify.bars.effective import Effective
+from steelyard.identify.masses.recentred import apart, recentred
+from steelyard.identify.masses.shape_error import MEASURED, ShapeError
 from steelyard.identify.part_masses import PartMasses
 from steelyard.identify.people import parameter_jacobian, people_jacobian
-from steelyard.identify.recentred import apart, recentred
-from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.inertia import InertialParameters, solids
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log

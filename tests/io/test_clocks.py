@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.io.clocks import Clock
+from steelyard.io.streams.clocks import Clock
 
 EVEN = 0.005 * np.arange(4000)
 

@@ -78,7 +78,7 @@ def test_pcd(tmp_path: Path, kind: str) -> None:
 
 
 def test_runs_that_repeat_are_undone() -> None:
-    from steelyard.io.pcd_files import _inflate
+    from steelyard.io.shapes.pcd_files import _inflate
 
     out = np.zeros(11, np.uint8)
     # two plain bytes "ab", then nine bytes copied from two back

@@ -11,8 +11,8 @@ import pytest
 from scipy.spatial import Delaunay
 
 from steelyard.errors import BadValue, CannotAnswer, MissingDependency
-from steelyard.io import foreign_cells
-from steelyard.io.foreign_cells import MESHERS, in_cells_of
+from steelyard.io.shapes import foreign_cells
+from steelyard.io.shapes.foreign_cells import MESHERS, in_cells_of
 from steelyard.shape.tets import TetMesh
 
 # A mesher for the test: Delaunay cells of a convex surface, one turned inside out, one point left unused.

@@ -13,13 +13,13 @@ import pytest
 from steelyard.errors import BadFile, BadValue
 from steelyard.findings import Finding
 from steelyard.io.cloud_files import read_cloud, write_cloud
-from steelyard.io.kept_scans import CELLS, SCAN
+from steelyard.io.shapes.kept_scans import CELLS, SCAN
 from steelyard.pipelines.shape_in_parts import Shape, kept, shape_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import Kept, KeptSpace
 from steelyard.shape.mesh import TriangleMesh
-from steelyard.shape.placement import Placement
 from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.scans.placement import Placement
 from steelyard.shape.views import Intrinsics
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose

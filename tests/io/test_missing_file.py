@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 
 from steelyard.errors import BadFile
-from steelyard.io.tables import find_file
+from steelyard.io.tables.files import find_file
 
 
 def test_the_folder_here_is_named_in_full(monkeypatch: pytest.MonkeyPatch, tmp_path: Path) -> None:

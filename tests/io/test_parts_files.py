@@ -13,8 +13,8 @@ import pytest
 from scipy.spatial import Delaunay
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io import parts_files
-from steelyard.io.parts_files import SavedParts, read_parts, write_parts
+from steelyard.io.shapes import parts_files
+from steelyard.io.shapes.parts_files import SavedParts, read_parts, write_parts
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.shape.tets import TetMesh
 

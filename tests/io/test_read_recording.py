@@ -304,14 +304,14 @@ def test_columns_of_text_are_left_alone(tmp_path: Path) -> None:
 
 
 def test_many_blocks(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("steelyard.io.text_blocks._BLOCK", 64)
+    monkeypatch.setattr("steelyard.io.tables.text_blocks._BLOCK", 64)
     rows = np.hstack([np.arange(50.0)[:, None], np.random.default_rng(0).normal(size=(50, 6)), np.eye(1, 4)[[0] * 50]])
     stream = only(read(tmp_path, STREAM + BY_NAME, a_csv=table(COLUMNS, rows)))
     np.testing.assert_allclose(stream.channels["force"], rows[:, 1:4], rtol=1e-11)
 
 
 def test_error_in_a_later_block_names_its_line(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("steelyard.io.text_blocks._BLOCK", 64)
+    monkeypatch.setattr("steelyard.io.tables.text_blocks._BLOCK", 64)
     lines = table(COLUMNS, ROWS[[0] * 50]).splitlines()
     lines[40] = lines[40].replace("0.2", "O.2")
     with pytest.raises(Exception, match=r'line 41, column "ty" holds "O.2", which is not a number'):
@@ -357,7 +357,7 @@ def test_parquet(tmp_path: Path) -> None:
 
 
 def test_one_file_may_serve_two_streams_and_is_read_once(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    from steelyard.io.text_table import TextTable
+    from steelyard.io.tables.text_table import TextTable
 
     reads = []
     original = TextTable.read

@@ -11,7 +11,7 @@ import pytest
 
 from steelyard.errors import BadValue
 from steelyard.io import read_recording
-from steelyard.io.recording_files import write_recording
+from steelyard.io.recordings.recording_files import write_recording
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.spatial import Rotation
 

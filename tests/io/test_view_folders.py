@@ -14,7 +14,7 @@ import pytest
 from steelyard.errors import BadFile
 from steelyard.io import bounds, view_folders
 from steelyard.io.object_pose import read_object_pose
-from steelyard.io.object_writing import write_object_views
+from steelyard.io.shapes.object_writing import write_object_views
 from steelyard.io.view_folders import read_views, write_views
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation

@@ -10,9 +10,9 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.recording_files import write_recording
+from steelyard.io.recordings.recording_files import write_recording
 from steelyard.io.team_files import read_team
-from steelyard.io.team_writing import write_team
+from steelyard.io.teams.team_writing import write_team
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate.three_omnids import three_omnids
 from steelyard.whole_files import whole_folder

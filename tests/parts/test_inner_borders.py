@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from steelyard.check import Array
-from steelyard.io.parts_files import SavedParts, read_parts, write_parts
+from steelyard.io.shapes.parts_files import SavedParts, read_parts, write_parts
 from steelyard.parts.inner_borders import cut_at_borders, over_half
 from steelyard.parts.pieces import cell_colours
 from steelyard.parts.segment import Segmentation, segment

@@ -11,9 +11,9 @@ import pytest
 import steelyard as sy
 from steelyard.errors import BadValue
 from steelyard.io import read_pendant, read_recording
-from steelyard.io.description import default_gravity
-from steelyard.io.recording_files import write_recording
-from steelyard.io.team_description import parse_team_description
+from steelyard.io.recordings.description import default_gravity
+from steelyard.io.recordings.recording_files import write_recording
+from steelyard.io.teams.team_description import parse_team_description
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording
 from steelyard.simulate import hammer
 from steelyard.simulate.team import simulate_team

@@ -19,8 +19,8 @@ from steelyard.parts.parts import Parts
 from steelyard.pipelines.options import Options
 from steelyard.pipelines.shape_in_parts import MOST_PARTS, Shape, shape_of
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.placement import Placement
 from steelyard.shape.scan import fuse
+from steelyard.shape.scans.placement import Placement
 from steelyard.simulate import hammer
 from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation

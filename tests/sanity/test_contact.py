@@ -14,7 +14,7 @@ from steelyard.identify.noise_aware import NoiseAware
 from steelyard.io.log_files import read_recording
 from steelyard.logs.alignment import align
 from steelyard.logs.log import MotionLog, Noise
-from steelyard.sanity.contact import untouched
+from steelyard.sanity.holding.contact import untouched
 from steelyard.simulate import scenarios
 from steelyard.simulate.logs import simulate_log
 from steelyard.spatial import Pose, Rotation

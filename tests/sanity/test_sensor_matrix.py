@@ -18,7 +18,7 @@ from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity import examine
-from steelyard.sanity.sensor_matrix import SURE, sensor_matrix
+from steelyard.sanity.fitted.sensor_matrix import SURE, sensor_matrix
 from steelyard.simulate import hammer
 from steelyard.simulate.logs import simulate_log
 from steelyard.spatial import Pose, Rotation

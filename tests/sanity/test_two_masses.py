@@ -9,8 +9,8 @@ import pytest
 
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
-from steelyard.sanity import two_masses as two_masses_module
-from steelyard.sanity.two_masses import TwoMasses, examine_masses, two_masses
+from steelyard.sanity.fitted import two_masses as two_masses_module
+from steelyard.sanity.fitted.two_masses import TwoMasses, examine_masses, two_masses
 from steelyard.simulate.logs import simulate_log
 
 MOTIONS = ("stop_go", "dyn_slow", "dyn_fast")

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.logs.misread import rolled
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.glance import in_axes
+from steelyard.sanity.readings.glance import in_axes
 from steelyard.spatial import Rotation
 
 Edit = Callable[[Recording], Recording]

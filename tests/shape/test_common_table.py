@@ -8,12 +8,12 @@ import manifold3d
 import numpy as np
 import pytest
 
-from steelyard.shape import common_table
 from steelyard.shape.carving import carved
-from steelyard.shape.common_table import levelled, slid
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scene import Scene, scene_of
+from steelyard.shape.scans import common_table
+from steelyard.shape.scans.common_table import levelled, slid
+from steelyard.shape.scans.scene import Scene, scene_of
 from steelyard.shape.views import Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed

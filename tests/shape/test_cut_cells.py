@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from steelyard.shape.cut_cells import crossing_edges, cut_cells
+from steelyard.shape.cells.cut_cells import crossing_edges, cut_cells
 from steelyard.shape.tets import FACES, TetMesh
 
 

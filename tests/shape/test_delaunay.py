@@ -8,9 +8,9 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from steelyard.shape.complex import Complex
-from steelyard.shape.delaunay import tetrahedra, thinly
-from steelyard.shape.tree import Tree
+from steelyard.shape.cells.complex import Complex
+from steelyard.shape.cells.delaunay import tetrahedra, thinly
+from steelyard.shape.sides.tree import Tree
 
 
 def _ball(rng: np.random.Generator) -> np.ndarray:

@@ -11,8 +11,8 @@ from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from steelyard.shape.exact_sign import determinant
 from steelyard.shape.hull import TOLERANCE, HullWork, hull_volume, hull_work, qhull
+from steelyard.shape.hulls.exact_sign import determinant
 from steelyard.shape.stand_ins import sure_hull, with_stand_ins
 from steelyard.spatial import Rotation
 

@@ -8,10 +8,10 @@ import manifold3d
 import numpy as np
 import pytest
 
-from steelyard.shape import depth_images, sight_lines
 from steelyard.shape.carving import carved
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.scans import depth_images, sight_lines
 from steelyard.shape.views import Intrinsics
 from steelyard.shape.volume import enclose
 from steelyard.simulate.scanning import scan_mesh

@@ -5,7 +5,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.known_sides import settled_along
+from steelyard.shape.points.known_sides import settled_along
 from steelyard.shape.volume import enclose
 
 RADIUS = 0.035

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.layers import Layers
+from steelyard.shape.sides.layers import Layers
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sheets import Sheet, sheet_of
 from steelyard.workshop.solids import ball, block, ring, rod, threaded

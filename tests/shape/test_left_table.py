@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.left_table import left_table
+from steelyard.shape.points.left_table import left_table
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sheets import channel, sheet_of
 from steelyard.workshop.solids import block, rod, union

@@ -8,12 +8,13 @@ from functools import cache
 import numpy as np
 import pytest
 
-from steelyard.shape import scan, scan_findings
+from steelyard.shape import scan
 from steelyard.shape.carving import carved
-from steelyard.shape.common_table import levelled
-from steelyard.shape.lens_error import Tables, _corrected, lens_by_table
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scene import scene_of
+from steelyard.shape.scans import scan_findings
+from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.lens_error import Tables, _corrected, lens_by_table
+from steelyard.shape.scans.scene import scene_of
 from steelyard.shape.views import Intrinsics, Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed, wrist_arc

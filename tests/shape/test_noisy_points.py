@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.noisy_points import settled
+from steelyard.shape.points.noisy_points import settled
 from steelyard.shape.volume import Solid, enclose
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import sheets

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.discs import Discs
 from steelyard.shape.orient import oriented
-from steelyard.shape.sheets import sheet_planes
-from steelyard.shape.spacing import Neighbours, areas
-from steelyard.shape.tree import Tree
-from steelyard.shape.winding import Sight
+from steelyard.shape.points.spacing import Neighbours, areas
+from steelyard.shape.sides.discs import Discs
+from steelyard.shape.sides.sheets import sheet_planes
+from steelyard.shape.sides.tree import Tree
+from steelyard.shape.sides.winding import Sight
 from steelyard.spatial import Pose, Rotation
 
 

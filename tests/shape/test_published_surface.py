@@ -14,7 +14,7 @@ from steelyard.io.object_folders import read_object
 from steelyard.shape.ball_pivoting import ball_pivoting
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.published_surface import OFFSET, published_surface
-from steelyard.shape.tangent_planes import tangent_normals
+from steelyard.shape.sides.tangent_planes import tangent_normals
 from steelyard.spatial import Pose, Rotation
 
 # Volume over true volume as measured of the published code.

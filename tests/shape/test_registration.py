@@ -9,13 +9,14 @@ import pytest
 from views_apart import apart
 
 from steelyard.errors import CannotAnswer
-from steelyard.shape import registration, scan
+from steelyard.shape import scan
 from steelyard.shape.carving import carved
-from steelyard.shape.common_table import levelled
-from steelyard.shape.region import object_on_table
-from steelyard.shape.registration import Seen, agreed
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scene import scene_of
+from steelyard.shape.scans import registration
+from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.region import object_on_table
+from steelyard.shape.scans.registration import Seen, agreed
+from steelyard.shape.scans.scene import scene_of
 from steelyard.shape.views import Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed

@@ -13,10 +13,10 @@ from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.shape.carving import carved
 from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.mesh import TriangleMesh
-from steelyard.shape.region import _with_its_floor
+from steelyard.shape.points.thinning import spread
 from steelyard.shape.scan import fuse
-from steelyard.shape.thinning import spread
-from steelyard.shape.underside import Underside
+from steelyard.shape.scans.region import _with_its_floor
+from steelyard.shape.scans.underside import Underside
 from steelyard.shape.views import Intrinsics, Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import D435, disturbed

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 from scipy.spatial import cKDTree
 
-from steelyard.shape.placement import placement
 from steelyard.shape.scan import fuse
+from steelyard.shape.scans.placement import placement
 from steelyard.simulate.camera import disturbed, wrist_arc
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation

@@ -6,13 +6,13 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.shape import sight_lines
 from steelyard.shape.carving import carved
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.depth_images import pixel_of
 from steelyard.shape.known_space import SeenSpace
-from steelyard.shape.medians import middle_mean, quantile
-from steelyard.shape.table_plane import table_planes
+from steelyard.shape.points.medians import middle_mean, quantile
+from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans.depth_images import pixel_of
+from steelyard.shape.scans.table_plane import table_planes
 from steelyard.shape.volume import enclose
 
 CAMERA = np.array([60.0, 60.0, 32.0, 24.0])

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import CannotAnswer
-from steelyard.shape.table_plane import find_table
+from steelyard.shape.scans.table_plane import find_table
 from steelyard.shape.views import TablePlane
 
 CAMERAS = np.array([[0.4, 0.0, 0.5], [-0.2, 0.35, 0.5], [-0.2, -0.35, 0.5]])

@@ -5,12 +5,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from steelyard.shape.complex import Complex
+from steelyard.shape.cells.complex import Complex
 from steelyard.shape.orient import SLOPE
-from steelyard.shape.sheets import sheet_planes
-from steelyard.shape.spacing import Neighbours
-from steelyard.shape.ties import Ties
-from steelyard.shape.tree import Tree
+from steelyard.shape.points.spacing import Neighbours
+from steelyard.shape.sides.sheets import sheet_planes
+from steelyard.shape.sides.ties import Ties
+from steelyard.shape.sides.tree import Tree
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import sheet_of
 from steelyard.workshop.solids import ring

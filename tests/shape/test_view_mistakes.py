@@ -12,7 +12,7 @@ import pytest
 from steelyard.errors import CannotAnswer
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import fuse
-from steelyard.shape.view_mistakes import likely_mistake
+from steelyard.shape.scans.view_mistakes import likely_mistake
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation

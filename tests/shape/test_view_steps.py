@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 from views_apart import apart
 
-from steelyard.shape.common_table import levelled
-from steelyard.shape.registration import Seen, agreed
-from steelyard.shape.scene import scene_of
-from steelyard.shape.view_steps import steps_together
+from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.registration import Seen, agreed
+from steelyard.shape.scans.scene import scene_of
+from steelyard.shape.scans.view_steps import steps_together
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.catalogue import build

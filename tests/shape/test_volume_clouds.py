@@ -10,12 +10,12 @@ import pytest
 from steelyard.errors import BadValue
 from steelyard.evaluate.solids import SAMPLES, score, true_solid, winding_of
 from steelyard.io.object_folders import read_object
+from steelyard.shape.cells.complex import Complex
+from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.complex import Complex
-from steelyard.shape.islands import without_islands
 from steelyard.shape.nesting import winding_number
+from steelyard.shape.sides.tree import Tree
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.tree import Tree
 from steelyard.shape.volume import Solid, enclose
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded

@@ -7,14 +7,14 @@ import pytest
 
 from steelyard.evaluate.solids import score, true_solid
 from steelyard.shape import filling
+from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.complex import Complex
 from steelyard.shape.orient import SLOPE, Oriented, oriented, walled
-from steelyard.shape.sheets import sheet_planes
-from steelyard.shape.spacing import Neighbours
-from steelyard.shape.tree import Tree
+from steelyard.shape.points.spacing import Neighbours
+from steelyard.shape.sides.sheets import sheet_planes
+from steelyard.shape.sides.tree import Tree
+from steelyard.shape.sides.walls import Wall
 from steelyard.shape.volume import enclose
-from steelyard.shape.walls import Wall
 from steelyard.workshop.catalogue import build
 from steelyard.workshop.sampling import spread_evenly, surface_cloud
 from steelyard.workshop.sheets import channel, sheet_of

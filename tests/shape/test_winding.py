@@ -6,11 +6,11 @@ import numpy as np
 import pytest
 from scipy.spatial import Delaunay
 
-from steelyard.shape.cells import cells
-from steelyard.shape.discs import Discs
+from steelyard.shape.cells.cells import cells
+from steelyard.shape.sides.discs import Discs
+from steelyard.shape.sides.tree import Tree
+from steelyard.shape.sides.winding import Sight
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.tree import Tree
-from steelyard.shape.winding import Sight
 
 WIDTH = 0.02
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.shape.scene import Scene
+from steelyard.shape.scans.scene import Scene
 from steelyard.spatial import Pose, Rotation
 
 

@@ -10,8 +10,8 @@ import numpy as np
 
 from steelyard import evaluate
 from steelyard.check import Array
-from steelyard.identify.linear import inverse_scaled, normal_equations
-from steelyard.identify.noise_cost import residual_map_of, weight
+from steelyard.identify.cost.linear import inverse_scaled, normal_equations
+from steelyard.identify.cost.noise_cost import residual_map_of, weight
 from steelyard.identify.regressor import design
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.log import MotionLog, Noise

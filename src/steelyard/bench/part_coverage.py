@@ -18,8 +18,8 @@ from steelyard.bench.pool import batches, spread
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
+from steelyard.identify.masses.shape_error import EXACT, MEASURED
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.shape_error import EXACT, MEASURED
 from steelyard.io.object_folders import object_folders
 from steelyard.simulate.handling import NOISE, noise_std
 

@@ -134,7 +134,7 @@ def _answer(shape: Shape, X_SW: Pose, log: MotionLog) -> Estimate:
 
 def _unseen(scanned: Scanned, bounds: Any) -> float:
     """Return the volume [m^3] over the table that the views leave unseen, by exact depth at the true poses."""
-    from steelyard.shape.sight_lines import seen_past
+    from steelyard.shape.scans.sight_lines import seen_past
 
     views = scanned.exact
     points = np.random.default_rng(0).uniform(bounds[0], bounds[1], (_SAMPLES, 3))

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
-from steelyard.identify.shape_error import ShapeError
+from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.parts.clustering import cluster
 from steelyard.parts.known import KnownObject
 from steelyard.parts.parts import Parts

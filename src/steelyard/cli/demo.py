@@ -61,7 +61,7 @@ def _held_object(seed: int, output: Path, keep: Path | None, as_json: bool) -> N
     from steelyard.cli.versus import summary, versus_table
     from steelyard.io import read_recording, result_dict, write_result
     from steelyard.io.cloud_files import write_cloud
-    from steelyard.io.recording_files import write_recording
+    from steelyard.io.recordings.recording_files import write_recording
     from steelyard.logs.alignment import align
     from steelyard.pipelines.shape_in_parts import kept, shape_of
     from steelyard.report import write_report

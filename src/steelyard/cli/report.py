@@ -16,7 +16,7 @@ from steelyard.errors import BadValue
 
 if TYPE_CHECKING:
     from steelyard.identify.estimate import Estimate
-    from steelyard.io.parts_files import SavedParts
+    from steelyard.io.shapes.parts_files import SavedParts
     from steelyard.parts.parts import Parts
     from steelyard.report import Report, Residuals, Scene, Truth
     from steelyard.shape.cloud import Cloud
@@ -188,7 +188,7 @@ def _scene(
 def _saved(parts: Path | None, scan: Path | None) -> tuple[SavedParts, Cloud | None]:
     """Return the solid in parts and the points to draw; without `parts` the scan is cut, as `identify --scan` does."""
     if parts is not None:
-        from steelyard.io.parts_files import read_parts
+        from steelyard.io.shapes.parts_files import read_parts
 
         return read_parts(parts), None if scan is None else _cloud(scan)
     from steelyard.api import saved_parts, shape_of

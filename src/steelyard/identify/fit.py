@@ -11,8 +11,8 @@ import numpy as np
 
 from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.conclude import conclude
-from steelyard.identify.correlated import score_in_time
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_levels import with_noise
 from steelyard.identify.problem import NOTHING_KNOWN, BiasPrior, Problem, require_rows, without_drift

@@ -12,10 +12,10 @@ from numpy.typing import ArrayLike
 
 from steelyard import check
 from steelyard.errors import CannotAnswer
+from steelyard.identify.cost.linear import solve_scaled
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.geodesic import Geodesic
-from steelyard.identify.linear import solve_scaled
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms

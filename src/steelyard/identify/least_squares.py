@@ -14,10 +14,10 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.identify.cost.linear import reweighted, solve_scaled
+from steelyard.identify.cost.noise_cost import weight
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
-from steelyard.identify.linear import reweighted, solve_scaled
-from steelyard.identify.noise_cost import weight
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog

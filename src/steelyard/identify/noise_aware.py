@@ -14,10 +14,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.identify import newton
+from steelyard.identify.cost import newton
+from steelyard.identify.cost.linear import reweighted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
-from steelyard.identify.linear import reweighted
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms

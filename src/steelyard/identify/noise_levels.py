@@ -8,8 +8,8 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.linear import inverse_scaled, loosest, normal_equations, reweighted
-from steelyard.identify.noise_cost import residual_map_of, weights_at
+from steelyard.identify.cost.linear import inverse_scaled, loosest, normal_equations, reweighted
+from steelyard.identify.cost.noise_cost import residual_map_of, weights_at
 from steelyard.identify.regressor import design
 from steelyard.identify.rest import RIPPLE, without_acceleration
 from steelyard.logs.log import Mask, MotionLog, Noise

@@ -19,11 +19,11 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import counted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared
+from steelyard.identify.masses.models import mixture
+from steelyard.identify.masses.shape_error import MEASURED, ShapeError
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.part_models import mixture
 from steelyard.identify.problem import Problem
 from steelyard.identify.rest import without_noise_of_rest
-from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import Moments

@@ -17,16 +17,16 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
+from steelyard.identify.bars.correlated import score_in_time
+from steelyard.identify.bars.effective import Effective
 from steelyard.identify.conclude import conclude, widened
-from steelyard.identify.correlated import score_in_time
-from steelyard.identify.effective import Effective
+from steelyard.identify.cost.linear import reweighted
 from steelyard.identify.estimate import Estimate, PartMass
 from steelyard.identify.fit import Bias, prepared, problem_of
-from steelyard.identify.linear import reweighted
-from steelyard.identify.loosened import loosened
-from steelyard.identify.misdrawn import misdrawn
-from steelyard.identify.part_findings import elsewhere, named_materials, part_findings
-from steelyard.identify.part_models import (
+from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings
+from steelyard.identify.masses.loosened import loosened
+from steelyard.identify.masses.misdrawn import misdrawn
+from steelyard.identify.masses.models import (
     Masses,
     averaged_masses,
     free_masses,
@@ -34,12 +34,12 @@ from steelyard.identify.part_models import (
     log_evidence,
     material_masses,
 )
-from steelyard.identify.part_uneven import Uneven, suspicious, uneven
-from steelyard.identify.placement import consistent, misplaced, with_mass
+from steelyard.identify.masses.placement import consistent, misplaced, with_mass
+from steelyard.identify.masses.recentred import apart, followed, recentred
+from steelyard.identify.masses.shape_error import MEASURED, ShapeError
+from steelyard.identify.masses.uneven import Uneven, suspicious, uneven
 from steelyard.identify.problem import Problem
-from steelyard.identify.recentred import apart, followed, recentred
 from steelyard.identify.rest import without_noise_of_rest
-from steelyard.identify.shape_error import MEASURED, ShapeError
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog

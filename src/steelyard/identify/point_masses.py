@@ -16,9 +16,9 @@ from scipy.optimize import nnls
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.identify.cost.linear import unit_diagonal
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
-from steelyard.identify.linear import unit_diagonal
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms

@@ -9,8 +9,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import counted
-from steelyard.identify.linear import normal_equations, solve_scaled
-from steelyard.identify.noise_cost import residual_map_of, weights_at
+from steelyard.identify.cost.linear import normal_equations, solve_scaled
+from steelyard.identify.cost.noise_cost import residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.identify.regressor import design
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise

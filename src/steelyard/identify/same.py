@@ -10,7 +10,7 @@ from scipy.special import gammaincc
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import natural_sizes
-from steelyard.identify.linear import unit_diagonal
+from steelyard.identify.cost.linear import unit_diagonal
 from steelyard.inertia import InertialParameters, forms
 
 # A result is exact to this share of mass, radius of gyration and inertia: what is typed from a data sheet is rounded.

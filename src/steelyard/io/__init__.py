@@ -5,7 +5,7 @@ from steelyard.io.pendant import read_pendant
 from steelyard.io.result_files import result_dict, write_result
 from steelyard.io.result_reading import read_result
 from steelyard.io.team_files import read_team
-from steelyard.io.team_writing import write_team
+from steelyard.io.teams.team_writing import write_team
 
 __all__ = [
     "read_pendant",

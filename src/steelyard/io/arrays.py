@@ -12,11 +12,18 @@ from numpy.typing import ArrayLike
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.io.description import ASSUMED, Description, default_gravity, measures_gravity, parse_gravity, parse_noise
 from steelyard.io.entries import Entry, listed
 from steelyard.io.log_files import recording_of
+from steelyard.io.recordings.description import (
+    ASSUMED,
+    Description,
+    default_gravity,
+    measures_gravity,
+    parse_gravity,
+    parse_noise,
+)
 from steelyard.io.rotations import ANGULAR, FORMS, TURNS
-from steelyard.io.stream_entries import FRAMED, LONGEST_DELAY, MOUNTED, QuantitySpec, StreamSpec, TimeSpec
+from steelyard.io.streams.entries import FRAMED, LONGEST_DELAY, MOUNTED, QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.table_header import Columns, Header
 from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, QUANTITIES, Mount, Recording

@@ -9,11 +9,11 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.array_table import ArrayTable, array_headers, read_numbers
 from steelyard.io.in_file import in_file
-from steelyard.io.kept_scans import CELLS, SCAN, bytes_of, kept_of
-from steelyard.io.pcd_files import read_pcd
 from steelyard.io.ply_files import read_ply
+from steelyard.io.shapes.kept_scans import CELLS, SCAN, bytes_of, kept_of
+from steelyard.io.shapes.pcd_files import read_pcd
+from steelyard.io.tables.array_table import ArrayTable, array_headers, read_numbers
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import Kept
 from steelyard.whole_files import write_bytes

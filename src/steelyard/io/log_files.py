@@ -9,14 +9,14 @@ from pathlib import Path
 from steelyard import check
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
-from steelyard.io import guess
-from steelyard.io.arm_joints import arm_of, posed, with_joints_in_order
-from steelyard.io.description import Description, read_description
-from steelyard.io.joined_tables import own_rows
-from steelyard.io.missing_rows import without_missing
-from steelyard.io.requirements import require_answerable, require_matched_rows
-from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
-from steelyard.io.tables import Table, find_file, open_table
+from steelyard.io.recordings import guess
+from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
+from steelyard.io.recordings.description import Description, read_description
+from steelyard.io.recordings.joined_tables import own_rows
+from steelyard.io.recordings.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
+from steelyard.io.streams.missing_rows import without_missing
+from steelyard.io.streams.requirements import require_answerable, require_matched_rows
+from steelyard.io.tables.files import Table, find_file, open_table
 from steelyard.logs.recording import Recording, Stream
 from steelyard.robots.serial import SerialArm
 

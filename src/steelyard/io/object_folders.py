@@ -11,12 +11,12 @@ from steelyard.check import Array
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.io.array_table import ArrayTable, read_numbers
 from steelyard.io.documents import load_json
 from steelyard.io.entries import is_number
 from steelyard.io.in_file import in_file
 from steelyard.io.json_arrays import Shape, array_of
 from steelyard.io.ply_files import read_mesh
+from steelyard.io.tables.array_table import ArrayTable, read_numbers
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.known import MOTION, KnownObject, Track, unseen_finding
 from steelyard.parts.parts import Parts

@@ -10,7 +10,7 @@ import numpy as np
 from steelyard.errors import BadDescription, BadInput
 from steelyard.io.documents import load_toml, parse_toml
 from steelyard.io.entries import Entry
-from steelyard.io.stream_entries import parse_pose
+from steelyard.io.streams.entries import parse_pose
 from steelyard.spatial import Pose
 
 _EXAMPLE = '{ position = [0, 0, 0.12], unit = "m", rotation = [1,0,0, 0,1,0, 0,0,1], form = "matrix" }'

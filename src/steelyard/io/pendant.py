@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard import check
 from steelyard.errors import BadValue
-from steelyard.io.description import ASSUMED, default_gravity
+from steelyard.io.recordings.description import ASSUMED, default_gravity
 from steelyard.io.rotations import rotation_of
 from steelyard.io.units import ANGLE
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream

@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate, Evidence, PartMass
 from steelyard.inertia import forms
-from steelyard.io.team_results import team_entries
+from steelyard.io.results.team_results import team_entries
 from steelyard.team.estimate import TeamEstimate
 from steelyard.whole_files import write_text
 

@@ -15,8 +15,8 @@ from steelyard.inertia import InertialParameters
 from steelyard.io.documents import load_json
 from steelyard.io.in_file import in_file
 from steelyard.io.json_arrays import array_of
-from steelyard.io.result_details import delays_of, evidence_of, notes_of, parts_of
-from steelyard.io.team_results import team_of
+from steelyard.io.results.result_details import delays_of, evidence_of, notes_of, parts_of
+from steelyard.io.results.team_results import team_of
 
 # Share of the largest entry of an inertia by which what was typed may be off.
 ROUNDED = 0.01

@@ -12,13 +12,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
-from steelyard.io.arm_joints import arm_of, posed, with_joints_in_order
-from steelyard.io.description import default_gravity
-from steelyard.io.joint_angles import require_likely
-from steelyard.io.stream_entries import StreamSpec
-from steelyard.io.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
-from steelyard.io.tables import Table, find_file
-from steelyard.io.team_description import RecordingSpec, RobotSpec, TeamDescription, read_team_description
+from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
+from steelyard.io.recordings.description import default_gravity
+from steelyard.io.recordings.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
+from steelyard.io.streams.entries import StreamSpec
+from steelyard.io.tables.files import Table, find_file
+from steelyard.io.teams.joint_angles import require_likely
+from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, read_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_streams import in_grasp_axes, on_one_clock

@@ -11,7 +11,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.borrowed import integer
+from steelyard.shape.hulls.borrowed import integer
 
 
 class Heap(NamedTuple):

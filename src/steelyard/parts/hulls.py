@@ -12,7 +12,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.borrowed import borrowed, integer
+from steelyard.shape.hulls.borrowed import borrowed, integer
 
 _MOST = 2**15  # vertices whose numbers fit in two bytes; of hulls with more no face is kept
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.parts.skin import Skin
-from steelyard.shape.cut_cells import crossing_edges, cut_cells
+from steelyard.shape.cells.cut_cells import crossing_edges, cut_cells
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 

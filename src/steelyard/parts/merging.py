@@ -18,8 +18,8 @@ from steelyard.check import Array
 from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
 from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place
 from steelyard.parts.reach import MOST, Room, reach, room
-from steelyard.shape.borrowed import borrowed, integer
 from steelyard.shape.hull import HullWork, hull_work
+from steelyard.shape.hulls.borrowed import borrowed, integer
 from steelyard.shape.stand_ins import StandIns, sure_hull
 
 # Hollow is counted in grains of this share of the whole volume. Unions that leave out the same tets are equally hollow,

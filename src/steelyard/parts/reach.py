@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.borrowed import borrowed, integer
+from steelyard.shape.hulls.borrowed import borrowed, integer
 
 # Points of both; of more than that no bound is made: a table has the square of it.
 MOST = 512

@@ -9,7 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
-from steelyard.shape.spacing import Neighbours
+from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross, unit_vectors
 

@@ -10,9 +10,9 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
 from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.least_squares import LeastSquares
+from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.part_cuts import PartCuts
-from steelyard.identify.shape_error import ShapeError
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.options import Options

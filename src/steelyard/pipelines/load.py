@@ -11,9 +11,9 @@ from steelyard.check import BREAKDOWNS
 from steelyard.errors import BadValue, CannotAnswer, NoMasses
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias
-from steelyard.identify.part_uneven import explains
-from steelyard.identify.placement import contradicted, lies_elsewhere
-from steelyard.identify.shape_error import MEASURED
+from steelyard.identify.masses.placement import contradicted, lies_elsewhere
+from steelyard.identify.masses.shape_error import MEASURED
+from steelyard.identify.masses.uneven import explains
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts

@@ -23,9 +23,9 @@ from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
-from steelyard.sanity.misplaced import Misplaced, misplaced, of_sensor
-from steelyard.sanity.sensor_matrix import turn_of
-from steelyard.sanity.small_slip import small_slip
+from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
+from steelyard.sanity.fitted.sensor_matrix import turn_of
+from steelyard.sanity.holding.small_slip import small_slip
 
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"

@@ -13,7 +13,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
-from steelyard.identify.shape_error import MEASURED, ShapeError
+from steelyard.identify.masses.shape_error import MEASURED, ShapeError
 from steelyard.parts.parts import Parts
 from steelyard.parts.segment import Segmentation, segment
 from steelyard.shape import carving

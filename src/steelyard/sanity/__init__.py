@@ -2,16 +2,16 @@
 
 from steelyard.sanity.after import after, drift_of, row_noise
 from steelyard.sanity.before import examine
-from steelyard.sanity.density import impossible_density, maybe_hollow
-from steelyard.sanity.frozen_rows import dead_channels
-from steelyard.sanity.gravity import fitted_gravity, levelled
-from steelyard.sanity.misplaced import examine_place
-from steelyard.sanity.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.fitted.density import impossible_density, maybe_hollow
+from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
+from steelyard.sanity.fitted.misplaced import examine_place
+from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.fitted.sensor_matrix import examine_sensor
+from steelyard.sanity.fitted.slow_sensor import allow_filter
+from steelyard.sanity.fitted.soft_arm import allow_softness
+from steelyard.sanity.fitted.two_masses import examine_masses
 from steelyard.sanity.one_body import one_body
-from steelyard.sanity.sensor_matrix import examine_sensor
-from steelyard.sanity.slow_sensor import allow_filter
-from steelyard.sanity.soft_arm import allow_softness
-from steelyard.sanity.two_masses import examine_masses
+from steelyard.sanity.rows.frozen_rows import dead_channels
 
 __all__ = [
     "after",

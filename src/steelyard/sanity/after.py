@@ -15,10 +15,10 @@ from steelyard.logs.conditioning import noise_std
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.sanity.coverage import coverage
-from steelyard.sanity.full_fit import Rows
-from steelyard.sanity.glance import channel
-from steelyard.sanity.gravity import fitted_gravity
-from steelyard.sanity.plausible import implausible
+from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.gravity import fitted_gravity
+from steelyard.sanity.fitted.plausible import implausible
+from steelyard.sanity.readings.glance import channel
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
 CHI2, NOISE_RATIO = 2.5, 2.5

@@ -7,16 +7,16 @@ from dataclasses import replace
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
-from steelyard.sanity.clock_offset import examine_offset
-from steelyard.sanity.clock_unit import examine_clock
-from steelyard.sanity.conventions import examine_conventions, examine_turns
-from steelyard.sanity.frozen_rows import dead_channels
-from steelyard.sanity.leaps import examine_sparse
-from steelyard.sanity.memory import examine_memory
 from steelyard.sanity.no_torque import without_zero_torque
-from steelyard.sanity.rows import examine_rows
-from steelyard.sanity.silent import without_silent
-from steelyard.sanity.units import examine_units
+from steelyard.sanity.readings.clock_offset import examine_offset
+from steelyard.sanity.readings.clock_unit import examine_clock
+from steelyard.sanity.readings.conventions import examine_conventions, examine_turns
+from steelyard.sanity.readings.silent import without_silent
+from steelyard.sanity.readings.units import examine_units
+from steelyard.sanity.rows.frozen_rows import dead_channels
+from steelyard.sanity.rows.judged import examine_rows
+from steelyard.sanity.rows.leaps import examine_sparse
+from steelyard.sanity.rows.memory import examine_memory
 
 # A motion is told from its neighbours in time.
 FEWEST_ROWS = 12

@@ -10,9 +10,9 @@ from steelyard.check import Mask
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
-from steelyard.sanity.contact import untouched
-from steelyard.sanity.misplaced import misplaced
-from steelyard.sanity.sensor_matrix import in_world, sensor_matrix, wrench_stream
+from steelyard.sanity.fitted.misplaced import misplaced
+from steelyard.sanity.fitted.sensor_matrix import in_world, sensor_matrix, wrench_stream
+from steelyard.sanity.holding.contact import untouched
 
 
 def one_body(

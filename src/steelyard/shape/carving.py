@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding, percent
-from steelyard.shape.islands import without_islands
+from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.known_space import KeptSpace, SeenSpace, Space
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import Solid

@@ -14,7 +14,7 @@ from steelyard.errors import BadValue
 from steelyard.shape.eight_bits import Colours, eight_bits
 from steelyard.shape.known_space import Kept
 from steelyard.shape.mesh import Integers
-from steelyard.shape.spacing import Neighbours
+from steelyard.shape.points.spacing import Neighbours
 from steelyard.spatial import Pose
 
 # Normals this near to unit vectors are left as they are.

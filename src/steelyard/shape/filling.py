@@ -8,16 +8,16 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
-from steelyard.shape.cells import cells
+from steelyard.shape.cells.cells import cells
+from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.discs import Discs
-from steelyard.shape.islands import without_islands
 from steelyard.shape.orient import DEPTH, SLOPE, Oriented, signed_links, walled
-from steelyard.shape.sheets import sheet_planes, stacked
+from steelyard.shape.sides.discs import Discs
+from steelyard.shape.sides.sheets import sheet_planes, stacked
+from steelyard.shape.sides.ties import Ties
+from steelyard.shape.sides.tree import Tree
+from steelyard.shape.sides.winding import Sight
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.ties import Ties
-from steelyard.shape.tree import Tree
-from steelyard.shape.winding import Sight
 
 CLEAR = 0.2  # doubt below which no sheets need be looked at
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread

@@ -18,8 +18,8 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.borrowed import borrowed, integer
-from steelyard.shape.hull_faces import (
+from steelyard.shape.hulls.borrowed import borrowed, integer
+from steelyard.shape.hulls.hull_faces import (
     FAR,
     FIRST,
     KEPT,

@@ -8,16 +8,16 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.complex import Complex
-from steelyard.shape.discs import Discs
-from steelyard.shape.layers import Layers
-from steelyard.shape.sheets import sheet_planes
-from steelyard.shape.spacing import Neighbours, areas
-from steelyard.shape.ties import Ties
-from steelyard.shape.tree import Tree
-from steelyard.shape.walls import Wall
-from steelyard.shape.winding import Sight
+from steelyard.shape.points.spacing import Neighbours, areas
+from steelyard.shape.sides.discs import Discs
+from steelyard.shape.sides.layers import Layers
+from steelyard.shape.sides.sheets import sheet_planes
+from steelyard.shape.sides.ties import Ties
+from steelyard.shape.sides.tree import Tree
+from steelyard.shape.sides.walls import Wall
+from steelyard.shape.sides.winding import Sight
 
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15

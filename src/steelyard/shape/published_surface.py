@@ -21,7 +21,7 @@ from steelyard.errors import BadValue
 from steelyard.shape.ball_pivoting import ball_pivoting
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
-from steelyard.shape.tangent_planes import tangent_normals
+from steelyard.shape.sides.tangent_planes import tangent_normals
 from steelyard.shape.tets import TetMesh
 
 # Shares of the diagonal.

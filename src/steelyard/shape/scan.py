@@ -13,24 +13,24 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
-from steelyard.shape import sight_lines
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.common_table import levelled
 from steelyard.shape.known_space import SeenSpace
-from steelyard.shape.lens_error import lens_by_table
-from steelyard.shape.patches import surface_of, surfels
-from steelyard.shape.placement import Placement, placement
-from steelyard.shape.region import followed, lost_share
-from steelyard.shape.registration import Seen, agreed
-from steelyard.shape.scan_colours import colours_of
-from steelyard.shape.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
-from steelyard.shape.scene import LEAST_VIEWS, Scene, scene_of
-from steelyard.shape.spacing import Neighbours
-from steelyard.shape.stand import put_on_stand
-from steelyard.shape.thinning import in_cubes, spread, spread_to
-from steelyard.shape.underside import DOWNWARD, Underside, closed_below
-from steelyard.shape.uneven import uneven
-from steelyard.shape.view_mistakes import likely_mistake
+from steelyard.shape.points.spacing import Neighbours
+from steelyard.shape.points.thinning import in_cubes, spread, spread_to
+from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.lens_error import lens_by_table
+from steelyard.shape.scans.patches import surface_of, surfels
+from steelyard.shape.scans.placement import Placement, placement
+from steelyard.shape.scans.region import followed, lost_share
+from steelyard.shape.scans.registration import Seen, agreed
+from steelyard.shape.scans.scan_colours import colours_of
+from steelyard.shape.scans.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
+from steelyard.shape.scans.scene import LEAST_VIEWS, Scene, scene_of
+from steelyard.shape.scans.stand import put_on_stand
+from steelyard.shape.scans.underside import DOWNWARD, Underside, closed_below
+from steelyard.shape.scans.uneven import uneven
+from steelyard.shape.scans.view_mistakes import likely_mistake
 from steelyard.shape.views import TablePlane, Views
 from steelyard.shape.working_cloud import in_small_pieces
 from steelyard.spatial import Pose, Rotation

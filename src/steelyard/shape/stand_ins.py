@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.hull import HullWork, hull_volume, qhull
-from steelyard.shape.hull_faces import KEPT
+from steelyard.shape.hulls.hull_faces import KEPT
 
 T = TypeVar("T")
 _MET, _ASKED = 0, 1

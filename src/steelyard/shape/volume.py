@@ -16,7 +16,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.filling import CLEAR, Filled, by_walls, clearer_alone, filled, outward
 from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import SLOPE, Oriented, oriented
-from steelyard.shape.sheets import torn
+from steelyard.shape.sides.sheets import torn
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.thin_walls import blurred_walls, share_within_noise, thinner_than_seen, within_noise
 

@@ -11,12 +11,12 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.known_sides import settled_along
-from steelyard.shape.left_table import left_table
 from steelyard.shape.mesh import Integers
-from steelyard.shape.noisy_points import settled
-from steelyard.shape.spacing import Neighbours
-from steelyard.shape.thinning import spread_to
+from steelyard.shape.points.known_sides import settled_along
+from steelyard.shape.points.left_table import left_table
+from steelyard.shape.points.noisy_points import settled
+from steelyard.shape.points.spacing import Neighbours
+from steelyard.shape.points.thinning import spread_to
 
 LEAST = 20  # points that can show a solid
 _TOO_LONG_M, _TOO_SHORT_M = 5.0, 0.005  # no object that an arm holds is longer, or shorter

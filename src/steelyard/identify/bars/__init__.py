@@ -1,0 +1,1 @@
+"""Error bars: correlated noise, errors that come back with the pose, answers without one pose."""

@@ -1,0 +1,87 @@
+"""From what a log says about phi to the masses of parts: free, averaged over models, or from a list of materials."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.bars.effective import Effective
+from steelyard.identify.masses import density_priors
+from steelyard.identify.masses.material_choice import Choices, choose
+from steelyard.identify.masses.nonnegative import nonnegative_masses, spread_about
+from steelyard.parts.material import Material
+from steelyard.parts.parts import Parts
+
+
+@dataclass(frozen=True, eq=False)
+class Masses:
+    """Masses (P,) [kg] with covariance (P, P), and the material choices looked at where there was a list."""
+
+    mean: Array
+    covariance: Array
+    choices: Choices | None = None
+
+
+def free_masses(data: Effective, parts: Parts) -> Masses:
+    """Return masses that are only kept from falling below zero."""
+    A, b = _in_masses(data, parts)
+    mean = nonnegative_masses(A, b)
+    return Masses(mean, spread_about(A, b, mean))
+
+
+def free_mean(data: Effective, parts: Parts) -> Array:
+    """Return the masses (P,) of `free_masses` alone, without their covariance."""
+    return np.asarray(nonnegative_masses(*_in_masses(data, parts)))
+
+
+def averaged_masses(data: Effective, parts: Parts) -> Masses:
+    """Return masses averaged by evidence over one common density and groups of equal density."""
+    A, b = _in_masses(data, parts)
+    if len(parts) == 1:
+        return free_masses(data, parts)
+    mean, covariance, _ = density_priors.averaged(_families(A, b, parts.volume))
+    return Masses(mean, covariance)
+
+
+def log_evidence(data: Effective, parts: Parts) -> Array:
+    """Return the log evidence (F,) of the parts, summed over the models of each family.
+
+    Up to a constant of the data alone, so that different cuts of one object compare.
+    """
+    families = _families(*_in_masses(data, parts), parts.volume)
+    return np.array([float(np.logaddexp.reduce(evidence)) for _, evidence, _ in families])
+
+
+def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]) -> Masses:
+    """Return masses averaged by evidence over the choices of one material per part."""
+    A, b = _in_masses(data, parts)
+    guess = averaged_masses(data, parts).mean
+    choices = choose(A, b, parts.volume, materials, guess)
+    mean, covariance = choices.mixture()
+    return Masses(mean, covariance, choices)
+
+
+def mixture(weight: Array, means: Sequence[Array], covariances: Sequence[Array]) -> tuple[Array, Array]:
+    """Return mean (n,) and covariance (n, n) of a mixture with weights (K,), the spread between its means included."""
+    mean = weight @ np.stack(means)
+    off = np.stack(means) - mean
+    return mean, np.einsum("k,kij->ij", weight, np.stack(covariances)) + np.einsum("k,ki,kj->ij", weight, off, off)
+
+
+def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:
+    """Return A (P, P) and b (P,): the data as m^T A m / 2 - b^T m."""
+    B = parts.per_mass
+    return B.T @ data.information @ B, B.T @ data.pull
+
+
+def _families(A: Array, b: Array, volume: Array) -> list[tuple[Array, Array, Array]]:
+    """Return both families of density models: masses, log evidence and covariances of each model."""
+    start = np.full(len(volume), np.log(max(float(nonnegative_masses(A, b).sum()), 1e-6) / volume.sum()))
+    common = density_priors.common_density(A, b, volume, start)
+    widest = np.log(common[0][-1] / volume)
+    starts = density_priors.first_partitions(widest)
+    masses, evidence, spread, _, looked = density_priors.equal_groups(A, b, volume, widest, starts)
+    return [common, (masses[:looked], evidence[:looked], spread[:looked])]

@@ -1,0 +1,1 @@
+"""Log descriptions: checked, guessed, proposed and written, and the files that they name."""

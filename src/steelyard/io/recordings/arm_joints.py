@@ -1,0 +1,107 @@
+"""Positions of an arm's joints become the pose of the sensor in the base."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array, Mask
+from steelyard.errors import BadDescription, BadValue
+from steelyard.io.entries import listed
+from steelyard.io.recordings.description import ArmSpec
+from steelyard.io.rotations import TURNS
+from steelyard.io.streams.entries import QuantitySpec, StreamSpec
+from steelyard.io.tables.files import Table, choose_columns, find_file
+from steelyard.io.units import ANGLE
+from steelyard.io.urdf_files import read_arm
+from steelyard.logs.recording import Stream
+from steelyard.robots.serial import SerialArm
+
+# From so many turning joints on, an arm at work holds one of them beyond 6.3 degrees.
+_ARM = 3
+_IN_BRACKETS = re.compile(r"\[([^\]]+)\]$")
+
+
+def arm_of(said: ArmSpec, path: Path, data: Path | None) -> SerialArm:
+    """Return the arm that the description at `path` names, its URDF sought as data files are; raises BadFile."""
+    return read_arm(find_file(said.urdf, path.parent, data, f"{said.where}, urdf"), said.sensor_link, said.base_link)
+
+
+def with_joints_in_order(spec: StreamSpec, table: Table, arm: SerialArm) -> StreamSpec:
+    """Return the stream with one column per joint of the arm, from base to sensor; raises BadDescription."""
+    quantities = tuple(
+        replace(q, columns=_columns(q, table, arm)) if q.name == "joint_position" else q for q in spec.quantities
+    )
+    return replace(spec, quantities=quantities)
+
+
+def posed(spec: StreamSpec, stream: Stream, arm: SerialArm) -> Stream:
+    """Return the stream with the positions (N, n) of the arm's joints as `rotation` and `position` of the sensor in W.
+
+    Rows that hold no number hold none afterwards. Raises BadValue where the unit of angles is another.
+    """
+    quantity = next((q for q in spec.quantities if q.name == "joint_position"), None)
+    if quantity is None:
+        return stream
+    sliding = np.array([joint.kind == "prismatic" for joint in arm.moving])
+    positions = stream.channels["joint_position"] / np.where(sliding, ANGLE[quantity.unit], 1.0)
+    good: Mask = np.asarray(np.isfinite(positions).all(1))
+    _require_likely(quantity, positions[good][:, ~sliding])
+    pose = arm.pose(positions[good])
+    found = {"rotation": np.full((len(good), 3, 3), np.nan), "position": np.full((len(good), 3), np.nan)}
+    found["rotation"][good], found["position"][good] = pose.rotation.matrix, pose.position
+    kept = {name: values for name, values in stream.channels.items() if name != "joint_position"}
+    return replace(stream, channels=kept | {name: check.frozen(values) for name, values in found.items()})
+
+
+def _columns(spec: QuantitySpec, table: Table, arm: SerialArm) -> tuple[int, ...]:
+    """Return the column of each joint: by its name where columns have names of joints, else as they stand."""
+    numbers = choose_columns(table.header, spec.columns, None, spec.where)
+    names = table.header.names
+    labels = [_label(names[n]) for n in numbers] if names else []
+    joints = [joint.name for joint in arm.moving]
+    found = [_places(joint, labels) for joint in joints]
+    if all(len(places) == 1 for places in found) and len({places[0] for places in found}) == len(joints):
+        return tuple(numbers[places[0]] for places in found)
+    if any(found) or (names and any(label != names[n] for label, n in zip(labels, numbers, strict=True))):
+        raise BadDescription(
+            f"{spec.where}: columns are named after joints, but not one after each of the arm's: {listed(joints)}. "
+            f"Named are {listed(labels)}."
+        )
+    if len(numbers) != len(joints):
+        raise BadDescription(
+            f"{spec.where}: the arm has {len(joints)} joints from base to sensor ({listed(joints)}); {len(numbers)} "
+            "columns are given. Give theirs in this order, or columns with their names."
+        )
+    return numbers
+
+
+def _label(column: str) -> str:
+    """Return what a column is called by: "position[elbow]" by "elbow", "q[0]" as it stands."""
+    inside = _IN_BRACKETS.search(column)
+    return inside.group(1) if inside and not inside.group(1).isdigit() else column
+
+
+def _places(joint: str, labels: Sequence[str]) -> list[int]:
+    """Return which labels are a joint's name; if none is, which hold it beside a prefix or within a path."""
+    exact = [k for k, label in enumerate(labels) if label == joint]
+    return exact or [k for k, label in enumerate(labels) if joint in label]
+
+
+def _require_likely(spec: QuantitySpec, angles: Array) -> None:
+    largest = float(np.abs(angles).max(initial=0.0))
+    if largest > TURNS:
+        raise BadValue(
+            f"{spec.where}: joints turn by up to {largest:.4g} rad, more than two turns. They are probably in degrees: "
+            'set unit = "deg".'
+        )
+    if spec.unit == "deg" and len(angles) and angles.shape[1] >= _ARM and largest <= np.radians(2 * np.pi):
+        raise BadValue(
+            f"{spec.where}: no joint is ever beyond {np.degrees(largest):.4g} deg. They are probably in radians: "
+            'set unit = "rad".'
+        )

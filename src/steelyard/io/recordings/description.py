@@ -1,0 +1,165 @@
+"""The log description (TOML) as checked values; no data file is opened here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadDescription
+from steelyard.io.documents import load_toml
+from steelyard.io.entries import Entry
+from steelyard.io.example import EXAMPLE
+from steelyard.io.object_pose import ObjectPose, parse_object_pose
+from steelyard.io.streams.entries import StreamSpec, parse_stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD, STANDARD_GRAVITY
+
+# [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
+_WEAKEST, _STRONGEST = 0.1, 100.0
+_LOUDEST = 1e6
+NOISE = ("force", "torque", "acceleration", "angular_acceleration")  # whose standard deviation can be told
+ARM = ("urdf", "sensor_link", "base_link")  # keys that describe an arm
+_SECTIONS = ("log", "noise", "object", "stream", "robot")
+
+# Gravity that nobody states, and how well it is known.
+ASSUMED = f"{STANDARD_GRAVITY} ± {STANDARD_GRAVITY * ASSUMED_GRAVITY_STD:.3f} m/s²"
+LEVEL_BASE = f"[log] gives no gravity: {ASSUMED} along -z of W, a level base, was assumed"
+
+
+def default_gravity() -> Array:
+    """Return standard gravity in W, z up (3,) [m/s^2]: what holds where a description does not say."""
+    return np.array([0.0, 0.0, -STANDARD_GRAVITY])
+
+
+def measures_gravity(streams: Sequence[StreamSpec]) -> bool:
+    """Return whether a stream measures gravity."""
+    return any(quantity.name == "gravity" for spec in streams for quantity in spec.quantities)
+
+
+@dataclass(frozen=True)
+class ArmSpec:
+    """Where the arm is described: path of its URDF as written, the sensor's link, and the base's, None for the root."""
+
+    urdf: str
+    sensor_link: str
+    base_link: str | None
+    where: str
+
+
+@dataclass(frozen=True, eq=False)
+class Description:
+    """What a description says.
+
+    gravity      (3,) [m/s^2] in W, and the relative standard deviation of its length
+    wrench_sign  +1 on-object, -1 on-sensor
+    noise        standard deviations, SI
+    tool         path of a result, as written
+    placed       pose of O in S, None where nothing says
+    arm          where the arm's joints are described, None where nothing says
+    notes        what was left to be assumed
+    """
+
+    streams: tuple[StreamSpec, ...]
+    gravity: Array = field(default_factory=default_gravity)
+    wrench_sign: int = 1
+    noise: Mapping[str, float] = field(default_factory=dict)
+    tool: str | None = None
+    placed: ObjectPose | None = None
+    arm: ArmSpec | None = None
+    notes: tuple[str, ...] = ()
+    gravity_std: float = 0.0
+
+
+def read_description(path: Path) -> Description:
+    """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
+    return parse_description(load_toml(path), path.name)
+
+
+def parse_description(values: Mapping[str, Any], name: str) -> Description:
+    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription."""
+    top = Entry(values, name)
+    if "team" in top:
+        raise top.error("[team] makes this a team description. Use it with: steelyard team")
+    top.only(*_SECTIONS)
+    log = top.section("log")
+    log.only("gravity", "wrench", "tool")
+    gravity = parse_gravity(log) if "gravity" in log else default_gravity()
+    placed = parse_object_pose(top.section("object"))
+    streams = _streams(top)
+    arm = _arm(top) if "robot" in top else None
+    _require_arm_for_joints(streams, arm)
+    told = "gravity" in log or measures_gravity(streams)
+    return Description(
+        streams=streams,
+        gravity=gravity,
+        wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
+        noise=parse_noise(top.section("noise")),
+        tool=log.text("tool"),
+        placed=placed,
+        arm=arm,
+        notes=() if told else (LEVEL_BASE,),
+        gravity_std=0.0 if told else ASSUMED_GRAVITY_STD,
+    )
+
+
+def parse_gravity(entry: Entry) -> Array:
+    """Return `gravity` (3,) [m/s^2]; raises BadDescription where nothing on Earth is as heavy or as light."""
+    gravity = entry.numbers("gravity", 3)
+    if not gravity.any():
+        raise entry.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
+    if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
+        raise entry.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
+    return gravity
+
+
+def _short(values: Array) -> str:
+    return f"[{', '.join(f'{v:g}' for v in values)}]"
+
+
+def parse_noise(entry: Entry) -> dict[str, float]:
+    """Return the standard deviations that `entry` gives, SI; raises BadDescription."""
+    entry.only(*NOISE)
+    return {key: entry.positive(key, _LOUDEST) for key in NOISE if key in entry}
+
+
+def _arm(top: Entry) -> ArmSpec:
+    entry = top.section("robot")
+    if "model" in entry:
+        raise entry.error('"model" is for teams. Give an arm\'s urdf = "arm.urdf" and sensor_link = "..".')
+    entry.only(*ARM)
+    return parse_arm(entry)
+
+
+def parse_arm(entry: Entry) -> ArmSpec:
+    """Return what `entry` says of an arm under the keys ARM; raises BadDescription."""
+    for key, example in (("urdf", 'urdf = "arm.urdf"'), ("sensor_link", 'sensor_link = "tool0"')):
+        entry.require(key, example)
+    return ArmSpec(str(entry.text("urdf")), str(entry.text("sensor_link")), entry.text("base_link"), entry.where)
+
+
+def _require_arm_for_joints(streams: Sequence[StreamSpec], arm: ArmSpec | None) -> None:
+    """Raise BadDescription where joints have no arm, or the pose that they tell is told again."""
+    for spec in streams:
+        if "joint_position" not in spec.names:
+            continue
+        if arm is None:
+            raise BadDescription(
+                f'{spec.where}: "joint_position" needs the arm. Add [robot] with urdf = "arm.urdf" and sensor_link = '
+                '".."; or give the orientation of the sensor, as rotation = { columns = [..], form = .. }.'
+            )
+        if twice := [name for other in streams for name in ("rotation", "position") if name in other.names]:
+            raise BadDescription(f'{spec.where}: "joint_position" tells the {twice[0]}, too. Give one of them.')
+
+
+def _streams(top: Entry) -> tuple[StreamSpec, ...]:
+    value = top.values.get("stream", [])
+    if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
+        raise top.error("streams are written as sections that start with [[stream]].")
+    if not value:
+        raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
+    streams = [parse_stream(Entry(item, f"{top.where}, [[stream]] {i}")) for i, item in enumerate(value, 1)]
+    return tuple(streams)

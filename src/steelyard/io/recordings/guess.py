@@ -1,0 +1,178 @@
+"""A bare data file becomes a description when its column names are the usual ones.
+
+A unit in brackets is taken; a vector whose meaning its numbers leave open (gx may be a gyro) is left out.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array, Mask
+from steelyard.io.entries import listed
+from steelyard.io.recordings.description import ASSUMED, Description, default_gravity
+from steelyard.io.recordings.not_told import cannot_tell, own_lines, require_told
+from steelyard.io.streams.channels import channel_with_gaps
+from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
+from steelyard.io.streams.missing_rows import stand_apart
+from steelyard.io.streams.usual_names import (
+    STEMS,
+    Names,
+    array_names,
+    compared,
+    rotation_named,
+    said_unit,
+    said_units,
+    time_columns,
+    vector_named,
+)
+from steelyard.io.tables.files import Table
+from steelyard.io.units import TIME, UNITS
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD
+
+Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
+_UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
+
+_EPOCH = (1e9, 1e10)  # [s] stamps since 1970 lie here from 2001 to 2286
+_SLOWEST = 10.0  # [s] longer steps than this are not seconds
+_ONE_G = (0.8, 1.25)  # size of an accelerometer reading in g
+_GRAVITY = (9.7, 9.9)
+_SPECIFIC_FORCE = (8.0, 12.0)
+_NEW_POSE = float(np.cos(np.radians(5)))
+
+
+def describe(table: Table) -> tuple[Description, Cells]:
+    """Return what the names in the file say, and its cells; raises BadDescription with an example."""
+    names = _simplified(table)
+    vectors = {quantity: found for quantity in STEMS if (found := vector_named(names, quantity))}
+    rotation = rotation_named(names)
+    stamps = next(time_columns(names), ())
+    require_told(table, names, [*vectors, *(["rotation"] if rotation else [])])
+    wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
+    cells = table.read(sorted({*map(int, wanted), *stamps}), stamps)
+    specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
+    specs += [rotation] if rotation else []
+    require_told(table, names, [spec.name for spec in specs])
+    time = TimeSpec(stamps, _time_units(table, names, stamps, cells), 0.0, "time") if stamps else None
+    gravity, notes = _gravity(specs, cells)
+    poses = time is None and _turns_each_row(specs, cells, gravity)
+    where = table.path.name
+    located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
+    time = time and replace(time, where=f"{where}, time")
+    streams = [StreamSpec(where, topic, where, time, poses) for topic in _topics(located, cells, time)]
+    return Description(tuple(streams), gravity, notes=notes, gravity_std=ASSUMED_GRAVITY_STD if notes else 0.0), cells
+
+
+def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
+    """Return the quantities of each stream: all in one, or those of each topic where topics were joined by time."""
+    if time is None:
+        return [tuple(specs)]
+    topics: list[tuple[Mask, list[QuantitySpec]]] = []
+    for spec in specs:
+        held = np.logical_and.reduce([~np.isnan(cells[int(n)]) for n in spec.columns])
+        mine = next((group for rows, group in topics if not stand_apart(rows, held)), None)
+        if mine is None:
+            topics.append((held, [spec]))
+        else:
+            mine.append(spec)
+    return [tuple(group) for _, group in topics]
+
+
+def _simplified(table: Table) -> Names:
+    header = table.header
+    if header.names is None:
+        raise cannot_tell(table, "the file has no header", {})
+    plain: dict[str, int] = {}
+    units: dict[int, str] = {}
+    inner = {n for group in header.groups.values() for n in group}
+    for number, name in enumerate(header.names):
+        unit = None if number in inner else _UNIT.search(name)
+        if unit:
+            units[number] = unit.group(1)
+        simple = compared(name[: unit.start()] if unit else name)
+        if simple in plain:
+            known = Names(plain, units, header.dates)
+            raise cannot_tell(table, f'two columns are called "{simple}"', own_lines(table, known))
+        plain[simple] = number
+    return Names({**plain, **array_names(header)}, units, header.dates)
+
+
+def _vector_spec(
+    table: Table, names: Names, quantity: str, numbers: tuple[int, ...], cells: Cells
+) -> QuantitySpec | None:
+    """Return the vector with its unit, None where its size does not tell what it is."""
+    said = said_units(names, quantity, numbers)
+    if len(said) > 1:
+        reason = f"the columns of {quantity} have different units, {' and '.join(said)}; write them in one"
+        raise cannot_tell(table, reason, own_lines(table, names))
+    unit = said[0] if said else None
+    if unit is not None and unit not in UNITS[quantity]:
+        reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
+        raise cannot_tell(table, reason, own_lines(table, names))
+    if unit is None:
+        unit = _unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
+    return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)
+
+
+def _unit_by_size(quantity: str, values: Array) -> str | None:
+    """Return SI; an accelerometer shows whether it counts in g, and gravity that it is gravity."""
+    size = _size(values) if len(values) else 0.0
+    if quantity == "specific_force" and _ONE_G[0] < size < _ONE_G[1]:
+        return "g"
+    low, high = {"specific_force": _SPECIFIC_FORCE, "gravity": _GRAVITY}.get(quantity, (-1.0, np.inf))
+    return next(iter(UNITS[quantity])) if low < size < high or not np.isfinite(size) else None
+
+
+def _time_units(table: Table, names: Names, stamps: Sequence[int], cells: Cells) -> tuple[str, ...]:
+    return ("s", "ns") if len(stamps) > 1 else (_time_unit(table, names, stamps[0], cells),)
+
+
+def _time_unit(table: Table, names: Names, number: int, cells: Cells) -> str:
+    """Return the unit from the name (t_ms, t [ms]), from the size of stamps since 1970, or seconds."""
+    said = said_unit(names, number)
+    if said is not None:
+        return said
+    if cells[number].dtype.kind == "M":
+        return "s"
+    stamps = cells[number].astype(np.float64)
+    stamps = stamps[np.isfinite(stamps)]
+    for unit, per_second in TIME.items():
+        if len(stamps) and _EPOCH[0] < stamps[0] / per_second < _EPOCH[1]:
+            return unit
+    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
+    if step > _SLOWEST:
+        reason = f"time rises by {step:g} per row, which can hardly be seconds"
+        raise cannot_tell(table, reason, own_lines(table, names))
+    return "s"
+
+
+def _size(values: Array) -> float:
+    """Return the median length of the rows of (N, 3) that hold numbers; NaN where none does."""
+    sizes = np.linalg.norm(values[np.isfinite(values).all(-1)], axis=-1)
+    return float(np.median(sizes)) if len(sizes) else float("nan")
+
+
+def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[str, ...]]:
+    """Return gravity in W, z up, as long as the file's own gravity; standard where it has none, which a note says."""
+    for spec in specs:
+        if spec.name == "gravity":
+            values = np.stack([cells[int(n)] for n in spec.columns], -1)
+            return np.array([0.0, 0.0, -_size(values)]), ()
+    way = " along -z of the world" if any(spec.name == "rotation" for spec in specs) else ""
+    return default_gravity(), (
+        f"the file does not say gravity: {ASSUMED}{way} was assumed ([log] gravity of a description)",
+    )
+
+
+def _turns_each_row(specs: Sequence[QuantitySpec], cells: Cells, gravity: Array) -> bool:
+    """Whether gravity turns by more than 5 degrees from row to row: then each row is a still pose."""
+    spec = next(s for s in reversed(specs) if s.name in ("rotation", "gravity", "specific_force"))
+    values = channel_with_gaps(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)
+    down = values[:, 2] if spec.form else values / np.linalg.norm(values, axis=-1, keepdims=True)
+    cosine = np.einsum("ni,ni->n", down[1:], down[:-1])
+    cosine = cosine[np.isfinite(cosine)]
+    return bool(len(cosine)) and float(np.median(cosine)) < _NEW_POSE

@@ -1,0 +1,138 @@
+"""The streams of a description opened and read: columns, channels in SI, seconds on one origin, names."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard import check
+from steelyard.check import Array
+from steelyard.errors import BadDescription, BadValue
+from steelyard.io.entries import listed
+from steelyard.io.streams.channels import channel, channel_with_gaps, require_one_length
+from steelyard.io.streams.clocks import Clock, common_origin, require_likely_step, steady
+from steelyard.io.streams.entries import QuantitySpec, StreamSpec
+from steelyard.io.streams.split_stamps import one_column
+from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
+
+Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
+
+
+def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> list[Table]:
+    """Return the table of every stream; a file, or topic of a bag, that is named twice is opened once."""
+    opened: dict[tuple[object, ...], Table] = {}
+    for spec in specs:
+        if spec.source not in opened:
+            path = find_file(spec.path, folder, data, spec.where)
+            opened[spec.source] = open_table(path, spec.topic, spec.frames)
+    return [opened[spec.source] for spec in specs]
+
+
+def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cells]:
+    """Return the cells of every stream's own columns; each file is read once, whatever number of streams share it."""
+    own: list[set[int]] = []
+    wanted: dict[int, set[int]] = {}
+    exact: dict[int, set[int]] = {}
+    for spec, table in zip(specs, tables, strict=True):
+        stamps = time_columns(spec, table)
+        own.append({*_chosen(spec, table, stamps), *stamps})
+        wanted.setdefault(id(table), set()).update(own[-1])
+        exact.setdefault(id(table), set()).update(stamps)
+    cells: dict[int, Cells] = {}
+    for table in tables:
+        if id(table) not in cells:
+            cells[id(table)] = table.read(sorted(wanted[id(table)]), sorted(exact[id(table)]))
+    return [{n: cells[id(table)][n] for n in mine} for table, mine in zip(tables, own, strict=True)]
+
+
+def _chosen(spec: StreamSpec, table: Table, stamps: Sequence[int]) -> list[int]:
+    """Return the columns of all quantities; raises BadDescription where one is named for two things."""
+    user = dict.fromkeys(stamps, "time")
+    chosen = []
+    for quantity in spec.quantities:
+        for n in _numbers(quantity, table):
+            if n in user:
+                called = f'"{table.header.names[n]}"' if table.header.names else str(n)
+                both = f"{user[n]} and {quantity.name}" if user[n] != quantity.name else f"two axes of {user[n]}"
+                raise BadDescription(
+                    f"{spec.where}: column {called} is given for {both}. Each needs columns of its own; "
+                    f"columns in {table.path.name}: {listed(table.header.shown() or range(table.header.count))}."
+                )
+            user[n] = quantity.name
+            chosen.append(n)
+    return chosen
+
+
+def _numbers(spec: QuantitySpec, table: Table) -> tuple[int, ...]:
+    return choose_columns(table.header, spec.columns, spec.count, spec.where)
+
+
+def time_columns(spec: StreamSpec, table: Table) -> tuple[int, ...]:
+    """Return the columns of the clock, none where the stream has no stamps."""
+    if spec.time is None or not spec.time.columns:
+        return ()
+    return choose_columns(table.header, spec.time.columns, len(spec.time.units), spec.time.where)
+
+
+def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, gaps: bool = False) -> dict[str, Array]:
+    """Return quantity -> channel in SI; with `gaps`, rows that hold NaN pass as NaN, else they are an error."""
+    out: dict[str, Array] = {}
+    for quantity in spec.quantities:
+        columns = [cells[n].astype(np.float64, copy=False) for n in _numbers(quantity, table)]
+        values = (channel_with_gaps if gaps else channel)(quantity, columns, gravity)
+        out[quantity.name] = values
+        if quantity.name in ("force", "torque") and len(values) > 1 and not np.nan_to_num(values).any():
+            passive = ' or say torque = "zero" if the wrist passes no moment' if quantity.name == "torque" else ""
+            raise BadValue(
+                f"{spec.where}: {quantity.name} is zero in every row. Give the columns that hold it{passive}."
+            )
+    if spec.zero_torque:
+        if "force" not in out:
+            raise BadDescription(f'{spec.where}: torque = "zero" belongs in the stream that holds "force".')
+        out["torque"] = check.frozen(np.zeros_like(out["force"]))
+    lengths = {name: len(values) for name, values in out.items()}
+    stamps = [len(cells[n]) for n in time_columns(spec, table)]
+    require_one_length(lengths | dict(zip(("time", "its second column"), stamps, strict=False)), spec.where)
+    if not next(iter(lengths.values())):
+        raise BadValue(f"{spec.where}: the log is empty: it has no rows. Record again, or correct the path.")
+    return out
+
+
+def seconds_of(
+    specs: Sequence[StreamSpec],
+    tables: Sequence[Table],
+    cells: Sequence[Cells],
+    rows: Sequence[int],
+    gaps: bool = False,
+) -> list[Array | None]:
+    """Return seconds after one common origin; a stream with only a rate starts with the earliest clock.
+
+    With `gaps`, stamps that are missing stay NaN, else they are an error.
+    """
+    clocks: dict[int, Clock] = {}
+    for i, (spec, table, mine) in enumerate(zip(specs, tables, cells, strict=True)):
+        columns = [mine[number] for number in time_columns(spec, table)]
+        if spec.time is not None and columns:
+            stamps = one_column(columns, spec.time.units, spec.time.where)
+            clocks[i] = Clock.of(stamps, spec.time.unit, spec.time.where, gaps)
+    origin = common_origin(list(clocks.values()))
+    seconds: list[Array | None] = [clocks[i].seconds_after(origin) if i in clocks else None for i in range(len(specs))]
+    start = min((float(np.nanmin(s)) for s in seconds if s is not None), default=0.0)
+    for i, spec in enumerate(specs):
+        if spec.time is not None and not spec.time.columns:
+            require_likely_step(1 / spec.time.rate, spec.time.where)
+            seconds[i] = steady(spec.time.rate, rows[i], start)
+    return seconds
+
+
+def stream_names(specs: Sequence[StreamSpec]) -> list[str]:
+    """Return one name per stream: its path and topic, with #2, #3 .. behind where one serves several streams."""
+    names: list[str] = []
+    called = [spec.path if spec.topic is None else f"{spec.path}:{spec.topic}" for spec in specs]
+    for i, name in enumerate(called):
+        before = called[:i].count(name)
+        names.append(f"{name}#{before + 1}" if before else name)
+    return names

@@ -1,0 +1,1 @@
+"""What result files hold beside the ten numbers."""

@@ -1,0 +1,105 @@
+"""What a team's result holds beside the ten numbers: grasps, clock offsets, principal frames; written and read."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import BadFile, BadInput
+from steelyard.identify.estimate import Estimate
+from steelyard.io.json_arrays import array_of
+from steelyard.io.results.hinge_results import hinge_entries, hinge_of
+from steelyard.spatial import Pose, Rotation
+from steelyard.team.estimate import GraspEstimate, TeamEstimate
+
+MOST_ROBOTS = 10_000
+
+
+def team_entries(estimate: TeamEstimate) -> dict[str, Any]:
+    """Return the entries that only a team's result has, as arrays and numbers."""
+    return {
+        "reference": estimate.reference,
+        "grasps": {name: _grasp_entry(grasp) for name, grasp in estimate.grasps.items()},
+        "clock_offsets_s": dict(estimate.clock_offsets_s),
+        "clock_offset_std_s": dict(estimate.clock_offset_std_s),
+        "wrench_biases": dict(estimate.wrench_biases),
+        "principal_moments_kgm2": estimate.principal_moments,
+        "principal_frame": {
+            name: {"rotation": pose.rotation.matrix, "position_m": pose.position}
+            for name, pose in estimate.principal_frames.items()
+        },
+        **hinge_entries(estimate.hinge),
+    }
+
+
+def _grasp_entry(grasp: GraspEstimate) -> dict[str, Any]:
+    return {
+        "rotation": grasp.pose.rotation.matrix,
+        "position_m": grasp.pose.position,
+        "std_deg": grasp.std_deg,
+        "std_m": grasp.std_m,
+        "covariance": grasp.covariance,
+        "lost": grasp.lost,
+    }
+
+
+def team_of(path: Path, values: Mapping[str, Any], plain: Estimate) -> TeamEstimate:
+    """Return the team's result whose ten numbers are `plain`; raises BadFile."""
+    grasps = values.get("grasps")
+    if not isinstance(grasps, dict) or not 0 < len(grasps) <= MOST_ROBOTS:
+        raise BadFile(f'{path}: "grasps" must be one object with a grasp of every robot.')
+    reference = values.get("reference", plain.frame)
+    if reference not in grasps:
+        raise BadFile(f'{path}: the reference must be one of the grasps; found "{str(reference)[:40]}".')
+    known = {f.name: getattr(plain, f.name) for f in fields(Estimate)}
+    return TeamEstimate(
+        **known,
+        reference=str(reference),
+        grasps={str(name): _grasp(path, str(name), entry) for name, entry in grasps.items()},
+        clock_offsets_s=_seconds(path, values, "clock_offsets_s"),
+        clock_offset_std_s=_seconds(path, values, "clock_offset_std_s"),
+        wrench_biases=_biases(path, values),
+        hinge=hinge_of(path, values),
+    )
+
+
+def _grasp(path: Path, name: str, entry: Any) -> GraspEstimate:
+    if not isinstance(entry, dict):
+        raise BadFile(f'{path}: the grasp of "{name}" must be one object with rotation and position_m.')
+    of = f' of the grasp of "{name}"'
+    matrix = array_of(path, entry, "rotation", (3, 3), of)
+    try:
+        turn = Rotation(matrix)
+    except BadInput as error:
+        raise BadFile(f'{path}: "rotation"{of}: {error}') from None
+    place = array_of(path, entry, "position_m", (3,), of)
+    covariance = np.zeros((6, 6))
+    if "covariance" in entry:
+        covariance = array_of(path, entry, "covariance", (6, 6), of)
+    elif "std_deg" in entry and "std_m" in entry:
+        said = [array_of(path, entry, key, (3,), of) for key in ("std_deg", "std_m")]
+        covariance = np.diag(np.concatenate([np.deg2rad(said[0]), said[1]]) ** 2)
+    lost = np.zeros((0, 6))
+    if entry.get("lost"):
+        lost = array_of(path, entry, "lost", (None, 6), of)
+    return GraspEstimate(Pose(turn, place), covariance, lost)
+
+
+def _biases(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
+    """Return the bias (6,) of every recording, none where a result says nothing of it."""
+    entry = values.get("wrench_biases") or {}
+    if not isinstance(entry, dict):
+        raise BadFile(f'{path}: "wrench_biases" must be one object with six numbers for every recording.')
+    return {str(name): array_of(path, entry, name, (6,), " of wrench_biases") for name in entry}
+
+
+def _seconds(path: Path, values: Mapping[str, Any], key: str) -> dict[str, float]:
+    entry = values.get(key) or {}
+    if not isinstance(entry, dict):
+        raise BadFile(f'{path}: "{key}" must be one object of numbers.')
+    return {str(name): float(array_of(path, entry, name, (), f" of {key}")) for name in entry}

@@ -1,0 +1,1 @@
+"""Data files of all kinds as named columns: text, NPZ, Parquet, bags."""

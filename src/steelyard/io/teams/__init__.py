@@ -1,0 +1,1 @@
+"""Team descriptions: checked and written."""

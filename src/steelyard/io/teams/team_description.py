@@ -1,0 +1,206 @@
+"""The team description (TOML) as checked values; no data file is opened here."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, get_args
+
+from steelyard.check import Array
+from steelyard.io.documents import load_toml
+from steelyard.io.entries import Entry
+from steelyard.io.recordings.description import (
+    ARM,
+    ArmSpec,
+    default_gravity,
+    measures_gravity,
+    parse_arm,
+    parse_gravity,
+)
+from steelyard.io.streams.entries import StreamSpec, parse_stream
+from steelyard.logs.recording import ASSUMED_GRAVITY_STD
+from steelyard.logs.team_log import KINDS, Base, Kind
+
+EXAMPLE = """\
+[team]
+gravity   = [0, 0, -9.81]        # in each robot's home frame, m/s^2; or "unknown"
+reference = "left"
+
+[[robot]]
+name  = "left"
+model = "omnid"                  # then joint_position and joint_torque suffice
+  [[robot.recording]]
+  kind = "motion"                # "grasp", "still" or "motion"; one recording may serve all
+    [[robot.recording.stream]]
+    path           = "left.csv"
+    time           = { columns = ["t"], unit = "s" }
+    joint_position = { columns = ["q1", "q2", "q3", "q4", "q5", "q6"], unit = "rad" }
+    joint_torque   = { columns = ["tau1", "tau2", "tau3"], unit = "N*m" }
+"""
+_SIGNS = {"on-object": 1, "on-sensor": -1}
+
+
+@dataclass(frozen=True)
+class RecordingSpec:
+    """One [[robot.recording]]; `name` is None where it is matched by its place among those of its kind."""
+
+    kind: Kind
+    streams: tuple[StreamSpec, ...]
+    where: str
+    name: str | None = None
+    away: bool = False
+
+
+@dataclass(frozen=True, eq=False)
+class RobotSpec:
+    """One [[robot]]; gravity (3,) [m/s^2] in its home frame, None where it is to be estimated.
+
+    omnid, arm  whose joints its streams may tell
+    """
+
+    name: str
+    gravity: Array | None
+    base: Base
+    wrench_sign: int
+    omnid: bool
+    arm: ArmSpec | None
+    recordings: tuple[RecordingSpec, ...]
+
+
+@dataclass(frozen=True, eq=False)
+class TeamDescription:
+    """What a team description says; gravity_std as in TeamLog."""
+
+    robots: tuple[RobotSpec, ...]
+    reference: str
+    gravity_std: float = 0.0
+
+
+def read_team_description(path: Path) -> TeamDescription:
+    """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
+    return parse_team_description(load_toml(path), path.name)
+
+
+def parse_team_description(values: Mapping[str, Any], name: str) -> TeamDescription:
+    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription."""
+    top = Entry(values, name)
+    if "log" in top or "stream" in top:
+        raise top.error("[log] and [[stream]] make this the log of one robot. Use it with: steelyard identify")
+    top.only("team", "robot")
+    team = top.section("team")
+    team.only("gravity", "reference", "wrench")
+    rows = _tables(top, "robot", "[[robot]]")
+    if not rows:
+        raise top.error(f"no [[robot]] is given, so there is no team. A description begins like this:\n{EXAMPLE}")
+    robots = tuple(_robot(Entry(row, f"{name}, [[robot]] {k}"), team) for k, row in enumerate(rows, 1))
+    reference = team.text("reference")
+    measured = any(measures_gravity(own.streams) for robot in robots for own in robot.recordings)
+    told = measured or any(_states_gravity(place) for place in (team, *(Entry(row, name) for row in rows)))
+    return TeamDescription(
+        robots, robots[0].name if reference is None else reference, 0.0 if told else ASSUMED_GRAVITY_STD
+    )
+
+
+def _tables(entry: Entry, key: str, written: str) -> Sequence[Mapping[str, Any]]:
+    """Return an array of tables, empty where it is not there."""
+    value = entry.values.get(key, [])
+    if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
+        raise entry.error(f'"{key}" is written as sections that start with {written}.')
+    return value
+
+
+def _robot(entry: Entry, team: Entry) -> RobotSpec:
+    entry.require("name", 'name = "left"')
+    name = str(entry.text("name"))
+    entry = Entry(entry.values, f'{entry.where} ("{name}")')
+    entry.only("name", "model", *ARM, "base", "gravity", "wrench", "recording")
+    omnid = "model" in entry and bool(entry.choice("model", ("omnid",), ""))
+    if omnid and "urdf" in entry:
+        raise entry.error('"model" and "urdf" say the same. Give one of them.')
+    arm = parse_arm(entry) if set(ARM) & set(entry.values) else None
+    base: Any = entry.choice("base", get_args(Base), "still")
+    sign = _SIGNS[entry.choice("wrench", list(_SIGNS), team.choice("wrench", list(_SIGNS), "on-object"))]
+    rows = _tables(entry, "recording", "[[robot.recording]]")
+    if not rows:
+        raise entry.error(f"no [[robot.recording]] is given. A robot looks like this:\n{EXAMPLE}")
+    known = ("joint_position", "joint_torque") if omnid else ("joint_position",) if arm else ()
+    recordings = tuple(_recording(Entry(row, f"{entry.where}, recording {k}"), known) for k, row in enumerate(rows, 1))
+    return RobotSpec(name, _gravity(entry, team), base, sign, omnid, arm, recordings)
+
+
+def _gravity(entry: Entry, team: Entry) -> Array | None:
+    """Return the robot's own gravity, else the team's, else the standard one of a level base."""
+    for place in (entry, team):
+        if _states_gravity(place):
+            return parse_gravity(place)
+        if "gravity" in place:
+            return None
+    return default_gravity()
+
+
+def _states_gravity(entry: Entry) -> bool:
+    return "gravity" in entry and entry.values["gravity"] != "unknown"
+
+
+def _recording(entry: Entry, known: Sequence[str]) -> RecordingSpec:
+    """Check one recording of a robot whose joints are `known` by these quantities."""
+    entry.only("kind", "name", "away", "stream")
+    entry.require("kind", f'kind = "motion"; one of {", ".join(KINDS)}')
+    kind: Any = entry.choice("kind", KINDS, "")
+    away = entry.values.get("away", False)
+    if not isinstance(away, bool):
+        raise entry.error(f'"away" must be true or false; got {away!r}.')
+    rows = _tables(entry, "stream", "[[robot.recording.stream]]")
+    if away and rows:
+        raise entry.error('"away" says that the robot holds nothing in this recording; leave out its streams.')
+    if not away and not rows:
+        raise entry.error(
+            "no [[robot.recording.stream]] is given. Give one, or away = true where the robot holds nothing."
+        )
+    streams = tuple(
+        parse_stream(Entry(row, f"{entry.where}, stream {k}"), robot=True, arm="joint_torque" not in known)
+        for k, row in enumerate(rows, 1)
+    )
+    for stream in streams:
+        _check(Entry({}, stream.where), stream, known)
+    _refuse_twice(entry, streams)
+    return RecordingSpec(kind, streams, entry.where, entry.text("name"), away)
+
+
+def _check(place: Entry, stream: StreamSpec, known: Sequence[str]) -> None:
+    """Refuse what cannot be used in a team."""
+    if stream.poses or stream.time is None:
+        raise place.error(
+            "the streams of a team need time: robots are brought together by their clocks. Give "
+            'time = { columns = ["t"], unit = "s" }, or time = { rate = 100, unit = "Hz" } where all start together.'
+        )
+    joints = sorted((stream.names & {"joint_position", "joint_torque"}) - set(known))
+    if joints:
+        raise place.error(
+            f'"{joints[0]}" needs the kinematics of the robot. Write model = "omnid" in its [[robot]], or, for the '
+            'pose of an arm, urdf = "arm.urdf" and sensor_link = ".."; or give the pose and the wrench of the grasp '
+            "instead."
+        )
+    if stream.mount is not None and stream.mount.position is not None and "specific_force" in stream.names:
+        raise place.error(
+            "an accelerometer of a team must sit at the grasp: leave out the position of its mount, or leave it out."
+        )
+
+
+def _refuse_twice(entry: Entry, streams: Sequence[StreamSpec]) -> None:
+    given = [name for stream in streams for name in stream.names]
+    for name in given:
+        if given.count(name) > 1:
+            raise entry.error(f'"{name}" is given by {given.count(name)} streams. Give it in one.')
+    for name, joint in (("rotation", "joint_position"), ("position", "joint_position"), ("force", "joint_torque")):
+        if name in given and joint in given:
+            raise entry.error(f'"{name}" and "{joint}" say the same. Give one of them.')
+    if "joint_torque" in given and "joint_position" not in given:
+        raise entry.error('"joint_torque" becomes a force only at known joint angles. Give "joint_position" as well.')
+    if "force" in given and "torque" not in given:
+        raise entry.error(
+            '"force" is given without "torque". Give its columns, or torque = "zero" for a passive gimbal.'
+        )
+    if "torque" in given and "force" not in given:
+        raise entry.error('"torque" is given without "force"; half a wrench adds up to nothing. Give both.')

@@ -1,0 +1,164 @@
+"""Full fit: ten parameters and a bias by weighted least squares, with room for what a log should not contain.
+
+Extra columns (a drift, a tilt of gravity) are judged by how much they explain and by leaving out stretches of the log.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array, Integers
+from steelyard.identify.cost.linear import inverse_scaled
+from steelyard.identify.regressor import design, motion_map
+from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import features
+from steelyard.logs.noise import robust_std
+from steelyard.logs.runs import picked
+from steelyard.spatial import cross_matrix
+
+_MOST_ROWS = 3000
+_BLOCKS = 12
+_SMALLEST = 1e-9
+_MEAN_S = 1.0  # of what is slow in a residual
+RANK = 1e-9  # of the largest eigenvalue: what is below is not told
+
+
+@dataclass(frozen=True, eq=False)
+class FullFit:
+    """Weighted solution of a log.
+
+    solution    (p,) phi (10), bias (6), then the extra columns
+    covariance  (p, p) by leaving out stretches
+    left        weighted sum of squares, over the same weights for every fit of one `Rows`
+    """
+
+    solution: Array
+    covariance: Array
+    left: float
+
+    @property
+    def spread(self) -> Array:
+        """Standard deviations (p,) by leaving out stretches."""
+        return np.asarray(np.sqrt(np.diag(self.covariance)))
+
+
+@dataclass(frozen=True, eq=False)
+class Rows:
+    """A thinned log as a linear problem: columns (N, 6, 16 or 22), values (N, 6), weights (N, 6), block (N,)."""
+
+    log: MotionLog
+    columns: Array
+    values: Array
+    weights: Array
+    block: Integers
+
+    @classmethod
+    def of(cls, log: MotionLog, drift: bool = False) -> tuple[Rows, Integers]:
+        """Return the rows and which rows of the log they are; weights from the residuals of each class of rows.
+
+        drift  whether six more columns let the bias grow with time
+        """
+        pick = picked(len(log), _MOST_ROWS)
+        thin = log.rows(pick)
+        rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
+        if drift:
+            rows = replace(rows, columns=np.concatenate([rows.columns, rows.drifting()], 2))
+        for _ in range(2):
+            rows = replace(rows, weights=_weights(rows, rows.solve().solution))
+        return rows, pick
+
+    @staticmethod
+    def columns_of(log: MotionLog) -> Array:
+        """Return the regressor (N, 6, 16) of parameters and bias."""
+        return np.asarray(-np.einsum("pij,nj->nip", design(True), features(log), optimize=True))
+
+    def solve(self, extra: Array | None = None, jackknife: bool = False) -> FullFit:
+        """Return the solution with extra columns (N, 6, k)."""
+        X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
+        both = np.concatenate([X, self.values[:, :, None]], 2) * np.sqrt(self.weights)[:, :, None]
+        blocks = int(self.block.max()) + 1
+        scatter = np.stack([_gram(both[self.block == b]) for b in range(blocks)]) if jackknife else _gram(both)[None]
+        total, size = scatter.sum(0), X.shape[2]
+        solution = _solution(total, size)
+        left = float(total[size, size] - 2 * solution @ total[:size, size] + solution @ total[:size, :size] @ solution)
+        covariance = np.zeros((size, size))
+        if jackknife and blocks > 2:
+            moved = np.stack([_solution(total - s, size) for s in scatter]) - solution
+            covariance = (blocks - 1) / blocks * moved.T @ moved
+        return FullFit(solution, covariance, max(left, 0.0))
+
+    def told(self, extra: Array, least: float) -> Array:
+        """Return the combinations (k, j) of extra columns (N, 6, k) that no body with a bias mimics.
+
+        least  share of a combination's squares, its columns scaled alike, that the other columns must leave
+        """
+        both = np.concatenate([self.columns, extra], 2) * np.sqrt(self.weights)[:, :, None]
+        gram, size = _gram(both), self.columns.shape[2]
+        scale = np.sqrt(np.maximum(np.diag(gram)[size:], _SMALLEST**2))
+        across = gram[size:, :size]
+        rest = gram[size:, size:] - across @ inverse_scaled(gram[:size, :size].copy(), RANK) @ across.T
+        values, vectors = np.linalg.eigh(rest / np.outer(scale, scale))
+        return np.asarray(vectors[:, values > least] / scale[:, None])
+
+    def slowly(self, fit: FullFit, extra: Array | None = None) -> float:
+        """Return the weighted sum of squares of what a fit with extra columns (N, 6, k) leaves in means over a second.
+
+        White noise hardly lasts that long. Rows of a table are taken one by one.
+        """
+        X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
+        miss = (self.values - X @ fit.solution) * np.sqrt(self.weights)
+        if self.log.time is None:
+            return float((miss**2).sum())
+        at = np.unique(np.floor(self.log.time / _MEAN_S), return_inverse=True)[1]
+        total = np.zeros((int(at.max()) + 1, 6))
+        np.add.at(total, at, miss)
+        return float((total**2 / np.bincount(at)[:, None]).sum())
+
+    def tilting(self, phi: Array, rotation: Array, gravity: Array) -> Array:
+        """Return the derivative (N, 6, 3) of the wrench by a small turn of gravity (3,) in W [rad]."""
+        return np.asarray(motion_map(phi)[:, 3:6] @ (np.swapaxes(rotation, 1, 2) @ cross_matrix(gravity)))
+
+    def drifting(self) -> Array:
+        """Return columns (N, 6, 6) of a bias that grows by one over the log."""
+        if self.log.time is None:
+            return np.zeros((len(self.values), 6, 6))
+        time = self.log.time
+        run = (time - time.mean()) / max(float(time[-1] - time[0]), _SMALLEST)
+        return np.asarray(run[:, None, None] * np.eye(6))
+
+
+def _gram(rows: Array) -> Array:
+    flat = rows.reshape(-1, rows.shape[2])
+    return np.asarray(flat.T @ flat)
+
+
+def _solution(scatter: Array, size: int) -> Array:
+    return np.asarray(inverse_scaled(scatter[:size, :size].copy(), RANK) @ scatter[:size, size])
+
+
+def _first_weights(log: MotionLog) -> Array:
+    spread = np.maximum(log.wrench.var(0), _SMALLEST)
+    return np.broadcast_to(~log.dead / spread, log.wrench.shape).copy()
+
+
+def _weights(rows: Rows, solution: Array) -> Array:
+    """Return inverse variances (N, 6) of the residuals, by class of rows and kind of channel."""
+    miss = rows.values - rows.columns @ solution
+    out, heard = np.empty_like(miss), ~rows.log.dead
+    for kind in np.unique(rows.log.noise_class):
+        at = rows.log.noise_class == kind
+        variance = robust_std(miss[at]) ** 2 + 0.01 * miss[at].var(0)
+        mean = (variance * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1)
+        out[at] = heard / np.maximum(np.repeat(mean, 3), _SMALLEST**2)
+    return out
+
+
+def _blocks(log: MotionLog) -> Integers:
+    """Return the stretch (N,) each row belongs to: even stretches of time, or the rows of a table one by one."""
+    if log.time is None:
+        return np.arange(len(log)) % min(len(log), 4 * _BLOCKS)
+    share = (log.time - log.time[0]) / max(float(log.time[-1] - log.time[0]), _SMALLEST)
+    block = np.minimum((share * _BLOCKS).astype(np.int64), _BLOCKS - 1)
+    return np.asarray(np.unique(block, return_inverse=True)[1].astype(np.int64))

@@ -1,0 +1,55 @@
+"""A slow sensor: the filter that makes its wrench late makes it too small as well, where it is quick.
+
+A delay is put right, but not what a filter takes away. A filter of first order that is late by `late` [s] leaves
+1 / sqrt(1 + (2 pi f late)^2) of a frequency f, a mean over the last samples about as much, a slow bus all of it. No log
+tells them apart by much: the noise of accelerations, which grows with f, lowers what seems to follow, too.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.identify.estimate import Estimate
+from steelyard.logs.clock import median_step
+from steelyard.logs.conditioning import signal
+from steelyard.logs.log import MotionLog
+from steelyard.sanity.fitted.full_fit import Rows
+
+# A filter is behind none to all of a delay, all shares alike likely: the mean square of what it takes away.
+SHARE = 1 / 3
+# It is said where it is so large beside the bars that are.
+WORTH_SAYING = 1.0
+_FEWEST_ROWS = 50
+
+
+def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
+    """Return the estimate with bars that hold what a filter may take away which makes the wrench `late` [s]."""
+    moving = ~log.still
+    if late <= 0 or log.time is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
+        return estimate
+    rows, pick = Rows.of(log)
+    taken = taken_away(log.time, log.predicted(rows.solve().solution[:10]), late)
+    moved = np.sqrt(SHARE) * replace(rows, values=taken[pick]).solve().solution[:10]
+    wider = replace(estimate, covariance=estimate.covariance + np.outer(moved, moved))
+    known = estimate.identified
+    if not (wider.std[known] > np.hypot(1, WORTH_SAYING) * estimate.std[known]).any():
+        return wider
+    return wider.noted(
+        f"the wrench is {1e3 * late:.2g} ms late: a filter that makes it so takes of quick motion, too; error bars "
+        "hold what that may change"
+    )
+
+
+def taken_away(time: Array, wrench: Array, late: float) -> Array:
+    """Return what a filter of first order that is `late` [s] had taken away (N, 6) for `wrench` (N, 6) to be left."""
+    step = median_step(time)
+    even = np.arange(time[0], time[-1] + step / 2, step)
+    values = signal(time, wrench).at(even)
+    # There and back, so that the ends meet.
+    loop = np.concatenate([values, values[::-1]])
+    frequency = np.fft.rfftfreq(len(loop), step)[:, None]
+    lost = np.sqrt(1 + (2 * np.pi * frequency * late) ** 2) - 1
+    return signal(even, np.fft.irfft(lost * np.fft.rfft(loop, axis=0), len(loop), axis=0)[: len(even)]).at(time)

@@ -1,0 +1,127 @@
+"""The mass that is accelerated beside the mass that is weighed, after the fit: one body has one mass and one centre.
+
+A controller that takes a payload away leaves less weight than inertia. Poses of another point than S, in another unit
+of length or time, or a force behind a slow filter give accelerations that the load does not feel.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.alignment_findings import planar_finding
+from steelyard.logs.log import MotionLog
+from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.readings.both_masses import TAKEN_AWAY, clock_words
+from steelyard.spatial import cross_matrix
+
+# They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
+# distance [m], and leaves less of the squared residual.
+SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
+# A cable pulls back in the rhythm of a motion, as a mass that is not weighed would: a controller is blamed beyond so
+# many.
+TAKEN = 8.0
+# No tool's tip is farther [m] from the sensor.
+FARTHEST = 5.0
+# Noise of an acceleration lowers the mass that it shows by its share of the variance; so many times that is allowed.
+# Where centres lie is judged below the second share only.
+NOISE, CALM = 3.0, 0.05
+# Below this share a controller has not only taken a weight away.
+TOO_MUCH = -0.7
+_FEWEST_ROWS = 50
+ELSEWHERE = {"weight-compensated", "motion-mismatch", "wrench-unexplained", "base-tilted", "force-unit"}
+
+
+@dataclass(frozen=True, eq=False)
+class TwoMasses:
+    """What a log says of mass and first moment by acceleration and by weight.
+
+    mass, first_moment    [kg], (3,) [kg m] by acceleration
+    less, less_std        (4,) [kg, kg m] how much less of them is weighed, with standard deviations
+    left                  squared residual beside that with one mass
+    noise                 share of noise in the squared acceleration of the rows
+    """
+
+    mass: float
+    first_moment: Array
+    less: Array
+    less_std: Array
+    left: float
+    noise: float
+
+    @property
+    def weighed(self) -> float:
+        """Mass [kg] by weight."""
+        return self.mass - float(self.less[0])
+
+    @property
+    def apart(self) -> Array:
+        """How far (3,) [m] what is accelerated lies from what is weighed, as far as a mass as weighed tells."""
+        return np.asarray(self.less[1:] - self.less[0] * self.first_moment / self.mass) / self.weighed
+
+
+def two_masses(log: MotionLog) -> TwoMasses | None:
+    """Return both masses; None for too few moving rows or channels that do not measure."""
+    moving = ~log.still
+    if log.noise is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
+        return None
+    rows, _ = Rows.of(log)
+    once = rows.solve()
+    fit = rows.solve(_weight(rows.log.gravity), jackknife=True)
+    left = fit.left / once.left if once.left else 1.0
+    phi = fit.solution
+    return TwoMasses(float(phi[0]), phi[1:4], phi[16:20], fit.spread[16:20], left, noise_share(log))
+
+
+def noise_share(log: MotionLog) -> float:
+    """Return the share of its uncertainty in the squared acceleration of moving rows, linear or angular, the larger."""
+    moving = ~log.still
+    if log.noise is None or not moving.any():
+        return 0.0
+    variance = np.stack([n.acceleration + n.taken for n in log.noise])[log.noise_class][moving]
+    sizes = np.concatenate([log.angular_acceleration, log.acceleration], 1)[moving] ** 2
+    shares = [variance[:, part].sum() / max(float(sizes[:, part].sum()), 1e-300) for part in (slice(0, 3), slice(3, 6))]
+    return float(max(shares))
+
+
+def _weight(gravity: Array) -> Array:
+    """Return what a mass and a first moment that are not weighed leave out (N, 6, 4): m g, and h x g about S."""
+    out = np.zeros((len(gravity), 6, 4))
+    out[:, 3:, 0] = gravity
+    out[:, :3, 1:] = -cross_matrix(gravity)
+    return out
+
+
+def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding, ...]:
+    """Return `weight-compensated` or `motion-mismatch` where a log weighs another body than it accelerates."""
+    if {f.code for f in known} & ELSEWHERE:
+        return ()
+    found = two_masses(log)
+    if found is None or found.left > LEFT or min(found.mass, found.weighed) <= TOO_MUCH * abs(found.mass):
+        return ()
+    short, spread = float(found.less[0]), float(found.less_std[0])
+    both = (
+        f"The force follows the acceleration as that of {found.mass:.3g} ± {spread:.2g} kg, but the direction of "
+        f"gravity as that of {found.weighed:.3g} kg: "
+    )
+    # About one axis a lever passes for a mass, and noise of either draws both.
+    share = SHARE + (NOISE * found.noise if planar_finding(log.gravity) else 0.0)
+    if short > max(TAKEN * spread, share * abs(found.mass)):
+        other = clock_words(found.mass, found.weighed)
+        return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
+    if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
+        other = clock_words(found.mass, found.weighed)
+        text = f"{both}the load was not accelerated as the poses say.{f' {other}.' if other else ''}"
+        return (Finding.of("motion-mismatch", text),)
+    far, where = np.abs(found.apart), found.less_std[1:] / max(found.weighed, 1e-9)
+    if found.noise < CALM and far.max() < FARTHEST and (far > np.maximum(SURE * where, APART)).any():
+        shown = ", ".join(f"{1e3 * v:.0f}" for v in found.apart + 0.0)
+        text = (
+            f"What is accelerated lies ({shown}) ± {1e3 * float(np.linalg.norm(where)):.1g} mm from what is weighed: "
+            "the load was not accelerated as the poses say."
+        )
+        return (Finding.of("motion-mismatch", text),)
+    return ()

@@ -1,0 +1,135 @@
+"""Load change: from some time on, the robot holds another body, or the same one elsewhere; the bias stays."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array, Mask
+from steelyard.findings import Finding
+from steelyard.sanity.holding.consensus import Slices, solve, sums
+
+# Times tried on a first grid, and the time around a change in which hands may be at work [s].
+GRID, HANDS = 60, 0.5
+# Either side must last this long [s].
+SHORTEST = 1.0
+# A change below this share of the mass, or of this many standard deviations, is none.
+SHARE, DEVIATIONS = 0.08, 6.0
+# Another body must explain this much (chi-square) beyond what a jump of the bias would; and no lever beyond 1 m.
+BEYOND_BIAS, LONGEST_LEVER = 40.0, 1.0
+# A body of the same mass has slipped where its centre of mass moved further than this [m].
+SLIP = 0.003
+SLIPPED = "Grip the object tighter, or cut the log where it slipped."
+
+
+@dataclass(frozen=True, eq=False)
+class LoadChange:
+    """At `time` [s] the mass went from `before` to `after` [kg], or the body slipped; residual (F, 6) with both bodies.
+
+    slip  [m] how far the centre of mass moved at the same mass, 0 where the mass changed
+    """
+
+    time: float
+    before: float
+    after: float
+    residual: Array
+    slip: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class _Running:
+    """Running sums of H (F + 1, p, p) and g (F + 1, p), and the sum of c."""
+
+    H: Array
+    g: Array
+    c: float
+    ridge: Array
+
+    def normal(self, j: int, columns: slice) -> tuple[Array, Array]:
+        """Return the normal equations where `columns` are anew from slice j on."""
+        H, g = self.H[-1], self.g[-1]
+        late, late_g = H - self.H[j], g - self.g[j]
+        size = late_g[columns].size
+        out = np.block([[H, late[:, columns]], [late[columns], late[columns, columns]]])
+        return out + np.diag(np.append(self.ridge, self.ridge[columns][:size])), np.append(g, late_g[columns])
+
+    def cost(self, j: int, columns: slice) -> float:
+        """Return the least squared residual where `columns` are anew from slice j on."""
+        H, g = self.normal(j, columns)
+        return self.c - float(g @ solve(H, g))
+
+
+def longer_side(time: Array, at: float, what: str, slipped: bool) -> tuple[Mask, Finding]:
+    """Return the rows (N,) of the longer side of a change at a time [s], away from hands, and what is to be said."""
+    early = at - time[0] >= time[-1] - at
+    side = time < at - HANDS / 2 if early else time > at + HANDS / 2
+    text = (
+        f"At {at:.1f} s {what}; only the time {'before' if early else 'after'} it was used "
+        f"({100 * (1 - side.mean()):.0f} % of the rows were left out)."
+    )
+    finding = Finding.of("load-changed", text)
+    return side, replace(finding, remedy=SLIPPED) if slipped else finding
+
+
+def slip_words(moved: float) -> str:
+    """Say that the object slipped by so much [m]."""
+    return f"the object slipped: its centre of mass moved by {1e3 * moved:.2g} mm at the same mass"
+
+
+def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange | None:
+    """Return the one change of load that explains the slices best, if a change of bias does not do as well.
+
+    tolerance (F, 6) of each slice's wrench; memory slices in a row carry one independent residual.
+    """
+    level = np.broadcast_to(np.median(tolerance, axis=0), tolerance.shape)
+    tolerance = np.maximum(tolerance, level)
+    H, g, c = sums(slices, tolerance)
+    run = _Running(_running(H), _running(g), float(c.sum()), slices.ridge)
+    j = _best(run, slices.time)
+    if j is None:
+        return None
+    normal, right = run.normal(j, slice(0, 10))
+    x = solve(normal, right)
+    before, change = x[:10], x[-10:]
+    first = len(run.ridge)
+    covariance = memory * np.linalg.inv(normal)[first : first + 4, first : first + 4]
+    slip = _slip(before, change, np.asarray(covariance, dtype=np.float64))
+    real = slip > 0 or abs(change[0]) > max(SHARE * before[0], DEVIATIONS * float(np.sqrt(covariance[0, 0])))
+    possible = before[0] > 0 and before[0] + change[0] > 0
+    possible = possible and np.linalg.norm(change[1:4]) < LONGEST_LEVER * (before[0] if slip else abs(change[0]))
+    if len(run.ridge) > 10:
+        jump = run.cost(j, slice(10, 16)) - run.cost(j, slice(0, 10))
+        possible = possible and jump / memory > BEYOND_BIAS
+    if not (real and possible):
+        return None
+    residual = slices.y - slices.A @ x[: len(run.ridge)]
+    residual[j:] -= slices.A[j:, :, :10] @ change
+    time = float(slices.time[j - 1] + slices.time[j]) / 2
+    return LoadChange(time, float(before[0]), float(before[0] + change[0]), residual, slip)
+
+
+def _slip(before: Array, change: Array, covariance: Array) -> float:
+    """Return how far the centre of mass moved [m] where that is sure and the mass stayed, else 0."""
+    if before[0] <= 0 or abs(change[0]) > SHARE * before[0]:
+        return 0.0
+    moved = change[1:4]
+    sure = float(moved @ np.linalg.solve(covariance[1:, 1:], moved)) > DEVIATIONS**2
+    shift = float(np.linalg.norm((before[1:4] + moved) / (before[0] + change[0]) - before[1:4] / before[0]))
+    return shift if sure and shift > SLIP else 0.0
+
+
+def _running(values: Array) -> Array:
+    return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
+
+
+def _best(run: _Running, time: Array) -> int | None:
+    """Return the first slice of the second body: on a grid, then slice by slice around its best."""
+    inside = np.flatnonzero((time > time[0] + SHORTEST) & (time < time[-1] - SHORTEST))
+    if not len(inside):
+        return None
+    step = max(len(inside) // GRID, 1)
+    body = slice(0, 10)
+    first = min(inside[::step], key=lambda j: run.cost(int(j), body))
+    near = inside[abs(inside - first) <= step]
+    return int(min(near, key=lambda j: run.cost(int(j), body)))

@@ -1,0 +1,112 @@
+"""Clocks that count from different moments: a wrench and poses that were logged apart, each with stamps of its own.
+
+Delays are looked for within a quarter of a second once streams are aligned. Here the poses are moved along the wrench
+until the force turns with them: f = m a - R^T u + bias is linear in u, whatever gravity, sign and mass are.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.readings.glance import glance, resampled
+from steelyard.sanity.readings.rivals import best_rival, reading_of
+
+# As given the force must leave more than the first share of its variance, or share no time with the poses; moved, less
+# than the second, and less than so much of what it leaves as given.
+BAD, WELL, MUCH_BETTER = 0.1, 0.03, 0.1
+# Steps [s] of the search, of which there are no more than so many in the longer log.
+STEP_S, _MOST_STEPS = 0.1, 3000
+# What is compared must last so long [s], and for half of the shorter log.
+SHORTEST_S, OVERLAP = 5.0, 0.5
+# Delays below this [s] are found by aligning.
+LEAST_S = 0.2
+REMEDY = (
+    "Check that both files are of one run, and start their clocks together next time; what is left of the delay was "
+    "looked for, too."
+)
+
+
+def examine_offset(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the streams of other files moved to the clock of the wrench, and what is said of it."""
+    felt = next((s for s in recording.streams if {"force", "torque"} <= set(s.channels)), None)
+    posed = next((s for s in recording.streams if "rotation" in s.channels), None)
+    if felt is None or posed is None or felt.time is None or posed.time is None or posed.delay is not None:
+        return recording, ()
+    if _file(felt) == _file(posed) or felt.frames.get("force", "S") == "W" or _explained(recording):
+        return recording, ()
+    late, left, before = _best(felt, posed, felt.time, posed.time)
+    if abs(late) < LEAST_S or left > min(WELL, MUCH_BETTER * before):
+        return recording, ()
+    moved = tuple(
+        s
+        if s.time is None or s.delay is not None or _file(s) == _file(felt)
+        else replace(s, time=s.time - late, moved=late)
+        for s in recording.streams
+    )
+    text = (
+        f"The stamps of '{posed.name}' are {'late' if late > 0 else 'early'} by {abs(late):.1f} s against the wrench: "
+        f"so moved, {100 * left:.2g} % of the force variance is left unexplained"
+        f"{f' instead of {100 * before:.2g} %' if before < 1 else ', and as given they share too little time'}. "
+        "The answer assumes this."
+    )
+    return replace(recording, streams=moved), (Finding("stream-delayed", text, REMEDY),)
+
+
+def _file(stream: Stream) -> str:
+    return stream.name.partition("#")[0]
+
+
+def _explained(recording: Recording) -> bool:
+    """Tell whether force and poses fit as they are, or as another reading of their description has them."""
+    view = glance(recording)
+    if view is None or view.rotation is None:
+        return False
+    given = reading_of(view, "", recording.gravity, view.rotation)
+    return given.fit.force_share < BAD or best_rival(recording, view, given) is not None
+
+
+def _best(felt: Stream, posed: Stream, clock: Array, other: Array) -> tuple[float, float, float]:
+    """Return how late [s] poses are with which the force fits best, and the shares of variance left so and as given.
+
+    As given all is left where they share too little time.
+    """
+    step = max(STEP_S, max(np.ptp(clock), np.ptp(other)) / _MOST_STEPS)
+    force = _on_steps(clock, felt.channels["force"], step)
+    turned = np.swapaxes(_on_steps(other, posed.channels["rotation"], step), 1, 2)
+    fewest = max(int(OVERLAP * min(len(force), len(turned))), int(SHORTEST_S / step))
+    lags = range(fewest - len(turned), len(force) - fewest + 1)
+    left = {lag: _left(force, turned, lag) for lag in lags}
+    if not left:
+        return 0.0, 1.0, 1.0
+    lag = min(left, key=lambda k: left[k])
+    late = float(other[0] - clock[0]) - step * (lag + _between([left.get(lag + k, 1.0) for k in (-1, 0, 1)]))
+    given = round(float(other[0] - clock[0]) / step)
+    return late, left[lag], left.get(given, 1.0)
+
+
+def _on_steps(clock: Array, values: Array, step: float) -> Array:
+    """Return the means (M, ..) of values (N, ..) over steps [s] from the first stamp on."""
+    rows = max(int(np.ptp(clock) / step), 2)
+    return resampled(clock, values, np.asarray(clock[0] + step * (np.arange(rows) + 0.5), dtype=np.float64))
+
+
+def _left(force: Array, turned: Array, lag: int) -> float:
+    """Return the share of the variance of forces (N, 3) left by turns (M, 3, 3) whose first row is at row `lag`."""
+    start, end = max(lag, 0), min(lag + len(turned), len(force))
+    f, R = force[start:end] - force[start:end].mean(0), turned[start - lag : end - lag]
+    R = R - R.mean(0)
+    normal, right = np.einsum("nij,nik->jk", R, R), np.einsum("nij,ni->j", R, f)
+    u = np.linalg.lstsq(normal, right, rcond=1e-6)[0]
+    variance = float((f**2).sum())
+    return 1.0 - float(right @ u) / variance if variance > 0 else 1.0
+
+
+def _between(left: list[float]) -> float:
+    """Return where between its neighbours, -0.5 to 0.5 steps off, the least of three shares has its minimum."""
+    bend = left[0] - 2 * left[1] + left[2]
+    return 0.5 * (left[0] - left[2]) / bend if bend > 0 else 0.0

@@ -1,0 +1,154 @@
+"""Conventions: sign and axes of the wrench, sense of the rotation, order of quaternions, gravity, unit of torque.
+
+The log as given is fitted beside the log under each rival convention (see `glance` and `rivals`). Where a rival is so
+much better that it is no matter of noise, the recording is returned as the rival reads it. All forces and torques
+scaled alike (lbf for N) fit as well as before, and so do the sign of the wrench and of gravity on a log at rest: no fit
+can tell them apart, and the messages say so.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.findings import REMEDIES, Finding
+from steelyard.logs.recording import Recording
+from steelyard.sanity.readings.blind_tilt import blind_tilt
+from steelyard.sanity.readings.both_masses import both_masses, examine_both_masses
+from steelyard.sanity.readings.glance import Glance, glance
+from steelyard.sanity.readings.level import examine_level
+from steelyard.sanity.readings.rivals import Reading, as_read, best_rival, reading_of, rival_finding, sign_of
+from steelyard.sanity.readings.static_fit import StaticFit
+from steelyard.sanity.readings.swapped import examine_swapped
+from steelyard.sanity.readings.tilt import blind_axis
+from steelyard.sanity.readings.torques import examine_torques
+from steelyard.sanity.readings.units import scaled
+from steelyard.sanity.readings.weightless import require_weight
+from steelyard.sanity.rows.leaps import examine_leaps
+
+# No hand holds a mass this far from its sensor [m].
+FURTHEST_ARM = 2.0
+
+
+def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording in the conventions that explain it, and a finding for each that was not as said.
+
+    Raises CannotAnswer where the force shows no weight in any.
+    """
+    view = glance(recording)
+    if view is None:
+        return recording, ()
+    recording, view, swapped = examine_swapped(recording, view)
+    found = list(swapped)
+    reading = reading_of(view, "", recording.gravity, view.rotation)
+    best = best_rival(recording, view, reading)
+    if best is not None:
+        found.append(rival_finding(best, reading))
+        recording, reading, view = as_read(recording, best), best, best.view or view
+    found.extend(masses := examine_both_masses(view, recording.gravity, reading.rotation))
+    # What a controller leaves of a weight may have either sign.
+    left_over = any(finding.code == "weight-compensated" for finding in masses)
+    flipped, findings = (recording, ()) if left_over else _signs(recording, view, reading)
+    if findings:
+        reading = reading_of(view, "", flipped.gravity, reading.rotation)
+    recording = flipped
+    found.extend(findings)
+    if not found:
+        recording, findings = examine_torques(recording, view, reading)
+    if found or not findings:
+        recording, findings = _lengths(recording, reading.fit)
+    found.extend(findings)
+    if best is None and reading.rotation is not None:
+        recording, findings = examine_level(recording, view, reading)
+        found.extend(findings)
+        blind = None if findings else blind_axis(view, reading.rotation)
+        if blind is not None and not found:
+            found.extend(blind_tilt(view, recording.gravity, blind))
+    if not found:
+        require_weight(view, recording.gravity, reading.rotation, reading.fit)
+    return recording, tuple(found)
+
+
+def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with pauses where its poses leap, unless they only leap as they were misread.
+
+    Then it comes back with its rotations as they were meant, and a finding.
+    """
+    paused = examine_leaps(recording)
+    view = None if paused is recording else glance(paused)
+    if view is None:
+        return paused, ()
+    given = reading_of(view, "", recording.gravity, view.rotation)
+    best = best_rival(paused, view, given)
+    if best is None or best.misread is None:
+        return paused, ()
+    return examine_leaps(as_read(recording, best)), (rival_finding(best, given),)
+
+
+def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the wrench or gravity turned round where the mass comes out negative, or with both."""
+    sign = sign_of(view, reading)
+    if sign == 0 or view.sign_free:
+        return recording, ()
+    if sign > 0:
+        return _both_signs(recording, view, reading)
+    mass = f"The mass comes out as {reading.fit.mass:.3g} ± {reading.fit.mass_std:.2g} kg"
+    moved = _moved_sign(view, reading)
+    upside_down = moved > 0
+    if moved == 0 and reading.rotation is not None:
+        # Nothing but habit can tell: a world whose z points down is rarer than a wrench of the other sign.
+        upside_down = float(recording.gravity[2]) > 0.8 * float(np.linalg.norm(recording.gravity))
+    doubt = "" if moved else "; a log at rest cannot tell the sign of the wrench from the sign of gravity"
+    if upside_down:
+        message = f"{mass}, so gravity points the other way in W; it was turned round{doubt}."
+        return replace(recording, gravity=-recording.gravity), (Finding.of("gravity-frame", message),)
+    was, now = ("on-object", "on-sensor") if recording.wrench_sign > 0 else ("on-sensor", "on-object")
+    message = f'{mass}, so the wrench has the other sign; it was taken as "{now}" instead of "{was}"{doubt}.'
+    return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
+
+
+def _both_signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with wrench and gravity turned round where what is accelerated has a negative mass.
+
+    Turned round both, forces at rest stay what they are.
+    """
+    if _moved_sign(view, reading) >= 0:
+        return recording, ()
+    message = (
+        "The force follows gravity as given, but the acceleration as that of a negative mass: wrench and gravity both "
+        "have the other sign; both were turned round."
+    )
+    remedy = f"Check [log] gravity; {REMEDIES['wrench-sign-flipped'][0].lower()}{REMEDIES['wrench-sign-flipped'][1:]}"
+    turned = replace(recording, wrench_sign=-recording.wrench_sign, gravity=-recording.gravity)
+    return turned, (Finding("wrench-sign-flipped", message, remedy),)
+
+
+def _moved_sign(view: Glance, reading: Reading) -> int:
+    """Return the sign of the mass that the measured acceleration shows; 0 where none is measured or it is too weak."""
+    if view.acceleration is None or reading.rotation is None:
+        return 0
+    masses, spread, _ = both_masses(view, reading.gravity, reading.rotation)
+    sure = abs(masses[0]) > 5 * spread[0] and 0.5 < abs(masses[0] / masses[1]) < 2
+    return int(np.sign(masses[0])) if sure else 0
+
+
+def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with torques in N m where the centre of mass lies metres away."""
+    size, spread = float(np.linalg.norm(found.moment)), float(np.linalg.norm(found.moment_std))
+    if not found.sign or found.arm < FURTHEST_ARM or size < 5 * spread or found.torque_share > 0.7:
+        return recording, ()
+    where = f"The centre of mass comes out {found.arm:.3g} m from the sensor, with a mass of {abs(found.mass):.3g} kg"
+    stream = next((s for s in recording.streams if "torque" in s.channels and "force" in s.channels), None)
+    if stream is None:
+        return recording, ()
+    if found.arm / 1000 < FURTHEST_ARM and abs(found.mass) < 0.02:
+        message = (
+            f"{where}: the force is a thousand times too small, as when kN are read as N; it was multiplied by 1000."
+        )
+        return scaled(recording, stream, ("force",), 1e3), (Finding.of("force-unit", message),)
+    if found.arm / 1000 < FURTHEST_ARM:
+        message = f"{where}: the torque is in N mm; it was divided by 1000."
+        return scaled(recording, stream, ("torque",), 1e-3), (Finding.of("length-in-mm", message),)
+    message = f"{where}: the units of force and torque do not belong together."
+    return recording, (replace(Finding.of("force-unit", message), left_in=True),)

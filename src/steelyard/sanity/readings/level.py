@@ -1,0 +1,102 @@
+"""Level: gravity in W as forces show it, beside a turned sensor and force columns that are mixed up."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.findings import Finding, percent
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.axis_words import direction_words
+from steelyard.sanity.mounts import mount_of, mount_remedy, vector
+from steelyard.sanity.readings.glance import Glance
+from steelyard.sanity.readings.mirrored import Mirror, mirrored
+from steelyard.sanity.readings.rivals import LEVEL, MUCH_BETTER, STEEP, Reading, sign_of
+from steelyard.sanity.readings.static_fit import StaticFit
+from steelyard.sanity.readings.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
+
+# With fewer poses or stretches than this, a direction of gravity fits by chance.
+FEWEST_BLOCKS = 6
+# Gravity found this far off is corrected at once [rad].
+CERTAIN_TILT = np.radians(2.0)
+# A sensor mounted this much askew is worth a word [rad].
+SENSOR_TURN = np.radians(10.0)
+
+
+def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with gravity along the direction that the wrench shows, where that is plainly another.
+
+    Force columns in another order, and a sensor that is turned, are told of where they explain more; they are left in.
+    """
+    if reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
+        return recording, ()
+    tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
+    turned = turned_sensor(view, reading.gravity, sign_of(view, reading))
+    mirror = mirrored(view, reading.gravity, sign_of(view, reading))
+    if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
+        return recording, (_mixed_finding(mirror, reading.fit),)
+    if turned is not None and _sensor_turned(turned, tilt, reading.fit):
+        stream = next(s for s in recording.streams if "force" in s.channels)
+        return recording, (_turned_finding(turned, reading.fit, stream),)
+    if tilt is None or not _plain(tilt, reading.fit):
+        return recording, ()
+    return replace(recording, gravity=tilt.gravity), (_tilted_finding(tilt),)
+
+
+def _mixed_finding(mirror: Mirror, given: StaticFit) -> Finding:
+    message = (
+        f"The forces fit one body if they are read as {mirror.words}: so, {percent(mirror.force_share)} of their "
+        f"variance is left unexplained instead of {percent(given.force_share)}; the answer does not assume this."
+    )
+    remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
+    return Finding("force-unit", message, remedy, left_in=True)
+
+
+def _turned_finding(turned: Turn, given: StaticFit, stream: Stream) -> Finding:
+    message = (
+        f"The wrench is turned by {np.degrees(turned.rotation.angle()):.0f} degrees against the frame whose "
+        f"rotation is given: '{stream.name}' looks mounted by the rotation vector "
+        f"({vector(mount_of(stream, turned.rotation))}) rad in S. So read, {percent(turned.force_share)} of the "
+        f"force variance is left unexplained instead of {percent(given.force_share)}; the answer does not "
+        "assume this."
+    )
+    return Finding("sensor-turned", message, mount_remedy(stream, turned.rotation), left_in=True)
+
+
+def _tilted_finding(tilt: GlanceTilt) -> Finding:
+    message = (
+        f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
+        f"given, along ({direction_words(tilt.gravity)}) of W; the answer uses the direction found{tilt.blind_words}."
+    )
+    if tilt.angle >= STEEP:
+        return Finding.of("gravity-frame", message)
+    share = percent(float(np.sin(tilt.angle)))
+    pull = f"On a level base a pull of {share} of the weight looks the same, and the mass is then off by about as much."
+    return Finding.of("base-tilted", f"{message} {pull}")
+
+
+def _sensor_turned(turned: Turn, tilt: GlanceTilt | None, given: StaticFit) -> bool:
+    """Tell whether a constant turn of S explains what neither the given nor a tilted gravity does."""
+    return (
+        turned.rotation.angle() > SENSOR_TURN
+        and turned.force_share < min(MUCH_BETTER * given.force_share, 0.3)
+        and (tilt is None or turned.force_share < 0.5 * tilt.force_share)
+    )
+
+
+def _columns_mixed(mirror: Mirror, turned: Turn | None, tilt: GlanceTilt | None, given: StaticFit) -> bool:
+    """Tell whether forces read in another order or sign explain what no turn of S and no tilted gravity does."""
+    rivals = [found.force_share for found in (turned, tilt) if found is not None]
+    bar = min(MUCH_BETTER * given.force_share, 0.3, *(0.5 * share for share in rivals))
+    return mirror.force_share < bar
+
+
+def _plain(tilt: GlanceTilt, given: StaticFit) -> bool:
+    """Tell whether the tilt is large, sure, and explains most of what the given direction leaves."""
+    return (
+        tilt.angle > max(CERTAIN_TILT, 5 * tilt.angle_std)
+        and tilt.force_share < 0.4 * given.force_share
+        and tilt.force_share < 0.3
+        and tilt.torque_share < 1.1 * given.torque_share + 1e-3
+    )

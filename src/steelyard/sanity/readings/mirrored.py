@@ -1,0 +1,46 @@
+"""Force columns of another order or sign: no turn of the sensor explains them, but a reflection of its axes does."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.sanity.readings.glance import Glance
+from steelyard.sanity.readings.static_fit import beside, solve
+from steelyard.sanity.readings.tilt import force_and_weight
+from steelyard.spatial import signed_axes
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """How the columns of the force would have to be read, and the share of the force variance that is then left."""
+
+    words: str
+    force_share: float
+
+
+# The 24 (24, 3, 3) that turn a right hand into a left one.
+REFLECTIONS = np.stack([X for X in signed_axes() if np.linalg.det(X) < 0])
+
+
+def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
+    """Return the exchange of axes and signs that explains the force best; None without rotations or all forces."""
+    if view.rotation is None or any(view.dead[3:]):
+        return None
+    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
+    force, down = force_and_weight(seen, sign)
+    # force = X m down: the trace with X is largest for the right one.
+    X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
+    _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
+    return Mirror(in_words(X, "F"), share)
+
+
+def in_words(X: Array, letter: str) -> str:
+    """Say what columns must be read as whose numbers are X times those meant: "Fx = -Fy, Fy = .."."""
+    said = []
+    for row, name in zip(X.T, "xyz", strict=True):  # meant_k = sum_i X_ik read_i
+        k = int(np.argmax(np.abs(row)))
+        said.append(f"{letter}{name} = {'-' if row[k] < 0 else ''}{letter}{'xyz'[k]}")
+    return ", ".join(said)

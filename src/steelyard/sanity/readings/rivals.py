@@ -1,0 +1,230 @@
+"""Readings: the log as given beside the ways in which rotation, gravity or axes of the wrench are commonly misread.
+
+A rival is claimed only where it
+
+* leaves less than a quarter of the force variance that the log as given leaves, and no more of the torque's;
+* explains at least half of the force variance, by a mass of the right sign beyond five jackknife standard deviations;
+* leaves less than half of what a freely tilted gravity would leave.
+
+Forces in the axes of W point down however the rotations are read, so that beside them torques decide: a rival way to
+read the rotations leaves a tenth of the torque variance, and half of what any other, or other axes, would leave.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding, percent
+from steelyard.logs.misread import MISREAD, Misread
+from steelyard.logs.recording import Recording
+from steelyard.sanity.readings.glance import Glance, glance, in_axes
+from steelyard.sanity.readings.static_fit import StaticFit, fit
+from steelyard.sanity.readings.tilt import GlanceTilt, tilt_of, turned_sensor
+
+# A rival leaves less than this share of the force variance that the log as given leaves.
+MUCH_BETTER = 0.25
+# A reading that leaves less than the first share of the force variance has rotation and gravity right but for a tilt;
+# one that leaves less than the second has the tilt right, too: two degrees leave more.
+GOOD, LEVEL = 0.03, 2e-4
+# By torques alone a rival leaves less than the first share of what is left as given, and less than the second of what
+# any other leaves, torques in other axes too.
+BY_TORQUE, BESIDE = 0.1, 0.5
+# Constant forces seem to turn with the sensor where a bias lies along gravity; torques then do not.
+TORQUES_TOO = 0.3
+# Beyond this no base is crooked [rad].
+STEEP = np.radians(60.0)
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """One way to read the recording: words for what would be wrong, gravity, rotations, its fit, how they were misread.
+
+    `misread` is None where the rotations are as given; `view` is what is seen where the wrench is in other axes;
+    `by_torque` says that torques alone tell it from the reading as given.
+    """
+
+    words: str
+    gravity: Array
+    rotation: Array | None
+    fit: StaticFit
+    misread: Misread | None = None
+    view: Glance | None = None
+    by_torque: bool = False
+
+    @property
+    def left(self) -> float:
+        """Share of the variance that is left unexplained of the part of the wrench that tells."""
+        return self.fit.torque_share if self.by_torque else self.fit.force_share
+
+
+def reading_of(
+    view: Glance, words: str, gravity: Array, rotation: Array | None, misread: Misread | None = None
+) -> Reading:
+    """Return a reading with the better of two fits: with the measured acceleration and without."""
+    found = fit(view.seen(gravity, rotation), view.block)
+    if view.acceleration is not None:
+        still = fit(replace(view, acceleration=None).seen(gravity, rotation), view.block)
+        found = min(found, still, key=lambda f: f.force_share)
+    return Reading(words, gravity, rotation, found, misread)
+
+
+def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | None:
+    """Return the rival that beats the reading as given, if there is one."""
+    if view.rotation is None:
+        return None
+    return _best_by_force(recording, view, given) or _best_by_torque(recording, view, given)
+
+
+def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Reading | None:
+    """Return the rival whose forces turn with gravity as those of the reading as given do not."""
+    if given.fit.force_share < GOOD:
+        return None
+    free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
+    bar = MUCH_BETTER * given.fit.force_share
+    able = [
+        r
+        for r in (*_rivals(recording, view, given.gravity), *_in_other_axes(recording, view, given))
+        if r.fit.force_share < min(bar, 0.5)
+        and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
+        and r.fit.sign != 0
+        and _varies(view, r)
+        and _beats_tilt(r, free)
+        and (r.view is None or r.fit.torque_share < TORQUES_TOO)
+    ]
+    # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
+    best = min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
+    return best if best is not None and not _outdone(best, view, given.gravity) else None
+
+
+def _best_by_torque(recording: Recording, view: Glance, given: Reading) -> Reading | None:
+    """Return the rotations with which torques in W belong to forces in W, which as given they do not."""
+    if any(view.dead) or given.fit.torque_share < GOOD:
+        return None
+    rivals = sorted(misread_rotations(recording, view, given), key=lambda r: r.left)
+    if not rivals or rivals[0].left > BY_TORQUE * given.fit.torque_share:
+        return None
+    in_sensor = reading_of(replace(view, world=frozenset({"force"})), "", given.gravity, view.rotation)
+    others = (in_sensor.fit.torque_share, *(rival.left for rival in rivals[1:]))
+    return rivals[0] if rivals[0].left < BESIDE * min(others) else None
+
+
+def misread_rotations(recording: Recording, view: Glance, given: Reading) -> Iterator[Reading]:
+    """Yield the other ways to read rotations that explain forces in W as well, with torques in W, too; else none."""
+    if view.world != {"torque", "force"}:
+        return
+    for rival in _rivals(recording, view, given.gravity):
+        as_well = rival.fit.force_share < 1.2 * given.fit.force_share + 1e-3 and rival.fit.sign == given.fit.sign
+        if rival.misread is not None and as_well:
+            yield replace(rival, by_torque=True)
+
+
+def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Reading]:
+    """Yield the ways in which rotation or gravity are commonly misread.
+
+    Rotations are put right row by row before they are averaged: misread ones may leap.
+    """
+    R = view.rotation
+    if R is None:
+        return
+    for misread in MISREAD:
+        meant = glance(put) if (put := _put_right(recording, misread)) is not None else None
+        if meant is not None and meant.rotation is not None:
+            yield reading_of(view, misread.words, gravity, meant.rotation, misread)
+    size = float(np.linalg.norm(gravity))
+    for axis in range(3):
+        if abs(gravity[axis]) < 0.8 * size:
+            for sign in (-1, 1):
+                words = f"gravity points along {'+' if sign > 0 else '-'}{'xyz'[axis]} of W"
+                yield reading_of(view, words, sign * size * np.eye(3)[axis], R)
+
+
+def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterator[Reading]:
+    """Yield the reading of the wrench in W where it was said to be in S, and in S where it was said to be in W.
+
+    Torques go with the forces, unless they belong to them much better in the others' axes.
+    """
+    if any(recording.dead) or given.rotation is None:
+        return
+    both = frozenset(() if "force" in view.world else ("torque", "force"))
+    views = {world: glance(in_axes(recording, world)) for world in (both, both ^ {"torque"})}
+    found = [
+        replace(reading_of(other, _axes_in_words(world), given.gravity, given.rotation), view=other)
+        for world, other in views.items()
+        if other is not None
+    ]
+    yield from found[:1]
+    yield from (r for r in found[1:] if r.fit.torque_share < BESIDE * found[0].fit.torque_share)
+
+
+def _axes_in_words(world: frozenset[str]) -> str:
+    if len(world) == 1:
+        (turned,) = world
+        return f"the {turned}s are in the axes of W (the base), the {'torque' if turned == 'force' else 'force'}s in S"
+    return f"the wrench is in the axes of {'W (the base), not of S' if world else 'S, not of W (the base)'}"
+
+
+def _outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
+    """Tell whether a turned sensor explains much more than the reading does, even with gravity tilted.
+
+    In turns about one axis a turn of S is a tilt and a change of sign, too; then the reading holds.
+    """
+    free = tilt_of(reading.view or view, reading.gravity, reading.rotation, reading.fit.mass)
+    left = min(reading.fit.force_share, 1.0 if free is None or free.angle > STEEP else free.force_share)
+    turned = turned_sensor(view, gravity, 1) if left > LEVEL else None
+    return turned is not None and turned.force_share < MUCH_BETTER * left
+
+
+def sign_of(view: Glance, reading: Reading) -> int:
+    """Return the sign of the mass, 0 where it is not sure or a turn of S explains a negative one much better."""
+    return 0 if reading.fit.sign < 0 and _outdone(reading, view, reading.gravity) else reading.fit.sign
+
+
+def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
+    """Tell whether a freely tilted gravity explains no more (an axis: much more) than the rival does."""
+    if free is None:
+        return True
+    if rival.misread is not None or rival.view is not None:
+        return rival.fit.force_share < 0.5 * free.force_share
+    return rival.fit.force_share < 2 * free.force_share + 1e-3
+
+
+def _varies(view: Glance, reading: Reading) -> bool:
+    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
+    pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation).pull
+    return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
+
+
+def rival_finding(best: Reading, given: Reading) -> Finding:
+    """Return what is said of the rival that is taken instead of the reading as given."""
+    part, instead = ("torque", given.fit.torque_share) if best.by_torque else ("force", given.fit.force_share)
+    message = (
+        f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.left)} of the {part} variance is "
+        f"left unexplained instead of {percent(instead)}. The answer assumes this."
+    )
+    if best.view is not None:
+        axes = [f'frame = "{"W" if part in best.view.world else "S"}" in its {part}' for part in ("force", "torque")]
+        return Finding("gravity-frame", message, f"Set {' and '.join(axes)} in the description of this stream.")
+    return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
+
+
+def as_read(recording: Recording, best: Reading) -> Recording:
+    """Return the recording with its rotations, gravity and axes of the wrench as the reading has them."""
+    if best.view is not None:
+        return in_axes(recording, best.view.world)
+    if best.misread is None:
+        return replace(recording, gravity=best.gravity)
+    return _put_right(recording, best.misread) or recording
+
+
+def _put_right(recording: Recording, misread: Misread) -> Recording | None:
+    """Return the recording with the mistake undone in all rotations; None where it cannot be in any."""
+    streams, able = [], False
+    for stream in recording.streams:
+        if (read := stream.channels.get("rotation")) is not None and (meant := misread.right(read)) is not None:
+            stream, able = replace(stream, channels={**stream.channels, "rotation": meant}), True
+        streams.append(stream)
+    return replace(recording, streams=tuple(streams)) if able else None

@@ -1,0 +1,107 @@
+"""Static fit: mass and first moment of mass that explain a wrench by gravity, and how much they leave unexplained."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from steelyard.check import Array, Integers
+from steelyard.sanity.readings.glance import Seen
+from steelyard.spatial import cross_matrix
+
+# A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
+LEAST_SHARE = 1e-4
+
+
+@dataclass(frozen=True, eq=False)
+class StaticFit:
+    """What one set of conventions makes of a log.
+
+    mass, mass_std        [kg]; the standard deviation by leaving out one stretch or pose after the other
+    moment, moment_std    (3,) first moment of mass [kg m]
+    force_share, torque_share   variance left over the variance that a bias alone leaves
+    """
+
+    mass: float
+    mass_std: float
+    moment: Array
+    moment_std: Array
+    force_share: float
+    torque_share: float
+
+    @property
+    def cost(self) -> float:
+        """Logarithm of the product of both shares: differences are those of a profile likelihood per row and axis."""
+        return float(np.log(max(self.force_share, LEAST_SHARE)) + np.log(max(self.torque_share, LEAST_SHARE)))
+
+    @property
+    def arm(self) -> float:
+        """Distance of the centre of mass from the sensor [m]; infinite without mass."""
+        size = float(np.linalg.norm(self.moment))
+        return size / abs(self.mass) if self.mass else float("inf")
+
+    @property
+    def sign(self) -> int:
+        """Sign of the mass where it is beyond five standard deviations and explains something, else 0."""
+        sure = abs(self.mass) > 5 * self.mass_std and self.force_share < 0.7
+        return int(np.sign(self.mass)) if sure else 0
+
+
+def fit(seen: Seen, block: Integers) -> StaticFit:
+    """Fit f = -m pull + lever h' + bias and tau = pull x h + spin I + bias to a glance."""
+    turned, forced = columns(seen)
+    mass, mass_std, force_share = solve(forced * seen.heard(1), seen.wrench[:, 3:], block)
+    moment, moment_std, torque_share = solve(turned * seen.heard(0), seen.wrench[:, :3], block)
+    return StaticFit(float(mass[0]), float(mass_std[0]), moment[:3], moment_std[:3], force_share, torque_share)
+
+
+def columns(seen: Seen) -> tuple[Array, Array]:
+    """Return what the torque (N, 3, 3 or 9) and the force (N, 3, 1 or 4) of a body are linear in."""
+    return beside(cross_matrix(seen.pull), seen.spin), beside(-seen.pull[:, :, None], seen.lever)
+
+
+def beside(columns: Array, more: Array | None) -> Array:
+    """Return columns (N, 3, k) with more of them behind, if there are any."""
+    return columns if more is None else np.concatenate([columns, more], 2)
+
+
+def solve(columns: Array, values: Array, block: Integers) -> tuple[Array, Array, float]:
+    """Return least squares with a free bias: solution (k,), jackknife std (k,), share of variance left.
+
+    columns (N, 3, k), values (N, 3), block (N,)
+    """
+    count, size = len(values), columns.shape[2]
+    total, solution, left_out = leave_out(columns, values, block)
+    spread = np.sqrt((len(left_out) - 1) / len(left_out) * ((left_out - solution) ** 2).sum(0))
+    variance = float(total[size, size])
+    left = variance - float(solution @ total[:size, size])
+    freedom = max(3 * count - 3 - size, 1) / max(3 * count - 3, 1)
+    share = max(left, 0.0) / variance / freedom if variance > 0 else 1.0
+    return solution, spread, min(share, 1.0)
+
+
+def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Array, Array]:
+    """Return the centred scatter (k+1, k+1), its solution (k,) and the solutions (B, k) without one block each."""
+    size = columns.shape[2]
+    both = np.concatenate([columns, values[:, :, None]], 2)
+    both = both - both.mean(0)
+    order = np.argsort(block, kind="stable")
+    starts = np.flatnonzero(np.diff(block[order], prepend=-1))
+    groups = np.split(both[order], starts[1:])
+    scatter = np.stack([g.reshape(-1, size + 1).T @ g.reshape(-1, size + 1) for g in groups])
+    total = scatter.sum(0)
+    rest = total - scatter
+    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
+    return total, _least_norm(total[:size, :size], total[:size, size]), left_out
+
+
+def _least_norm(matrix: Array, vector: Array) -> Array:
+    """Return the least-norm solution after scaling the columns to one."""
+    size = float(np.trace(matrix))
+    if not size > 1e-200:
+        return np.zeros(len(vector))
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * size))
+    values, axes = np.linalg.eigh(matrix * np.outer(scale, scale))
+    inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))

@@ -1,0 +1,167 @@
+"""Tilt: the direction of gravity in W taken from the wrench itself.
+
+Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone gives the direction without a start value.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array, Integers
+from steelyard.sanity.axis_words import axis_words
+from steelyard.sanity.readings.glance import Glance, Seen
+from steelyard.sanity.readings.static_fit import beside, fit, leave_out, solve
+from steelyard.spatial import Rotation, cross_matrix
+
+# Directions of W that the rotations show this much less (in variance) than the best one are left as given.
+_BLIND = 0.02
+# A turn is refined so many times.
+_ROUNDS = 3
+
+
+@dataclass(frozen=True, eq=False)
+class GlanceTilt:
+    """Gravity (3,) in W [m/s^2] that fits best, its angle to the given one and std [rad], and what it leaves.
+
+    blind   (3,) a direction of W along which gravity cannot be seen, None where all are
+    """
+
+    gravity: Array
+    angle: float
+    angle_std: float
+    force_share: float
+    torque_share: float
+    blind: Array | None = None
+
+    @property
+    def blind_words(self) -> str:
+        """Say which part of a tilt stays unseen."""
+        if self.blind is None:
+            return ""
+        return f"; a tilt toward ({axis_words(self.blind)}) of W cannot be seen in this motion"
+
+
+@dataclass(frozen=True, eq=False)
+class Turn:
+    """A constant turn of the wrench against the frame whose rotation is given, and what it leaves of the force."""
+
+    rotation: Rotation
+    force_share: float
+
+
+def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -> GlanceTilt | None:
+    """Return the gravity that fits best; None without rotations or where nothing is seen of it.
+
+    `mass` [kg] turns the measured acceleration into a force; its sign is taken from the fit as given.
+    """
+    if rotation is None:
+        return None
+    still = replace(view, acceleration=None)
+    seen = still.seen(gravity, rotation)
+    force = seen.wrench[:, 3:]
+    if view.acceleration is not None:
+        force = force + mass * view.seen(np.zeros(3), rotation).pull
+    turned = np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)
+    columns = -still.smooth(turned).reshape(-1, 3, 3) * seen.heard(1)
+    force = force * seen.heard(1)[:, 0]
+    lever = None if seen.lever is None else seen.lever * seen.heard(1)
+    sign = np.sign(mass) or 1.0
+    weight, spread, shown = free_direction(columns, lever, force, view.block, sign * gravity)
+    if weight is None:
+        return None
+    found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
+    angle = angle_between(found, gravity)
+    best = fit(view.seen(found, rotation), view.block)
+    if view.acceleration is not None:
+        best = min(best, fit(still.seen(found, rotation), view.block), key=lambda f: f.force_share)
+    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _axis_unseen(shown))
+
+
+def free_direction(
+    columns: Array, lever: Array | None, force: Array, block: Integers, gravity: Array
+) -> tuple[Array | None, float, Array]:
+    """Return u (3,) of f = columns u + lever h + bias, the jackknife std of its angle [rad], the part of W seen (3, 3).
+
+    columns, lever (N, 3, 3), force (N, 3), block (N,); `gravity` (3,) is kept in directions that no column shows.
+    """
+    centred = columns - columns.mean(0)
+    scatter = np.einsum("nik,nil->kl", centred, centred)
+    values, axes = np.linalg.eigh(scatter)
+    shown = axes[:, values > _BLIND * max(float(values[-1]), 1e-12)]
+    seen = shown @ shown.T
+    if values[-1] < 1e-4 * len(force):
+        return None, 0.0, seen
+
+    k = shown.shape[1]
+    _, all_rows, left_out = leave_out(beside(columns @ shown, lever), force, block)
+
+    def weight(part: Array) -> Array:
+        # The unseen part of gravity keeps its share: the seen part gives the weight.
+        u = shown @ part[:k]
+        scale = np.linalg.norm(u) / max(float(np.linalg.norm(seen @ gravity)), 1e-9)
+        return np.asarray(u + scale * (gravity - seen @ gravity))
+
+    everything = weight(all_rows)
+    angles = np.array([angle_between(weight(part), everything) for part in left_out])
+    count = len(angles)
+    return everything, float(np.sqrt((count - 1) / count * (angles**2).sum())), seen
+
+
+def angle_between(a: Array, b: Array) -> float:
+    """Return the angle [rad] between two vectors (3,)."""
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
+def force_and_weight(seen: Seen, sign: float) -> tuple[Array, Array]:
+    """Return, about their means, the force (N, 3) and what it should follow by the sign of the mass.
+
+    One that is not known (0) is taken to be right: turned by more than 120 degrees, forces look like a negative mass.
+    """
+    force, pull = seen.wrench[:, 3:] - seen.wrench[:, 3:].mean(0), seen.pull - seen.pull.mean(0)
+    return force, -pull * (np.sign(sign) or 1.0)
+
+
+def turned_sensor(view: Glance, gravity: Array, sign: float) -> Turn | None:
+    """Return the constant turn of S that explains the force best; None without rotations or all forces.
+
+    Where the sensor turns tells it (Wahba); then what the acceleration adds to the force puts it right.
+    """
+    if view.rotation is None or any(view.dead[3:]):
+        return None
+    still = replace(view, acceleration=None)
+    force, down = force_and_weight(still.seen(gravity, view.rotation), sign)
+    turn = Rotation.aligning(force.T @ down)
+    force = view.seen(gravity, view.rotation).wrench[:, 3:]
+    turns = (_refined(v.seen(gravity, v.rotation), force, turn, view.block) for v in (view, still))
+    return min(turns, key=lambda turn: turn.force_share)
+
+
+def _refined(seen: Seen, force: Array, turn: Rotation, block: Integers) -> Turn:
+    """Return the turn of forces (N, 3) near the one given with which a body felt as `seen` explains most of them."""
+    body = beside(-seen.pull[:, :, None], seen.lever)
+    share = 1.0
+    for _ in range(_ROUNDS):
+        right = turn.inverse().apply(force)
+        held, _, share = solve(body, right, block)
+        felt, size = body @ held, len(held)
+        more, _, _ = solve(beside(body, -cross_matrix(felt - felt.mean(0))), right, block)
+        turn = turn @ Rotation.exp(more[size:])
+    return Turn(turn, share)
+
+
+def blind_axis(view: Glance, rotation: Array) -> Array | None:
+    """Return the direction (3,) of W along which gravity cannot be seen beside a bias, None where there is none."""
+    turned = view.smooth(np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)).reshape(-1, 3, 3)
+    centred = turned - turned.mean(0)
+    values, axes = np.linalg.eigh(np.einsum("nik,nil->kl", centred, centred))
+    bar = _BLIND * float(values[2])
+    return np.asarray(axes[:, 0]) if values[0] < bar < values[1] else None
+
+
+def _axis_unseen(seen: Array) -> Array | None:
+    if np.trace(seen) > 2.5:
+        return None
+    _, axes = np.linalg.eigh(seen)
+    return np.asarray(axes[:, 0])

@@ -1,0 +1,186 @@
+"""Torques that do not belong to the forces: other axes, another point, columns of another order or sign, another unit.
+
+At rest a torque is h x g for some first moment h of mass, so that axes, the point that torques are about, and most
+orders of columns show. In motion the force shows h, too: how it follows the turning, beside the h of the torque, tells
+sign and unit.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.recording import STANDARD_GRAVITY, Recording
+from steelyard.sanity.readings.glance import Glance, Seen, in_axes
+from steelyard.sanity.readings.mirrored import REFLECTIONS, in_words
+from steelyard.sanity.readings.rivals import BESIDE, Reading, misread_rotations
+from steelyard.sanity.readings.static_fit import columns, solve
+from steelyard.sanity.readings.units import scaled
+
+# Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
+# second share, and fit well where they leave less than the third.
+FORCE, BAD, WELL = 0.1, 0.02, 0.1
+# Where force and torque both were said to be in W, a reading that leaves more than this share is told from no other.
+TOLD = 0.01
+# Another order must leave this share of what the order as given leaves.
+MUCH_BETTER = 0.1
+_FEWEST_ROWS = 6
+# The ratio of both first moments must be known so well, and they lie so nearly along one line.
+SURE, ALONG = 0.05, 0.2
+# It is a unit's if it is within this share of one, beside three standard deviations.
+NEAR = 0.02
+# What forces read too large by beside torques, and what explains it. Thousands show by where the centre of mass lies.
+UNITS = (
+    (4.44822, "forces in N are read as lbf"),
+    (1 / 4.44822, "forces in lbf are read as N"),
+    (STANDARD_GRAVITY, "forces in N are read as kgf, or torques in kgf*m as N*m"),
+    (1 / STANDARD_GRAVITY, "forces in kgf are read as N, or torques in N*m as kgf*m"),
+    (1 / 0.112985, "torques in N*m are read as lbf*in"),
+    (0.112985, "torques in lbf*in are read as N*m"),
+    (100.0, "torques in N*m are read as N*cm"),
+    (0.01, "torques in N*cm are read as N*m"),
+)
+REMEDY = "Check order and signs of the torque columns in the description."
+WHICH = "Check order, form, unit and sense of the rotation, and the frame of the torque."
+ABOUT_S = "Take position x force away from the torques, all in the axes of W, or log the wrench at the sensor."
+
+
+def examine_torques(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return a finding where torques, read otherwise, belong to the forces, and as given do not.
+
+    Torques in other axes than they are said to be in, or a thousand times too small, leave no doubt: the recording is
+    returned with them put right.
+    """
+    if any(view.dead) or len(view) < _FEWEST_ROWS:
+        return recording, ()
+    seen = view.seen(reading.gravity, reading.rotation)
+    turned, forced = columns(seen)
+    force, force_std, force_share = solve(forced, seen.wrench[:, 3:], view.block)
+    moment, _, share = solve(turned, seen.wrench[:, :3], view.block)
+    if force_share > FORCE:
+        return recording, ()
+    felt = force[1:4] if seen.lever is not None else np.zeros(3)
+    if share > BAD:
+        otherwise, findings = _elsewhere(recording, view, seen, turned, share, reading)
+        findings = findings or _ordered(view, seen, turned, share, felt)
+        if findings:
+            return otherwise, findings
+    if share >= WELL or seen.lever is None:
+        return recording, ()
+    ratio = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
+    if ratio is None:
+        return recording, ()
+    if abs(ratio[0] / 1000 - 1) < NEAR + 3 * ratio[1] / 1000:
+        return _in_newton_metres(recording, *ratio)
+    # The other sign looks like positions of a tip as far behind the centre of mass: all rows tell them apart later.
+    return recording, () if ratio[0] < 0 else compared(*ratio)
+
+
+def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with torques a thousand times larger, and what is said of it."""
+    stream = next(s for s in recording.streams if "torque" in s.channels)
+    text = (
+        f"What turns shows the centre of mass {ratio:.0f} ± {std:.1g} times as far from S as the torques do: they are "
+        "in N m, not in N mm, and were multiplied by 1000."
+    )
+    return scaled(recording, stream, ("torque",), 1e3), (Finding.of("length-in-mm", text),)
+
+
+def _elsewhere(
+    recording: Recording, view: Glance, seen: Seen, turned: Array, share: float, reading: Reading
+) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return what is said of torques in other axes, or about the origin of W, with the axes put right."""
+    rotation = reading.rotation
+    if rotation is None:
+        return recording, ()
+    axes = _in_other_axes(view, seen, turned, reading)
+    rivals = [axes, *((r.left, r.words) for r in misread_rotations(recording, view, reading))]
+    fitting = sorted(rival for rival in rivals if rival[0] <= MUCH_BETTER * share)
+    least = fitting[0][0] if fitting else 0.0
+    doubtful = least > TOLD and view.world == {"torque", "force"}
+    alike = [words for left, words in fitting if BESIDE * left < least or doubtful]
+    if len(alike) > 1 or doubtful:
+        text = (
+            f"The torques fit one body where {'; or where '.join(alike)}: so read, {_percent(least)} of their "
+            f"variance is left unexplained instead of {_percent(share)}. The answer does not assume this."
+        )
+        return recording, (Finding("wrench-unexplained", text, WHICH, left_in=True),)
+    if fitting and fitting[0] == axes:
+        text = (
+            f"T{axes[1][1:]}: so read, {_percent(axes[0])} of their variance is left unexplained "
+            f"instead of {_percent(share)}. The answer assumes this."
+        )
+        remedy = f'Set frame = "{"S" if "torque" in view.world else "W"}" in the torque of this stream.'
+        return in_axes(recording, view.world ^ {"torque"}), (Finding("gravity-frame", text, remedy),)
+    if view.position is None:
+        return recording, ()
+    arm = view.smooth(np.einsum("nji,nj->ni", rotation, view.position))
+    left = solve(turned, seen.wrench[:, :3] - np.cross(arm, seen.wrench[:, 3:]), view.block)[2]
+    if left > MUCH_BETTER * share:
+        return recording, ()
+    text = (
+        f"The torques are about the origin of W, not of S: so read, {_percent(left)} of their variance is left "
+        f"unexplained instead of {_percent(share)}; the answer does not assume this."
+    )
+    return recording, (Finding("wrench-unexplained", text, ABOUT_S, left_in=True),)
+
+
+def _in_other_axes(view: Glance, seen: Seen, turned: Array, reading: Reading) -> tuple[float, str]:
+    """Return what torques in the other axes leave, S for W or W for S, and the words for it."""
+    other = replace(view, world=view.world ^ {"torque"})
+    left = solve(turned, other.seen(np.zeros(3), reading.rotation).wrench[:, :3], view.block)[2]
+    return left, f"the torques are in the axes of {'W (the base)' if 'torque' in other.world else 'S'}"
+
+
+def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array) -> tuple[Finding, ...]:
+    """Return what says in which order and sign torque columns fit; `felt` (3,) is the first moment by the force."""
+    tried = [(X, *solve(turned, seen.wrench[:, :3] @ X, view.block)) for X in REFLECTIONS]
+    X, moment, _, left = min(tried, key=lambda found: found[3])
+    if left > MUCH_BETTER * share:
+        return ()
+    # Either sign fits as well: the force decides, or else fewer changes are likelier.
+    side = float(moment[:3] @ felt) or float(X.sum())
+    text = (
+        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {_percent(left)} of "
+        f"their variance is left unexplained instead of {_percent(share)}; the answer does not assume this."
+    )
+    return (Finding("force-unit", text, REMEDY, left_in=True),)
+
+
+def _ratio(felt: Array, spread: float, moment: Array) -> tuple[float, float] | None:
+    """Return how many times a first moment by force (3,) is that by torque, with its standard deviation.
+
+    None where it is not known well, or where they do not lie along one line.
+    """
+    size = float(np.linalg.norm(moment))
+    if spread > SURE * float(np.linalg.norm(felt)) or size == 0:
+        return None
+    ratio = float(felt @ moment) / size**2
+    along = np.linalg.norm(felt - ratio * moment) <= ALONG * np.linalg.norm(felt)
+    return (ratio, spread / size) if along else None
+
+
+def compared(ratio: float, std: float) -> tuple[Finding, ...]:
+    """Return what the ratio of first moments by force and by torque says of each other's sign and unit, if anything."""
+    if abs(ratio + 1) < 0.1 + 3 * std:
+        text = (
+            "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
+            "other side of S. The answer does not assume this."
+        )
+        return (Finding("force-unit", text, REMEDY, left_in=True),)
+    for factor, words in UNITS:
+        if abs(ratio / factor - 1) < NEAR + 3 * std / abs(ratio) and abs(ratio - 1) > 5 * std:
+            much, way = ((ratio, std), "large") if ratio > 1 else ((1 / ratio, std / ratio**2), "small")
+            text = (
+                f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {words}. The "
+                "answer does not assume this: mass or centre of mass is wrong by as much."
+            )
+            return (replace(Finding.of("force-unit", text), left_in=True),)
+    return ()
+
+
+def _percent(share: float) -> str:
+    return f"{100 * share:.2g} %"

@@ -1,0 +1,1 @@
+"""Rows that are no measurements, and rows of still poses."""

@@ -1,0 +1,125 @@
+"""The determinant of four points with its true sign: on which side of a plane a point lies, without doubt.
+
+Source: Shewchuk 1997, "Adaptive precision floating-point arithmetic and fast robust geometric predicates": exact sums
+and products of two numbers, and sums kept in parts that do not overlap.
+"""
+
+from __future__ import annotations
+
+import numba
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.shape.hulls.borrowed import integer
+
+# Rounding of the double-double determinant, of the sum of its terms: 2^-98 holds its dozen roundings of 2^-102.
+_ROUNDING = 2.0**-98
+_SPLIT = 134217729.0  # 2^27 + 1, halves the digits of a double
+
+
+@numba.njit(cache=True, nogil=True)
+def _product(a: float, b: float) -> tuple[float, float]:
+    """Return a b as a sum of two numbers, exactly."""
+    p = a * b
+    t = _SPLIT * a
+    a1 = t - (t - a)
+    a2 = a - a1
+    t = _SPLIT * b
+    b1 = t - (t - b)
+    b2 = b - b1
+    return p, a2 * b2 - (((p - a1 * b1) - a2 * b1) - a1 * b2)
+
+
+@numba.njit(cache=True, nogil=True)
+def _difference(a: float, b: float) -> tuple[float, float]:
+    """Return a - b as a sum of two numbers, exactly."""
+    s = a - b
+    t = s - a
+    return s, (a - (s - t)) - (b + t)
+
+
+@numba.njit(cache=True, nogil=True)
+def _times(a: float, a2: float, b: float, b2: float) -> tuple[float, float]:
+    p, e = _product(a, b)
+    e += a * b2 + a2 * b
+    s = p + e
+    return s, e - (s - p)
+
+
+@numba.njit(cache=True, nogil=True)
+def _minus(a: float, a2: float, b: float, b2: float) -> tuple[float, float]:
+    s, e = _difference(a, b)
+    t, f = _difference(a2, b2)
+    e += t
+    u = s + e
+    f += e - (u - s)
+    v = u + f
+    return v, f - (v - u)
+
+
+@numba.njit(cache=True, nogil=True)
+def determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
+    """Return (b - a) x (c - a) . (p - a) of four rows, with its true sign."""
+    bx, bx2 = _difference(xyz[b, 0], xyz[a, 0])
+    by, by2 = _difference(xyz[b, 1], xyz[a, 1])
+    bz, bz2 = _difference(xyz[b, 2], xyz[a, 2])
+    cx, cx2 = _difference(xyz[c, 0], xyz[a, 0])
+    cy, cy2 = _difference(xyz[c, 1], xyz[a, 1])
+    cz, cz2 = _difference(xyz[c, 2], xyz[a, 2])
+    total, rest, terms = 0.0, 0.0, 0.0
+    for k in range(3):
+        if k == 0:
+            u, u2, v, v2, w, w2, z, z2 = by, by2, cz, cz2, bz, bz2, cy, cy2
+        elif k == 1:
+            u, u2, v, v2, w, w2, z, z2 = bz, bz2, cx, cx2, bx, bx2, cz, cz2
+        else:
+            u, u2, v, v2, w, w2, z, z2 = bx, bx2, cy, cy2, by, by2, cx, cx2
+        m, m2 = _times(u, u2, v, v2)
+        n, n2 = _times(w, w2, z, z2)
+        d, d2 = _difference(xyz[p, k], xyz[a, k])
+        terms += (abs(m) + abs(n)) * abs(d)
+        m, m2 = _minus(m, m2, n, n2)
+        m, m2 = _times(m, m2, d, d2)
+        total, rest = _minus(total, rest, -m, -m2)
+    if abs(total + rest) > _ROUNDING * terms:
+        return float(total + rest)
+    return _exact_determinant(xyz, a, b, c, p)
+
+
+@numba.njit(cache=True, nogil=True)
+def _exact_determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
+    """Return the same from a sum without rounding: for four points nearly, or truly, on one line or plane."""
+    sides = np.empty((3, 3, 2))
+    for k in range(3):
+        sides[0, k, 0], sides[0, k, 1] = _difference(xyz[b, k], xyz[a, k])
+        sides[1, k, 0], sides[1, k, 1] = _difference(xyz[c, k], xyz[a, k])
+        sides[2, k, 0], sides[2, k, 1] = _difference(xyz[p, k], xyz[a, k])
+    parts = np.empty(200)  # of the sum so far, by rising size, none overlapping: 6 x 8 products of 4 parts at most
+    used = integer(0)
+    for turn in range(6):
+        i = turn % 3
+        j, k = ((i + 1) % 3, (i + 2) % 3) if turn < 3 else ((i + 2) % 3, (i + 1) % 3)
+        for bits in range(8):
+            u, v, w = sides[0, i, bits & 1], sides[1, j, (bits >> 1) & 1], sides[2, k, bits >> 2]
+            if u != 0.0 and v != 0.0 and w != 0.0:
+                m, m2 = _product(u if turn < 3 else -u, v)
+                for factor in (m2, m):
+                    n, n2 = _product(factor, w)
+                    used = _add_exactly(parts, used, n2)
+                    used = _add_exactly(parts, used, n)
+    return float(parts[used - 1]) if used > 0 else 0.0
+
+
+@numba.njit(cache=True, nogil=True)
+def _add_exactly(parts: Array, used: int, number: float) -> int:
+    """Add a number to a sum kept in parts that do not overlap; return how many there are now, none of them zero."""
+    kept = 0
+    for k in range(used):
+        number, rest = _difference(number, -parts[k])
+        if rest != 0.0:
+            parts[kept] = rest
+            kept += 1
+    if number != 0.0:
+        parts[kept] = number
+        kept += 1
+    return kept

@@ -1,0 +1,91 @@
+"""Patches of surface that the views measure, and points of it settled among them."""
+
+from __future__ import annotations
+
+import numpy as np
+from scipy import ndimage
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.shape.points.medians import middle_half_std
+from steelyard.shape.points.thinning import in_cubes, spread_to
+from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans.region import REACHES, STRIDE, Region, heights
+from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+
+_NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
+_SEEDS = 4  # points that are settled, for each that stays
+_CELL = 2.0  # edge of the cubes that pixels are averaged over, in pixel widths at the object
+_CUBE = 8  # pixel widths: points of one cube are looked up in the images one after the other
+_NEARLY = 0.9  # of an object's height: the mean over the cell of its top, its sides included
+
+
+def surfels(scene: Scene, region: Region) -> Array:
+    """Return patches (N, 8) of the object and of the table around it."""
+    cell = _CELL * scene.pixel
+    floor = -4 * scene.sigma - 2 * cell
+    layers = int((_top(scene, region) - floor) / cell) + 2
+    # Where few images hold an end of it, all of their pixels are needed.
+    stride = 1 if region.cut else STRIDE
+    found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
+    found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
+    if not len(found):
+        raise no_surface()
+    return found
+
+
+def _top(scene: Scene, region: Region) -> float:
+    """Return how high patches are looked for [m]: as usual things reach, or most of the pixels of a cell.
+
+    Pixels that fly past edges are measured anywhere up to the cameras.
+    """
+    usual = REACHES[0] * scene.distance
+    if region.highest <= usual:
+        return region.highest
+    high, low, pitch = heights(scene)
+    xy = low + pitch * (np.argwhere(high > usual * _NEARLY) + 0.5)
+    over = region.holds(np.column_stack([xy, np.zeros(len(xy))]))
+    tallest = high[high > usual * _NEARLY][over].max(initial=0.0)
+    return min(region.highest, max(usual, float(tallest) / _NEARLY))
+
+
+def no_surface() -> CannotAnswer:
+    """Return the error of views that agree on nothing."""
+    return CannotAnswer("no object was found on the table: the views agree on no surface there.")
+
+
+def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int) -> Array:
+    """Move points (N, 3) along their normals to what the views measure; return support (N, 3) as there."""
+    order = in_cubes(xyz, _CUBE * scene.pixel)
+    moved, support = xyz[order], np.empty((len(xyz), 3))
+    support[order] = sight_lines.settled(*scene.images(), moved, normal[order], window, scene.noise, rounds)
+    xyz[order] = moved
+    return support
+
+
+def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tuple[Array, Array]:
+    """Return points (N, 3) of the object's surface and normals, settled among the views, the table around it level 0.
+
+    CannotAnswer where nothing stands out of that.
+    """
+    mask = region.mask
+    order = np.argsort(-patches[:, 6], kind="stable")
+    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _SEEDS * points, scene.pixel)
+    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
+    support = settled(scene, xyz, normal, WINDOW, 2)
+    least = min(LEAST_VIEWS, len(scene.R))
+    good = (support[:, 0] >= least) & (support[:, 1] <= 0.5 * support[:, 0])
+    table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
+    level, rough = 0.0, 0.1 * scene.sigma
+    object_cells = ndimage.binary_erosion(mask, np.ones((3, 3)), iterations=3)
+    around = table & ~object_cells[region.cells_under(xyz)[0]]
+    if around.sum() >= 20:
+        level = float(np.median(xyz[around, 2]))
+        rough = middle_half_std(xyz[around, 2])
+    xyz[:, 2] -= level
+    scene.p[:, 2] -= level
+    keep = good & (xyz[:, 2] > 5 * rough)
+    if keep.sum() < 20:
+        raise CannotAnswer("no object was found on the table: nothing stands out of it once the views are fused.")
+    return xyz[keep], normal[keep]

@@ -1,0 +1,192 @@
+"""Where on the table the object lies, in a map of the heights that all views measure."""
+
+from __future__ import annotations
+
+from typing import Any, NamedTuple
+
+import numpy as np
+from scipy import ndimage
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.shape.points.medians import middle_half_std
+from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.scene import LEAST_VIEWS, Scene
+
+STRIDE = 3  # of the pixels that are averaged
+_ENDS, _CUT = 1.0, 0.5  # per cent of an object: its ends; share of the images from which on enough hold them
+_FULL, _SPARED = 18, 0.85  # images of which none is to be spared, of few that share
+_LOOKED_AT = 1000  # spots that are asked for that
+REACHES = (0.6, 1.2, 2.4)  # of the camera's distance: how far from where the cameras look it is sought, and followed
+_WATCHED = 0.25  # of the pixels that usual cells hold: with fewer it is not known how high a cell is
+_BRIM = 3  # cells from the edge of the map: an object there goes on past it
+_COARSE = 4  # cells between those for which it is asked which images hold them
+_CAP = 0.02  # of the camera's distance: heights beyond it count alike where the object is sought
+_NEAR = 3  # cells of the map of heights: a point so near shows the surface there
+_BARE = 0.3  # of a gap: more bare table parts two objects
+_MARGIN = 0.008  # of table kept around the object [m]
+
+
+class Region(NamedTuple):
+    """Where on the table the object lies.
+
+    mask     (I, J) cells of the map of heights, with a margin around the object
+    low      (2,) corner of the map [m]
+    pitch    edge of a cell [m]
+    stands   (I, J) cells in which the object stands out of the table
+    highest  over the table that anything is measured there, noise added [m]
+    others   objects that stand beside it
+    cut      whether many images cut off a part of it
+    """
+
+    mask: Any
+    low: Array
+    pitch: float
+    stands: Any
+    highest: float
+    others: int
+    cut: bool
+
+    def spots(self, cells: Any) -> Array:
+        """Return the middles (N, 3) of cells (I, J) on the table."""
+        xy = self.low + self.pitch * (np.argwhere(cells) + 0.5)
+        return np.column_stack([xy, np.zeros(len(xy))])
+
+    @property
+    def runs_off(self) -> bool:
+        """Whether the object goes on where the map ends."""
+        inner = (slice(_BRIM, -_BRIM),) * 2
+        return bool(self.stands.sum() > self.stands[inner].sum())
+
+    def cells_under(self, points: Array) -> tuple[tuple[Any, Any], Any]:
+        """Return the cells i, j (N,) under points (N, 3), the nearest beyond the map, and which points are over it."""
+        i, j = np.floor((points[:, :2] - self.low) / self.pitch).astype(int).T
+        rows, columns = self.mask.shape
+        within = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
+        return (i.clip(0, rows - 1), j.clip(0, columns - 1)), within
+
+    def holds(self, points: Array) -> Any:
+        """Whether points (N, 3) lie over its cells."""
+        cells, within = self.cells_under(points)
+        return within & self.mask[cells]
+
+
+def object_on_table(scene: Scene) -> Region:
+    """Return where the largest object near where the cameras look lies; CannotAnswer where nothing stands out there."""
+    return _object_within(scene, REACHES[0] * scene.distance, STRIDE)
+
+
+def followed(scene: Scene, region: Region) -> Region:
+    """Return all of the object: where it runs off the map it is followed as far as views look.
+
+    Only once they agree: the wrinkles of a table that they have apart have no end.
+    """
+    for reach in REACHES[1:]:
+        if region.runs_off:
+            # Ends that lie far off are seen by few pixels: all of them are needed.
+            region = _object_within(scene, reach * scene.distance, 1)
+    spots, count = region.spots(region.stands), len(scene.R)
+    held = np.percentile(scene.held(spots[:: max(1, len(spots) // _LOOKED_AT)])[:, 0], _ENDS)
+    cut = bool(held < max(_CUT * count, min(_FULL, _SPARED * count)))
+    return region._replace(cut=cut) if cut else region
+
+
+def _object_within(scene: Scene, reach: float, stride: int) -> Region:
+    """Return where the largest object lies, of a map that reaches so far from where the cameras look [m]."""
+    pitch = 2 * scene.pixel
+    half, near = int(reach / pitch), int(REACHES[0] * scene.distance / pitch)
+    low = np.full(2, -half * pitch)
+    size = 2 * half
+    cap = max(6 * scene.sigma, _CAP * scene.distance)
+    floor = 0.0 if scene.raised else -cap
+    sums = images.height_map(*scene.images(), stride, low, pitch, floor, cap, size, size)
+    middle = (slice(half - near, half + near),) * 2
+    well, watched = _watched(scene, sums[..., 0], middle, low, pitch)
+    mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
+    # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
+    even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
+    spread = middle_half_std(even) if len(even) else 0.0
+    level = float(np.median(even)) if len(even) else 0.0
+    up = watched & (mean > level + min(max(5 * spread, 0.3 * scene.sigma), 0.5 * cap))
+    label, found = ndimage.label(ndimage.binary_opening(up, np.ones((2, 2))), np.ones((3, 3)))
+    area = np.bincount(label[well], minlength=found + 1)[1:]
+    if not area.any():
+        raise CannotAnswer(
+            "no object was found on the table: nothing stands out of it where the cameras look. "
+            "Lay it there; if it stands on a stand, give the plane of that in table.json."
+        )
+    largest = int(np.argmax(area)) + 1
+    label = _with_its_floor(label, largest, watched & ~up)
+    area, whole = (np.bincount(cells, minlength=found + 1)[1:] for cells in (label[well], label.ravel()))
+    others = int((area > max(0.1 * area.max(), 25)).sum()) - 1
+    margin = max(3, int(np.ceil(_MARGIN / pitch)))
+    mine = ndimage.binary_dilation(label == largest, np.ones((3, 3)), iterations=margin)
+    stranger = ndimage.binary_dilation(
+        (label > 0) & (label != largest) & np.isin(label, 1 + np.flatnonzero(whole > 25)), np.ones((3, 3))
+    )
+    mine &= ~stranger
+    highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
+    return Region(mine, low, pitch, label == largest, highest, others, False)
+
+
+def _with_its_floor(label: Any, largest: int, table: Any) -> Any:
+    """Return labels (I, J), pieces within the largest added to it where hardly any of the table shows between.
+
+    Down in a mug, beside its wall, next to nothing is measured: its floor is no other object.
+    """
+    whole = ndimage.binary_closing(label == largest, np.ones((3, 3)), iterations=_NEAR)
+    hole, count = ndimage.label(ndimage.binary_fill_holes(whole) & (label != largest))
+    gap, bare = (np.bincount(hole[cells], minlength=count + 1) for cells in (label == 0, (label == 0) & table))
+    own = bare <= _BARE * gap
+    own[0] = False
+    return np.where(own[hole] & (label > 0), largest, label)
+
+
+def heights(scene: Scene) -> tuple[Array, Array, float]:
+    """Return the mean height (I, J) [m] measured in the cells about where the cameras look, corner (2,) and pitch [m].
+
+    Cells in which too little was measured are 0.
+    """
+    pitch = 2 * scene.pixel
+    half = int(REACHES[0] * scene.distance / pitch)
+    low = np.full(2, -half * pitch)
+    sums = images.height_map(*scene.images(), STRIDE, low, pitch, -scene.distance, scene.distance, 2 * half, 2 * half)
+    enough = sums[..., 0] >= _WATCHED * np.median(sums[..., 0][sums[..., 0] > 0])
+    return np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0), low, pitch
+
+
+def _watched(scene: Scene, count: Array, middle: tuple[slice, slice], low: Array, pitch: float) -> tuple[Any, Any]:
+    """Return which cells (I, J) of a map hold enough pixels: in the middle as many as usual, and all that are followed.
+
+    count  (I, J) pixels in each
+
+    A cell that few images hold, or only from afar, has enough if it has its share of the pixels that those images turn
+    to it: what an image does not show is no sign that nothing is there.
+    """
+    typical = float(np.median(count[middle][count[middle] > 0]))
+    usual, apart = count >= _WATCHED * typical, np.ones(count.shape, bool)
+    well = np.zeros(count.shape, bool)
+    well[middle] = usual[middle]
+    held, density = _held(scene, count.shape, low, pitch)
+    apart[middle] = held[middle] < _CUT * len(scene.R)
+    apart &= held >= min(LEAST_VIEWS, len(scene.R))
+    due = density * pitch**2
+    share = float(np.median(count[well] / np.maximum(due[well], 1e-9)))
+    return well, usual | (apart & (count > 0) & (count >= _WATCHED * share * due))
+
+
+def _held(scene: Scene, shape: tuple[int, ...], low: Array, pitch: float) -> tuple[Array, Array]:
+    """Return how many images hold the cells (I, J) of a map, and how densely their pixels lie there [1/m^2]."""
+    i, j = (np.arange(-(-n // _COARSE)) + 0.5 for n in shape)
+    xy = low + pitch * _COARSE * np.stack(np.meshgrid(i, j, indexing="ij"), axis=-1).reshape(-1, 2)
+    coarse = scene.held(np.column_stack([xy, np.zeros(len(xy))])).reshape(len(i), len(j), 2)
+    fine = coarse.repeat(_COARSE, 0).repeat(_COARSE, 1)[: shape[0], : shape[1]]
+    return fine[..., 0], fine[..., 1]
+
+
+def lost_share(xyz: Array, region: Region) -> float:
+    """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
+    covered = np.zeros_like(region.stands)
+    covered[region.cells_under(xyz)[0]] = True
+    covered = ndimage.binary_dilation(covered, np.ones((3, 3)), iterations=_NEAR)
+    return float((region.stands & ~covered).sum() / region.stands.sum())

@@ -1,0 +1,211 @@
+"""Poses that are slightly off: every view is moved until it agrees with the surface that all views give together."""
+
+from __future__ import annotations
+
+from contextlib import suppress
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.spatial import cKDTree
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.shape.points.thinning import spread_to
+from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.common_table import slid
+from steelyard.shape.scans.depth_images import FACING
+from steelyard.shape.scans.patches import no_surface, settled, surface_of, surfels
+from steelyard.shape.scans.region import Region, object_on_table
+from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.shape.scans.table_plane import INCIDENCE
+from steelyard.shape.scans.view_steps import moved, steps_together
+from steelyard.spatial import Rotation
+
+_POSE_STD = (0.01, np.radians(2.0))  # how far reported poses may be off [m, rad]
+_APART = 0.8  # of the depth noise: views that one fit moves apart by less are left where they are, rms
+_NEARBY = 0.001  # views that one fit moves apart by less need no search [m], rms
+_FINE = (0.006, 0.006, 0.003, 0.003, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
+_TOGETHER = 0.003  # in rounds of that and less all views step at once: farther off, one side may pass for another [m]
+_WINDOWS = (0.012, 0.012, *_FINE)
+_FAR = (0.02, 0.02, 0.02, *_WINDOWS)
+_MODEL = 2500  # points that views are fitted to
+_NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
+_STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
+_SAME = 0.1  # of the depth noise: views that spread by less are as good as each other
+_ON = 3.0  # times the depth noise: so near the surface a pixel lies on it
+_SAMPLES = 200_000  # pixels that are asked whether they do
+
+
+@dataclass(frozen=True, eq=False)
+class Seen:
+    """The object as the views have it together.
+
+    region   where it lies      patches  (N, 8) of its surface and of the table around it
+    spread   median spread of the views about the surface, in standard deviations of depth
+    """
+
+    region: Region
+    patches: Array
+    spread: float
+
+    @classmethod
+    def by(cls, scene: Scene) -> Seen:
+        """Return what the views see from where their cameras now are; CannotAnswer where they agree on nothing."""
+        region = object_on_table(scene)
+        patches = surfels(scene, region)
+        xyz, normal = _model(scene, patches, _NEAR)
+        support = settled(scene, xyz, normal, _NEAR, 1)
+        good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+        if not good.any():
+            raise no_surface()
+        return cls(region, patches, float(np.median(support[good, 2] / _expected(scene, xyz[good], normal[good]))))
+
+
+def _expected(scene: Scene, xyz: Array, normal: Array) -> Array:
+    """Return the spread (N,) [m] that noise makes about points (N, 3): cameras are nearer to those high up."""
+    square, seen = np.zeros(len(xyz)), np.zeros(len(xyz))
+    for eye in scene.p:
+        way = eye - xyz
+        far = (way**2).sum(1)
+        faces = (way * normal).sum(1) > FACING * np.sqrt(far)
+        square += np.where(faces, far, 0.0)
+        seen += faces
+    usual = scene.distance**2
+    return INCIDENCE * scene.noise * np.where(seen > 0, square / np.maximum(seen, 1), usual)
+
+
+@dataclass(frozen=True, eq=False)
+class _Try:
+    """What the views see from cameras at R (V, 3, 3), p (V, 3), and how far they contradict it.
+
+    crossed  share of what they say of the object's surface that is to have seen past it
+    shown    pixels that lie on it, of those looked at
+    """
+
+    seen: Seen
+    R: Array
+    p: Array
+    crossed: float
+    shown: int
+
+    @classmethod
+    def of(cls, scene: Scene, seen: Seen) -> _Try:
+        """Return the judgement of what is seen from where the cameras now are; CannotAnswer where that is nothing."""
+        R, p = scene.R, scene.p
+        scene.p = p.copy()
+        xyz, normal = surface_of(scene, seen.patches, seen.region, _MODEL)
+        on, past = settled(scene, xyz, normal, WINDOW, 0)[xyz[:, 2] > _STANDS_OUT * scene.sigma, :2].sum(0)
+        pixels = images.sampled(*scene.images(), max(1, int(np.sqrt(scene.views.depth.size / _SAMPLES))))[:, :3]
+        pixels = pixels[seen.region.holds(pixels)]
+        away, row = cKDTree(xyz).query(pixels, distance_upper_bound=_NEAR)
+        pixels, row = pixels[away < _NEAR], row[away < _NEAR]
+        off = np.abs(((pixels - xyz[row]) * normal[row]).sum(1))
+        # Nearer to it than to the table: a blurred rim must not pass the table's pixels for its own.
+        shown = (off < _ON * scene.sigma) & (off < pixels[:, 2])
+        return cls(seen, R, p, float(past / max(on + past, 1.0)), int(shown.sum()))
+
+
+def agreed(scene: Scene, first: Seen, off: float) -> Seen:
+    """Return what the views see, their cameras moved until they agree where that makes it better.
+
+    first  from the poses as they are
+    off    how far off views had the table before they were levelled, rms [m]; 0 where they were not
+
+    Views and the surface that they give together are fitted to each other in turn. One such fit tells whether it is
+    worth while: how far it would move the views apart. Where poses are off by more than a little, it is tried from
+    where they are and from where `slid` brings them. A try that loses the object is none.
+    """
+    if len(scene.R) < 2 or _apart(scene, first, _FINE[-1], off > 0) < _APART * scene.sigma:
+        return first
+    given, tries = (scene.R, scene.p), []
+    near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < _NEARBY
+    for fit in (_left, _fit_fine) if near else (_left, _fit_far, _fit_slid) if off else (_left, _fit_far):
+        scene.R, scene.p = given
+        with suppress(CannotAnswer):
+            tries.append(_Try.of(scene, fit(scene, first)))
+    if not tries:
+        raise no_surface()
+    # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
+    # spread more about it than about the best. Of a low object, which cannot be crossed, the last two tell.
+    most, least = max(each.shown for each in tries), max(min(each.seen.spread for each in tries), _SAME)
+    best = min(tries, key=lambda each: each.crossed - each.shown / max(most, 1) + each.seen.spread / least)
+    scene.R, scene.p = best.R, best.p
+    return best.seen
+
+
+def _left(_: Scene, first: Seen) -> Seen:
+    return first
+
+
+def _fit_fine(scene: Scene, first: Seen) -> Seen:
+    return _fitted(scene, first, _FINE)
+
+
+def _fit_far(scene: Scene, first: Seen) -> Seen:
+    return _fitted(scene, first, _FAR)
+
+
+def _fit_slid(scene: Scene, _: Seen) -> Seen:
+    slid(scene)
+    return _fitted(scene, Seen.by(scene), _WINDOWS)
+
+
+def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
+    """Return how far one fit to the surface would move apart what the views see of the object, rms [m].
+
+    wrong  whether poses are known to be: else moves along the surface, such as those of a ruler along itself, are
+           chance, and count as little as they show
+    """
+    R, p, xyz, normal = _fit(scene, seen, window)
+    high = xyz[:, 2] > _STANDS_OUT * scene.sigma
+    xyz, normal = (xyz[high], normal[high]) if high.any() else (xyz, normal)
+    shares, axes = np.linalg.eigh(normal.T @ normal / len(normal))
+    # All of a move where normals point everywhere.
+    shown = np.eye(3) if wrong else (axes * np.sqrt(np.minimum(3 * shares.clip(0), 1))).T
+    turn = R @ np.swapaxes(scene.R, 1, 2)
+    shift = p - np.einsum("vij,vj->vi", turn, scene.p)
+    middle = xyz.mean(0)
+    # Over all points: the mean of squares is that of the middle and of what turns about it do.
+    about = (xyz - middle).T @ (xyz - middle) / len(xyz)
+    turns = shown @ (turn - turn.mean(0))
+    by_turns = np.einsum("vij,jk,vik->v", turns, about, turns).mean()
+    return float(np.sqrt(((turn @ middle + shift) @ shown.T).var(0).sum() + by_turns))
+
+
+def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
+    """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
+    for window in windows:
+        scene.R, scene.p, xyz, normal = _fit(scene, seen, window)
+        if window <= _TOGETHER:
+            steps = steps_together(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+            scene.R, scene.p = _stepped(scene.R, scene.p, xyz.mean(0), steps)
+        seen = Seen.by(scene)
+    return seen
+
+
+def _stepped(R: Array, p: Array, middle: Array, steps: Array) -> tuple[Array, Array]:
+    """Return poses (V, 3, 3), (V, 3) after steps (V, 6), turns [rad] about `middle` (3,) and shifts [m]."""
+    turn = np.asarray(Rotation.exp(steps[:, :3]).matrix)
+    return turn @ R, middle + np.einsum("vij,vj->vi", turn, p - middle) + steps[:, 3:]
+
+
+def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array, Array]:
+    """Return poses (V, 3, 3), (V, 3) that fit the views to their own surface, and its points and normals (N, 3)."""
+    xyz, normal = _model(scene, seen.patches, window)
+    R, p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
+    return R, p, xyz, normal
+
+
+def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
+    """Return well-spread points (N, 3) of the surface that all views give together, and their normals.
+
+    CannotAnswer where they give none.
+    """
+    order = np.argsort(-patches[:, 6], kind="stable")
+    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _MODEL, 2 * scene.pixel)
+    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
+    support = settled(scene, xyz, normal, window, 1)
+    good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+    if not good.any():
+        raise no_surface()
+    return xyz[good], normal[good]

@@ -1,0 +1,95 @@
+"""Views in the frame of the table, and how noisy their depth is there."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.errors import CannotAnswer
+from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_noise, table_of
+from steelyard.shape.scans.view_mistakes import advice
+from steelyard.shape.views import TablePlane, Views
+from steelyard.spatial import Pose
+
+LEAST_VIEWS = 3  # that must agree before something is believed
+WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
+_SAMPLES = 30_000  # points that find the table
+
+
+@dataclass(eq=False)
+class Scene:
+    """The images with their poses in the frame of the table T: z up, the origin under where the cameras look.
+
+    X_WT      the table in W
+    R, p      rotations (V, 3, 3) and positions (V, 3) [m] of the cameras in T; they start where they were reported
+    distance  typical one from a camera to where the cameras look [m]
+    noise     standard deviation of depth at 1 m; it grows with the square of depth [1/m]
+    stated    the table that was given, as the points have it, in W; None where it was to be found
+    raised    whether a lower table shows beside this one, as beside a stand: what lies there is no object's
+    floor     what is measured lower than this is not of the table [m]
+    """
+
+    views: Views
+    X_WT: Pose
+    R: Array
+    p: Array
+    distance: float
+    noise: float
+    stated: TablePlane | None = None
+    raised: bool = False
+    floor: float = -np.inf
+
+    @property
+    def table(self) -> TablePlane:
+        """The plane that the object lies on, in W."""
+        normal = self.X_WT.rotation.matrix[:, 2]
+        return TablePlane(normal, float(normal @ self.X_WT.position))
+
+    @property
+    def pixel(self) -> float:
+        """Width of a pixel at the object [m]."""
+        return self.distance / self.views.intrinsics.fx
+
+    @property
+    def sigma(self) -> float:
+        """Standard deviation of depth at the object [m]."""
+        return self.noise * self.distance**2
+
+    def images(self) -> tuple[Any, float, Array, Array, Array]:
+        """Return what every pass over the images needs: depth, its unit, the camera and its poses."""
+        return self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p
+
+    def held(self, points: Array) -> Array:
+        """Return how many images hold each of points (N, 3), and how densely their pixels lie there [1/m^2]: (N, 2)."""
+        lens = self.views.intrinsics
+        return np.asarray(images.held(lens.vector, self.R, self.p, lens.height, lens.width, points))
+
+    def keep(self, rows: Any) -> None:
+        """Leave out all views but those of `rows`."""
+        if len(rows) < len(self.R):
+            self.views, self.R, self.p = self.views.chosen(rows), self.R[rows], self.p[rows]
+
+
+def scene_of(views: Views) -> Scene:
+    """Return the images in the table's frame."""
+    R, p = views.X_WC.rotation.matrix, views.X_WC.position
+    stride = max(1, int(np.sqrt(views.depth.size / _SAMPLES)))
+    sampled = images.sampled(views.depth, views.depth_unit, views.intrinsics.vector, R, p, stride)
+    looks = looked_at(R, p)
+    distance = float(np.median(np.linalg.norm(p - looks, axis=1)))
+    try:
+        table = table_of(sampled[:, :3], p, distance, views.table)
+    except CannotAnswer as error:
+        raise CannotAnswer(f"{error} {advice(views)}") from None
+    stated, step = None if views.table is None else table, np.inf
+    if stated is not None:
+        table, step = leveller(sampled[:, :3], p, distance, stated)
+    X_WT = table_frame(table, looks)
+    noise = table_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), distance, views.depth_unit, len(views))
+    X_TC = X_WT.inverse() @ views.X_WC
+    R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
+    return Scene(views, X_WT, R.copy(), p.copy(), distance, noise, stated, floor=-step / 2)
