@@ -33,6 +33,15 @@ def test_an_entry_says_what_it_means_how_it_is_seen_and_what_to_do(entry: str) -
     assert [word for word in ("**Means**", "**Seen**", "**Do**") if word not in entry] == []
 
 
+@pytest.mark.parametrize("entry", ENTRIES, ids=lambda entry: entry.splitlines()[0])
+def test_the_table_says_of_the_answer_what_the_entry_says(entry: str) -> None:
+    """How a finding is seen is folded under a line with what became of the answer; the table has it in a word."""
+    said = {"": "", "corrected": "Corrected: ", "named": "Only named: ", "either": "Corrected or only named: "}
+    row = re.search(rf"^\| \[`{entry.splitlines()[0]}`\].*\| ?(\w*) \|$", FAQ, re.MULTILINE)
+    assert row is not None
+    assert re.findall(r"<summary>(.*)how it is seen", entry) == ([said[row[1]]] if row[1] else [])
+
+
 @pytest.mark.parametrize("code", REMEDIES)
 def test_codes_are_words_and_remedies_are_sentences(code: str) -> None:
     assert re.fullmatch(r"[a-z]+(-[a-z]+)*", code)
