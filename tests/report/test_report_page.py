@@ -114,6 +114,15 @@ def test_the_numbers_stand_there(full: Report) -> None:
     assert "steelyard demo" in words
 
 
+def test_notes_are_a_list_of_their_own(full: Report) -> None:
+    """Beside the evidence they made one column of the page twice as long as the other."""
+    page = render(full)
+    assert '<ul class="notes"><li>a note</li></ul>' in page
+    assert ">note</dt>" not in page
+    bare = replace(full, estimate=replace(full.estimate, notes=()))
+    assert 'class="notes"' not in render(bare)
+
+
 def test_the_page_loads_nothing(full: Report) -> None:
     text_of_page = render(full)
     assert not re.search(r"(https?:)?//[a-z]", re.sub(r"<script(?s:.)*?</script>", "", text_of_page))

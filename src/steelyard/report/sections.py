@@ -244,7 +244,7 @@ def _largest(values: Array) -> float:
 
 
 def evidence(report: Report) -> Html:
-    """Return what the data had to say: rows, rank, condition, residuals, hold-out, bias, delays, notes."""
+    """Return what the data had to say: rows, rank, condition, residuals, hold-out, bias, delays."""
     seen = report.estimate.evidence
     rows: list[tuple[str, object, str]] = [("method", report.estimate.method, "")]
     of_what = ", of all robots together, unsmoothed" if isinstance(report.estimate, TeamEstimate) else ""
@@ -266,9 +266,14 @@ def evidence(report: Report) -> Html:
         rows.append(("sensor bias", f"{_vector(force)} N, {_vector(torque)} N m", "subtract from the raw channels"))
     delays = [(name, d) for name, d in report.estimate.delays_s.items() if d]
     rows += [("delay", f"{fixed(1e3 * delay, 2)} ms", name) for name, delay in delays[:_MOST]]
-    rows += [("note", note, "") for note in report.estimate.notes[:_MOST]]
     items = [tag("div", tag("dt", n), tag("dd", v, tag("small", why) if why else "")) for n, v, why in rows]
     return section("Evidence", tag("dl", *items, class_="facts"), name="evidence")
+
+
+def notes(report: Report) -> Html:
+    """Return what was chosen and assumed, one sentence each; nothing where there is nothing to say."""
+    said = [tag("li", note) for note in report.estimate.notes[:_MOST]]
+    return section("Notes", tag("ul", *said, class_="notes"), name="notes") if said else joined()
 
 
 def _rank(seen: Estimate) -> tuple[str, str]:
