@@ -389,12 +389,24 @@ def test_frames_that_nothing_ties(tmp_path: Path) -> None:
     assert str(error.value).endswith('no transforms lead from "base" to "tool". Frames here: arm, base.'), text
 
 
-def test_a_bare_bag_names_the_frame_of_its_wrench(tmp_path: Path) -> None:
+@pytest.mark.parametrize(
+    ("links", "base"),
+    [
+        ({("base", "ft"): Pose.identity()}, "base"),
+        ({("arm", "ft"): Pose.identity(), ("panda_link0", "arm"): Pose.identity()}, "panda_link0"),
+        ({("base_link", "ft"): Pose.identity(), ("map", "base_link"): Pose.identity()}, "base_link"),
+        ({("base", "camera"): Pose.identity()}, "base_link"),
+        ({("ft", "hand"): Pose.identity(), ("hand", "ft"): Pose.identity()}, "hand"),
+    ],
+)
+def test_a_bare_bag_names_the_frame_of_its_wrench_and_of_the_base(
+    tmp_path: Path, links: dict[tuple[str, str], Pose], base: str
+) -> None:
     maker = Maker(ROS2)
     out = [m for m in log_of(maker, 20)[0] if m[0] == "/ft"]
-    out.append(("/tf", TF, START, maker.transforms(START, {("base", "ft"): Pose.identity()})))
+    out.append(("/tf", TF, START, maker.transforms(START, links)))
     write_bag(tmp_path / "run", out)
-    assert 'frames   = ["base_link", "ft"]   # the sensor in the base' in message(tmp_path / "run")
+    assert f'frames   = ["{base}", "ft"]   # the sensor in the base' in message(tmp_path / "run")
 
 
 def test_bags_without_rosbags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

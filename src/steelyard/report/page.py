@@ -41,7 +41,8 @@ def render(report: Report, version: str | None = None) -> str:
         sections.comparison(report),
         sections.residuals(report),
         sections.findings(report),
-        tag("div", tag("div", sections.numbers(report), sections.notes(report)), sections.evidence(report), class_="pair"),
+        tag("div", sections.numbers(report), sections.evidence(report), class_="pair"),
+        sections.notes(report),
     )
     scene = "" if report.scene is None else tag("script", script_json(drawing(report, report.scene)),
                                                  type="application/json", id="scene")  # fmt: skip

@@ -8,7 +8,6 @@ from steelyard.io.bags import TRANSFORMS, Topic
 from steelyard.io.example import HEAD
 from steelyard.io.toml_string import toml_string
 
-_FRAMES = '["base_link", FRAME]   # the sensor in the base: put your own frames here'
 _WRENCH = {
     "geometry_msgs/msg/WrenchStamped": ("wrench.force", "wrench.torque"),
     "geometry_msgs/msg/Wrench": ("force", "torque"),
@@ -24,8 +23,8 @@ _ROBOT = 'urdf        = "arm.urdf"   # put the file of your arm here\n'
 _WIDTH = 8
 
 
-def bag_example(path: str, topics: Sequence[Topic], sensor: str) -> str:
-    """Return a description of the bag `path`: its first wrench and its first pose, or joints, to the frame `sensor`."""
+def bag_example(path: str, topics: Sequence[Topic], base: str, sensor: str) -> str:
+    """Return a description of the bag `path`: its first wrench and the first pose of `sensor` in `base`, or joints."""
     wrench = first_wrench(topics) or Topic("/wrench", "geometry_msgs/msg/WrenchStamped", 0)
     posed = [t for t in topics if t.kind in _POSE and not t.name.endswith("/tf_static")]
     joints = next((t for t in topics if t.kind == "sensor_msgs/msg/JointState"), None)
@@ -36,7 +35,8 @@ def bag_example(path: str, topics: Sequence[Topic], sensor: str) -> str:
         "force": f'{{ columns = ["{force}"], unit = "N" }}',
         "torque": f'{{ columns = ["{torque}"], unit = "N*m" }}',
     }
-    frames = {"frames": _FRAMES.replace("FRAME", toml_string(sensor))} if pose.kind in TRANSFORMS else {}
+    named = f"[{toml_string(base)}, {toml_string(sensor)}]   # the sensor in the base: check both"
+    frames = {"frames": named} if pose.kind in TRANSFORMS else {}
     seen = {
         **frames,
         "rotation": f'{{ columns = ["{turn}"], form = "quaternion-xyzw" }}   # S to W',
