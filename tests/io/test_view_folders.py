@@ -47,6 +47,29 @@ def test_written_views_are_read_again(folder: Path) -> None:
     assert read.table.offset == 0.1
 
 
+@pytest.mark.parametrize("ending", ["jpg", "jpeg"])
+def test_colours_may_be_jpeg(folder: Path, ending: str) -> None:
+    """As Open3D, COLMAP and most cameras write them; PNG stands first where both lie there."""
+    from PIL import Image
+
+    for path in (folder / "color").iterdir():
+        Image.fromarray(np.full((24, 32, 3), 90, np.uint8)).save(path.with_suffix(f".{ending}"))
+    assert np.array_equal(read_views(folder).rgb, VIEWS.rgb)
+    for path in (folder / "color").glob("*.png"):
+        path.unlink()
+    rgb = read_views(folder).rgb
+    assert rgb is not None
+    assert np.abs(rgb.astype(float) - 90).max() <= 1
+
+
+def test_depth_may_not_be_jpeg(folder: Path) -> None:
+    from PIL import Image
+
+    Image.fromarray(np.full((24, 32), 90, np.uint8)).save(folder / "depth" / "0000.png", "JPEG")
+    with pytest.raises(BadFile, match=r"depth/0000\.png: expected a PNG image; found something else\.$"):
+        read_views(folder)
+
+
 def names(folder: Path) -> list[str]:
     return sorted(path.relative_to(folder).as_posix() for path in folder.rglob("*") if path.is_file())
 

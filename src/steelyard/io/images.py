@@ -1,4 +1,4 @@
-"""PNG images, 8-bit colour and 16-bit depth: the one module that imports pillow (extra `images`)."""
+"""Images, colour of 8 bits (PNG, JPEG) and depth of 16 (PNG): the one module that imports pillow (extra `images`)."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def require_images() -> None:
 
 def read_depth(path: Path) -> Depths:
     """Return a depth image (H, W) uint16; raises BadFile where it has not one channel of 16 bits."""
-    image = _opened(path)
+    image = _opened(path, ("PNG",))
     if not image.mode.startswith("I"):
         raise BadFile(f"{path}: depth must be a PNG with one channel of 16 bits; this one has mode {image.mode}.")
     return np.asarray(_pixels(path, image), np.uint16)
@@ -40,23 +40,23 @@ def read_depth(path: Path) -> Depths:
 
 def read_colour(path: Path) -> Colours:
     """Return a colour image (H, W, 3) uint8; raises BadFile."""
-    image = _opened(path)
+    image = _opened(path, ("PNG", "JPEG"))
     if image.mode not in ("RGB", "RGBA", "L", "P", "LA"):
-        raise BadFile(f"{path}: colour must be a PNG with 8 bits per channel; this one has mode {image.mode}.")
+        raise BadFile(f"{path}: colour must be RGB or grey with 8 bits per channel; this image has mode {image.mode}.")
     return np.asarray(_pixels(path, image, "RGB"), np.uint8)
 
 
-def _opened(path: Path) -> Any:
+def _opened(path: Path, formats: tuple[str, ...]) -> Any:
     pillow = _pillow()
     if not path.exists():
         raise BadFile(f"{path}: this image is missing.")
     content = read_whole(path)
     try:
-        image = pillow.open(io.BytesIO(content), formats=("PNG",))
+        image = pillow.open(io.BytesIO(content), formats=formats)
     except pillow.DecompressionBombError:
         raise BadFile(f"{path}: this image has more pixels than any depth camera.") from None
     except (OSError, ValueError, SyntaxError):
-        raise BadFile(f"{path}: expected a PNG image; found something else.") from None
+        raise BadFile(f"{path}: expected a {' or '.join(formats)} image; found something else.") from None
     if image.width * image.height > MOST_PIXELS:
         raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than any depth camera has.")
     return image

@@ -1,4 +1,4 @@
-"""Folders of posed RGB-D views: camera.json, poses.csv, color/NAME.png, depth/NAME.png and, if known, table.json."""
+"""Folders of posed RGB-D views: camera.json, poses.csv, depth/NAME.png, color/NAME.png or .jpg, perhaps table.json."""
 
 from __future__ import annotations
 
@@ -26,6 +26,7 @@ from steelyard.whole_files import whole_folder, write_text
 _COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
 _HEADER = ",".join(_COLUMNS)
 _CAMERA = ("width", "height", "fx", "fy", "cx", "cy", "depth_unit_m")
+_COLOUR = ("png", "jpg", "jpeg")
 MOST_VIEWS = 10_000
 _LARGEST_CSV = 16_000_000
 _UNIT = 1e-3  # how far from 1 the length of a quaternion may be
@@ -47,7 +48,7 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
     for k, name in enumerate(names):
         depth[k] = _sized(folder / "depth" / f"{name}.png", read_depth, size)
         if rgb is not None:
-            rgb[k] = _sized(folder / "color" / f"{name}.png", read_colour, size)
+            rgb[k] = _sized(_colour(folder / "color", name), read_colour, size)
         if progress:
             progress(k + 1, len(names))
     table = _table(folder / "table.json") if (folder / "table.json").exists() else None
@@ -153,6 +154,12 @@ def _name(path: Path, line: int, name: str) -> str:
             f'{path}: line {line}: "{name}" is no name of a view. Use letters, digits, - and _ without folders.'
         )
     return name
+
+
+def _colour(folder: Path, name: str) -> Path:
+    """Return where the colour of a view lies, as cameras write it; the first of these names where it is missing."""
+    paths = [folder / f"{name}.{ending}" for ending in _COLOUR]
+    return next((path for path in paths if path.exists()), paths[0])
 
 
 def _sized(path: Path, read: Callable[[Path], Any], size: tuple[int, int]) -> Any:
