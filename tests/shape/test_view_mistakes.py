@@ -12,6 +12,7 @@ import pytest
 from steelyard.errors import CannotAnswer
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import fuse
+from steelyard.shape.scans.pose_scale import pose_scale
 from steelyard.shape.scans.view_mistakes import likely_mistake
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.simulate.scanning import scan_mesh
@@ -60,6 +61,8 @@ WRONG: list[tuple[str, Callable[[Views], Views], str]] = [
     ("millimetres", lambda v: moved(v, 1000), "divided by 1000, .*: give them in metres"),
     ("centimetres", lambda v: moved(v, 100), "divided by 100, .*: give them in metres"),
     ("a thousandth", lambda v: moved(v, 0.001), "times 1000, .*: give them in metres"),
+    ("no scale", lambda v: moved(v, 3.7), r"poses times 0\.2[67]\d?, .*\(poses from images alone"),
+    ("no scale, small", lambda v: moved(v, 0.13), r"poses times 7\.[5-9]\d?, .*: give them in metres \("),
     ("depth in 0.1 mm", lambda v: replace(v, depth_unit=1e-4), '"depth_unit_m": 0.001, .*: correct it in camera.json'),
     ("depth in cm", lambda v: replace(v, depth_unit=1e-2), '"depth_unit_m": 0.001, .*: correct it in camera.json'),
     ("a lens of half the size", lambda v: seen_by(v, fx=153.75, fy=153.75, cx=80, cy=60), "fx and fy times 2 "),
@@ -73,6 +76,16 @@ WRONG: list[tuple[str, Callable[[Views], Views], str]] = [
 def test_the_mistake_is_named(right: Views, wrong: Callable[[Views], Views], words: str) -> None:
     with pytest.raises(CannotAnswer, match=rf"^no (table|object) was found.*{words}"):
         fuse(wrong(right))
+
+
+def test_the_scale_of_poses_is_found_by_depth(right: Views) -> None:
+    for factor in (0.02, 0.5, 1.0, 30.0):
+        assert pose_scale(moved(right, factor)) == pytest.approx(1 / factor, rel=0.03)
+
+
+def test_views_that_tell_no_scale(right: Views) -> None:
+    assert pose_scale(moved(right, 0.0)) is None
+    assert pose_scale(moved(right, -1.0)) is None
 
 
 def test_right_views_hold_no_mistake(right: Views) -> None:

@@ -6,13 +6,14 @@ plane below them all; of views that are right nothing else does that, since a ta
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steelyard.errors import CannotAnswer
 from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.pose_scale import pose_scale
 from steelyard.shape.scans.table_plane import NEAR, largest_plane, looked_at
 from steelyard.shape.views import FARTHEST, NEAREST, Intrinsics, Views
 from steelyard.spatial import Pose, Rotation
@@ -94,17 +95,30 @@ def _of_size(factor: float) -> Mistake:
 _MISTAKES = (*_POSES, *map(_of_unit, _UNITS), *map(_of_size, _SIZES))
 
 
+def _of_scale(scale: float) -> Mistake:
+    undone = f"x, y, z of the poses times {scale:.3g}"
+    return undone, "give them in metres (poses from images alone have no scale)", lambda g: g.scaled(scale)
+
+
 def likely_mistake(views: Views) -> str:
     """Return a sentence on the mistake in poses, depth unit or intrinsics that explains views; "" where none does."""
     given = _Given(views.depth_unit, views.intrinsics, views.X_WC)
     before = table_share(views, given)
-    shares = [table_share(views, undo(given)) for _, _, undo in _MISTAKES]
-    best = int(np.argmax(shares))
-    if shares[best] < max(_MOST, before + _MORE):
+    least = max(_MOST, before + _MORE)
+    if said := _explained(views, given, _MISTAKES, before, least):
+        return said
+    scale = pose_scale(views)
+    return _explained(views, given, [_of_scale(scale)], before, least) if scale else ""
+
+
+def _explained(views: Views, given: _Given, mistakes: Sequence[Mistake], before: float, least: float) -> str:
+    """Return a sentence on the one of `mistakes` that puts most points on a plane; "" where that is less than least."""
+    shares = [table_share(views, undo(given)) for _, _, undo in mistakes]
+    if max(shares) < least:
         return ""
-    undone, do, _ = _MISTAKES[best]
+    undone, do, _ = mistakes[int(np.argmax(shares))]
     return (
-        f"With {undone}, {100 * shares[best]:.0f} % of the measured points would lie on one plane instead of "
+        f"With {undone}, {100 * max(shares):.0f} % of the measured points would lie on one plane instead of "
         f"{100 * before:.0f} %: {do}."
     )
 
