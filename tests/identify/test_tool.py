@@ -56,7 +56,7 @@ def test_the_object_is_recovered(pair: Pair) -> None:
     for alone in (without_tool(pair.shared, pair.tool, True), without_tool(pair.load, pair.tool, False)):
         gap = np.abs(people(alone.parameters) - people(thing()))
         assert (gap[:4] < 4 * alone.std[:4]).all()
-        assert alone.notes[-1].startswith(f"A tool of {pair.tool.mass:.4g} kg was taken away from a load of ")
+        assert alone.notes[-1].startswith(f"a tool of {pair.tool.mass:.4g} kg was taken away from a load of ")
 
 
 def test_sharing_the_bias_is_never_worse(pair: Pair) -> None:

@@ -55,7 +55,7 @@ def without_tool(load: Estimate, tool: Estimate, shared: bool) -> Estimate:
             f"{std:.2g} kg: no object was held, or the tool is not the one that was recorded."
         )
     message = (
-        f"A tool of {tool.mass:.4g} kg was taken away from a load of {load.mass:.4g} kg; the rest is the object alone."
+        f"a tool of {tool.mass:.4g} kg was taken away from a load of {load.mass:.4g} kg; the rest is the object alone"
     )
     rest = replace(
         load,
