@@ -409,6 +409,17 @@ def test_a_bare_bag_names_the_frame_of_its_wrench_and_of_the_base(
     assert f'frames   = ["{base}", "ft"]   # the sensor in the base' in message(tmp_path / "run")
 
 
+def test_a_bare_bag_says_where_its_wrench_is_in_the_axes_of_the_base(tmp_path: Path) -> None:
+    """As franka_ros2 gives external_wrench_in_base_frame; the sensor is then another frame."""
+    maker = Maker(ROS2)
+    out = [m for m in log_of(maker, 20)[0] if m[0] == "/ft"]
+    out.append(("/tf", TF, START, maker.transforms(START, {("ft", "hand"): Pose.identity()})))
+    write_bag(tmp_path / "run", out)
+    said = message(tmp_path / "run")
+    assert 'force    = { columns = ["wrench.force"], unit = "N", frame = "W" }   # in the base\'s axes' in said
+    assert 'frames   = ["ft", "tool0"]   # the sensor in the base: check both' in said
+
+
 def test_bags_without_rosbags(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setitem(__import__("sys").modules, "rosbags.rosbag1", None)
     (tmp_path / "run.mcap").write_bytes(b"\x89MCAP0\r\n")

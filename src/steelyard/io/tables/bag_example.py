@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 from steelyard.io.bags import TRANSFORMS, Topic
 from steelyard.io.example import HEAD
+from steelyard.io.tables.bag_frames import Frames
 from steelyard.io.toml_string import toml_string
 
 _WRENCH = {
@@ -23,29 +24,29 @@ _ROBOT = 'urdf        = "arm.urdf"   # put the file of your arm here\n'
 _WIDTH = 8
 
 
-def bag_example(path: str, topics: Sequence[Topic], base: str, sensor: str) -> str:
-    """Return a description of the bag `path`: its first wrench and the first pose of `sensor` in `base`, or joints."""
+def bag_example(path: str, topics: Sequence[Topic], frames: Frames) -> str:
+    """Return a description of the bag `path`: its first wrench, and its first pose of the sensor, or its joints."""
     wrench = first_wrench(topics) or Topic("/wrench", "geometry_msgs/msg/WrenchStamped", 0)
     posed = [t for t in topics if t.kind in _POSE and not t.name.endswith("/tf_static")]
     joints = next((t for t in topics if t.kind == "sensor_msgs/msg/JointState"), None)
     pose = next((t for kind in _POSE for t in posed if t.kind == kind), Topic("/tf", TRANSFORMS[0], 0))
     force, torque = _WRENCH[wrench.kind]
     turn, place = _POSE[pose.kind]
+    axes = (', frame = "W"', "   # in the base's axes") if frames.felt_in_base else ("", "")
     felt = {
-        "force": f'{{ columns = ["{force}"], unit = "N" }}',
-        "torque": f'{{ columns = ["{torque}"], unit = "N*m" }}',
+        "force": f'{{ columns = ["{force}"], unit = "N"{axes[0]} }}{axes[1]}',
+        "torque": f'{{ columns = ["{torque}"], unit = "N*m"{axes[0]} }}{axes[1]}',
     }
-    named = f"[{toml_string(base)}, {toml_string(sensor)}]   # the sensor in the base: check both"
-    frames = {"frames": named} if pose.kind in TRANSFORMS else {}
+    named = f"[{toml_string(frames.base)}, {toml_string(frames.sensor)}]   # the sensor in the base: check both"
     seen = {
-        **frames,
+        **({"frames": named} if pose.kind in TRANSFORMS else {}),
         "rotation": f'{{ columns = ["{turn}"], form = "quaternion-xyzw" }}   # S to W',
         "position": f'{{ columns = ["{place}"], unit = "m" }}',
     }
     first = HEAD + _stream(path, wrench, felt) + "\n[[stream]]\n"
     if joints is None or posed:
         return first + _stream(path, pose, seen)
-    return first + _stream(path, joints, _JOINTS) + f"\n[robot]\n{_ROBOT}sensor_link = {toml_string(sensor)}\n"
+    return first + _stream(path, joints, _JOINTS) + f"\n[robot]\n{_ROBOT}sensor_link = {toml_string(frames.sensor)}\n"
 
 
 def first_wrench(topics: Sequence[Topic]) -> Topic | None:

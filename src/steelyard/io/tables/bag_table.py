@@ -23,7 +23,7 @@ from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.bounds import require_bounded
 from steelyard.io.table_header import Columns, Header
 from steelyard.io.tables.bag_example import bag_example, first_wrench
-from steelyard.io.tables.bag_frames import base_of
+from steelyard.io.tables.bag_frames import frames_of
 
 STAMP, RECEIVED = "stamp", "received"
 _LOOKED_AT = 500  # messages from the first on that tell what a topic holds: its publishers take turns
@@ -195,9 +195,7 @@ def _labels(message: Any) -> tuple[str, ...]:
 
 def _which_topic(bag: Bag) -> BadDescription:
     wrench = first_wrench(bag.topics)
-    felt = next(bag.messages(wrench.name), None) if wrench else None
-    sensor = getattr(getattr(felt and felt[1], "header", None), "frame_id", "") or "tool0"
-    example = bag_example(bag.path.name, bag.topics, base_of(bag, sensor), sensor)
+    example = bag_example(bag.path.name, bag.topics, frames_of(bag, wrench and wrench.name))
     return BadDescription(
         f"{bag.path}: a bag needs a description that says which topic is what. {bag.told()} "
         f"Write one beside the bag, for example:\n{example}"
