@@ -26,7 +26,7 @@ def require_answerable(specs: Sequence[StreamSpec], name: str) -> None:
     if not {"rotation", "gravity", "specific_force"} & set(given):
         raise BadDescription(
             f"{name}: nothing says where gravity points in the sensor frame; given are {shown}. "
-            "Add rotation (S to W), gravity (in S) or specific_force (an accelerometer)."
+            "Add rotation (S to W), joint_position with a URDF, gravity (in S) or specific_force (an accelerometer)."
         )
 
 

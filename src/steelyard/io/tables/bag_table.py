@@ -195,7 +195,7 @@ def _labels(message: Any) -> tuple[str, ...]:
 
 def _which_topic(bag: Bag) -> BadDescription:
     wrench = first_wrench(bag.topics)
-    example = bag_example(bag.path.name, bag.topics, frames_of(bag, wrench and wrench.name))
+    example = bag_example(bag.path.name, bag.topics, frames_of(bag, wrench.name if wrench else None))
     return BadDescription(
         f"{bag.path}: a bag needs a description that says which topic is what. {bag.told()} "
         f"Write one beside the bag, for example:\n{example}"
