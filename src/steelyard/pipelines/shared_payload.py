@@ -18,13 +18,14 @@ import numpy as np
 
 from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import UNEXPLAINED, Finding
 from steelyard.identify.fit import within_numbers
 from steelyard.identify.scale import allow_scale
 from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
+from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clipped import without_clipped
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
@@ -64,9 +65,14 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     log, moving = with_moves_as_motion(log)
     whole, clipped = without_clipped(log)
     found = ESTIMATORS[method].identify(whole)
-    before = (*stuck_forces(log), *clipped, *_missing_rows(log), *_missing_wrenches(log, method))
-    found = replace(found, findings=(*before, *found.findings), notes=(*moving, *found.notes))
-    return _weighed(_with_gravity(found, log))
+    seen = (*stuck_forces(log), *clipped, *found.findings, *_missing_rows(log), *_missing_wrenches(log, method))
+    found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
+    return _weighed(_with_gravity(_remedied(found), log))
+
+
+def _remedied(found: TeamEstimate) -> TeamEstimate:
+    """Return the estimate with remedies that help where its wrenches are no body's."""
+    return found.with_remedies(UNEXPLAINED) if found.codes() & MISREAD else found
 
 
 def _with_gravity(found: TeamEstimate, log: TeamLog) -> TeamEstimate:

@@ -124,17 +124,18 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))
+    # What poses and clocks are wrong in comes before what of the wrenches does not fit them.
     found = (
         *seen.findings,
+        *bad_robots(log.names, seen.noise),
+        *seen.begun.findings(log),
+        *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
         *(one.finding() for one in touched),
         *odd,
+        *(gains(payload.gain, payload.gainless) if known else ()),
         *wrong,
         *lost_directions(team.grasps, seen.down, seen.apart),
-        *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
-        *seen.begun.findings(log),
-        *bad_robots(log.names, seen.noise),
-        *(gains(payload.gain, payload.gainless) if known else ()),
         *open_parameters(team.identified, team.evidence.rank),
     )
     said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
