@@ -18,7 +18,7 @@ import numpy as np
 
 from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import UNEXPLAINED, Finding
+from steelyard.findings import UNEXPLAINED, Finding, counted
 from steelyard.identify.fit import within_numbers
 from steelyard.identify.scale import allow_scale
 from steelyard.logs.recording import STANDARD_GRAVITY
@@ -65,7 +65,8 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     log, moving = with_moves_as_motion(log)
     whole, clipped = without_clipped(log)
     found = ESTIMATORS[method].identify(whole)
-    seen = (*stuck_forces(log), *clipped, *found.findings, *_missing_rows(log), *_missing_wrenches(log, method))
+    lost = (*_repeated_rows(log), *_missing_rows(log), *_missing_wrenches(log, method))
+    seen = (*stuck_forces(log), *clipped, *found.findings, *lost)
     found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
 
@@ -94,6 +95,15 @@ def _weighed(found: TeamEstimate) -> TeamEstimate:
     raise CannotAnswer(f"the data do not tell the mass: {weighed}.{noticed}")
 
 
+def _repeated_rows(log: TeamLog) -> Iterator[Finding]:
+    """Yield a finding for every robot of which rows were logged more than once."""
+    for name in log.names:
+        said = [f"{counted(t.repeated, 'row')} of '{r.name}'" for r, t in log.tracks_of(name) if t.repeated]
+        if said:
+            text = f"{', '.join(said)} of '{name}' repeat the row before in every channel; each was used once."
+            yield Finding.of("rows-duplicated", text)
+
+
 def _missing_rows(log: TeamLog) -> Iterator[Finding]:
     """Yield a finding for every robot that misses rows, or numbers in some rows, of recordings."""
     for name in log.names:
@@ -117,7 +127,7 @@ def _missing(track: Track | None) -> Iterator[tuple[str, str]]:
     step = np.diff(track.time)
     # Not the median: stamps that come in pairs lack nothing.
     absent = 1 - np.quantile(step, 0.6) / np.mean(step) if len(step) else 0.0
-    if absent > ABSENT:
+    if absent > ABSENT + track.repeated / (len(track) + track.repeated):
         yield f"about {100 * absent:.0f} % of the rows", ""
 
 
