@@ -23,6 +23,7 @@ from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.misread.forces import with_one_reading
 from steelyard.team.misread.length_units import require_metres
 from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign
+from steelyard.team.misread.taken import maps_of
 from steelyard.team.misread.torques import with_torque_sign
 from steelyard.team.payload.balance import require_balance
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
@@ -106,9 +107,9 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     def fitted(rows: list[tuple[BodyRows, Array]]) -> _Fitted:
         groups = _groups(rows, seen.path, highest_hz, seen.order)
         groups = tuple(replace(group, sighted=known) for group in groups)
-        groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
+        groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
-        return _Fitted(groups, D, C, tuple(read), fit_payload(groups, D, C, size, with_gain))
+        return _Fitted(groups, D, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
 
     first, touched = _untouched(seen.rows, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
@@ -140,7 +141,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     )
     said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
     said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
-    return replace(team, findings=found, notes=(*team.notes, *said))
+    return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,6 +152,7 @@ class _Fitted:
     D: Array
     C: Array
     read: tuple[Finding, ...]
+    taken: Mapping[str, Array]
     payload: PayloadFit
 
 
@@ -184,13 +186,14 @@ def _untouched(
 
 def _with_forces_read(
     groups: tuple[Group, ...], D: Array, names: Sequence[str], known: bool
-) -> tuple[tuple[Group, ...], Array, list[Finding]]:
-    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', and why.
+) -> tuple[tuple[Group, ...], Array, list[Finding], Mapping[str, Array]]:
+    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', why, and as what (6, 6).
 
     known  whether grasps' rotations are: forces along axes that nobody knows are not compared
     """
+    given, reading = D, None
     if known:
-        groups, read, doubtful = with_one_reading(groups, D, names)
+        groups, read, doubtful, reading = with_one_reading(groups, D, names)
     else:
         read, doubtful = (), np.zeros(len(names), np.bool_)
     D, signs = with_one_sign(groups, D, names, doubtful)
@@ -199,7 +202,7 @@ def _with_forces_read(
     if odd is not None:
         whole = sign_finding(names[odd])
         found = [*(one for one in found if one != whole), torque_sign_finding(names[odd], whole in found)]
-    return groups, D, found
+    return groups, D, found, maps_of(names, given, D, reading)
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float], size: float) -> TeamEstimate:
