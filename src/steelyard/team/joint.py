@@ -115,7 +115,9 @@ class JointTeam:
         made, path = standing.rows(log, self.highest_hz)
         down = vertical(standing.gravity(log), standing.fit.team.motion)
         left = standing.fit.left
-        return Seen(log, grasps, spread, noise, late, begun, left, tuple(found), made, path, 2, down, standing.apart)
+        return Seen(
+            log, grasps, spread, noise, late, begun, left, tuple(found), made, path, 2, down, standing.apart, yields
+        )
 
     def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors, Yields]:
         """Return log, fit of poses and clocks like `_fitted`, and how far grasps yield.

@@ -34,6 +34,7 @@ from steelyard.team.payload.model import Group, unit_bias, units_of_body
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
+from steelyard.team.poses.yielding import Yields
 from steelyard.team.team_findings import (
     bad_robots,
     biased_at_home,
@@ -74,6 +75,7 @@ class Seen:
     order         how often the motion that they come from is differentiated: twice for poses, once for twists
     down          (3,) gravity in R, None where nobody tells it
     apart         (2,) [rad, m] by how much robots disagree, where that may hide what the payload turned
+    yields        how far grasps yield, by what they push; None where that was not asked
     """
 
     log: TeamLog
@@ -89,6 +91,7 @@ class Seen:
     order: int
     down: Array | None
     apart: Array | None = None
+    yields: Yields | None = None
 
 
 def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz: float) -> TeamEstimate:
@@ -123,15 +126,19 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     wrong = () if told else tuple(unexplained(payload, D, log.names))
     if wrong:
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
+    if seen.yields is not None:
+        # Of all sensors only the sum of their biases is known: it may be that of any one.
+        bias = float(np.linalg.norm(payload.biases[:, 3:], axis=1).max(initial=0.0))
+        spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), bias)
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))
-    # What poses and clocks are wrong in comes before what of the wrenches does not fit them.
+    # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
     found = (
-        *seen.findings,
         *bad_robots(log.names, seen.noise),
         *seen.begun.findings(log),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
+        *seen.findings,
         *(one.finding() for one in touched),
         *odd,
         *(gains(payload.gain, payload.gainless) if known else ()),
