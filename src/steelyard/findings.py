@@ -151,6 +151,7 @@ _CANNOT_SHOW = {
     "centroids-coplanar",
     "more-parts-than-rank",
     "materials-tied",
+    "grasp-direction-lost",
     "tool-included",
     "common-gain-unseen",
 }

@@ -22,6 +22,7 @@ from steelyard.logs.recording import Mount, Stream
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
 from steelyard.logs.team_track import Track
+from steelyard.pipelines.shared_payload import _missing_rows, _repeated_rows
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
@@ -457,3 +458,52 @@ def test_the_description_that_the_format_shows(tmp_path: Path) -> None:
     np.testing.assert_allclose(log.recordings[0].tracks["left"].channels["force"], left.channels["force"])
     expected = motion.tracks["robot1"].channels["position"]
     np.testing.assert_allclose(log.recordings[0].tracks["right"].channels["position"], expected, atol=1e-12)
+
+
+def logged_again(path: Path, how: Callable[[list[str], int], list[str]]) -> None:
+    """Write every table of robot1 beside a team's description anew, row by row."""
+    for table in path.with_suffix("").glob("robot1-*.csv"):
+        head, *rows = table.read_text().splitlines()
+        table.write_text("\n".join([head, *(line for k in range(len(rows)) for line in how(rows, k))]) + "\n")
+
+
+def held(rows: list[str], k: int) -> list[str]:
+    """Return row k with its own stamp and the numbers of the row at which a sensor of half the rate was last read."""
+    return [rows[k].partition(",")[0] + "," + rows[k - k % 2].partition(",")[2]]
+
+
+@pytest.mark.parametrize(
+    ("how", "repeated"),
+    [(lambda rows, k: [rows[k]] * (2 if k % 10 == 3 else 1), 20), (held, 100)],
+    ids=["logged twice", "sensor slower than the logger"],
+)
+def test_rows_that_a_robot_logged_again_are_used_once_and_told(
+    how: Callable[[list[str], int], list[str]], repeated: int, tmp_path: Path
+) -> None:
+    path = write_team(omnids().log, tmp_path / "team.toml", omnids().joints)
+    whole = read_team(path)
+    logged_again(path, how)
+    log = read_team(path)
+    for before, after in zip(whole.recordings, log.recordings, strict=True):
+        for name, track in before.tracks.items():
+            found = after.tracks[name]
+            assert (found.repeated > 0) == (name == "robot1" and len(track) >= 150)
+            if name != "robot1" or (repeated == 20 and found.repeated):
+                np.testing.assert_allclose(found.channels["position"], track.channels["position"], atol=1e-12)
+    assert log.recordings[-1].tracks["robot1"].repeated == repeated
+    (told,) = _repeated_rows(log)
+    assert told.code == "rows-duplicated"
+    assert f"{repeated} rows of 'motion-" in told.message
+    assert "'robot1'" in told.message
+    assert not list(_missing_rows(log))
+
+
+def test_equal_stamps_of_a_coarse_clock_are_spread(tmp_path: Path) -> None:
+    path = write_team(omnids().log, tmp_path / "team.toml", omnids().joints)
+    whole = read_team(path)
+    logged_again(path, lambda rows, k: [rows[k - k % 2].partition(",")[0] + "," + rows[k].partition(",")[2]])
+    log = read_team(path)
+    for before, after in zip(whole.recordings, log.recordings, strict=True):
+        step = after.tracks["robot1"].time - before.tracks["robot1"].time
+        assert np.abs(step - step[0]).max() < 1e-6
+        assert after.tracks["robot1"].repeated == 0

@@ -7,13 +7,16 @@ import json
 import re
 from dataclasses import replace
 from functools import cache
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
+from steelyard.io import read_result, write_result
 from steelyard.report import render
 from steelyard.report.drawing import drawing
 from steelyard.report.team_page import team_page
@@ -113,6 +116,35 @@ def test_residuals_hold_no_bias_and_the_page_one_rms_within_its_axes() -> None:
     assert page.count(f"{general(seen.evidence.residual_force_N)} N per axis, unsmoothed") == 1
     lines = [float(n) for n in re.findall(r">[+]([0-9.]+) N<", page)]
     assert max(lines) >= float(np.abs(left.force).max())
+
+
+@pytest.mark.parametrize(
+    ("wrong", "said"), [(-np.eye(3), "force with its sign turned"), (np.eye(3) / 9.80665, "force times 9.807")]
+)
+def test_table_and_page_say_whose_wrench_was_put_right_and_the_plot_holds_it(
+    wrong: Array, said: str, tmp_path: Path
+) -> None:
+    noise = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.2, torque_white_Nm=0.02)
+    made = simulate_team(TeamScene(noise, sensing="poses", kinds=("still", "motion"), motion_samples=1500), 4)
+    recordings = []
+    for recording in made.log.recordings:
+        track = recording.tracks["robot1"]
+        channels = {n: v @ wrong if n in ("force", "torque") else v for n, v in track.channels.items()}
+        recordings.append(replace(recording, tracks={**recording.tracks, "robot1": replace(track, channels=channels)}))
+    log = made.log.with_recordings(*recordings)
+    write_result(JointTeam().identify(log), tmp_path / "result.json")
+    seen = read_result(tmp_path / "result.json")
+    assert isinstance(seen, TeamEstimate)
+    right = JointTeam().identify(made.log)
+    assert f"put right: {said}" in team_table(seen, "a team")
+    assert "put right" not in team_table(right, "a team")
+    page = html.unescape(render(team_page("a team", seen, log)))
+    assert page.count(said) >= 2  # beside the picture, and in the table
+    assert "put right" not in html.unescape(render(team_page("a team", right)))
+    left, once = team_residuals(log, seen), team_residuals(made.log, right)
+    assert left is not None
+    assert once is not None
+    np.testing.assert_allclose(left.force, once.force, atol=0.02)
 
 
 def test_rests_within_a_motion_are_not_called_moving() -> None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -59,6 +60,21 @@ def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) ->
     before = off(JointTeam().identify(made.log), made)
     assert before[0] > 10 * now[0]
     assert before[1] > 3
+
+
+def test_bars_hold_a_sensor_that_was_tared_under_load() -> None:
+    """Its grasp is told as it is where the sensor reads nothing."""
+    made = trial((6e4, 2e3), seed=703)
+    first = made.log.recordings[0].tracks["robot1"].channels["force"][0]
+    recordings = []
+    for recording in made.log.recordings:
+        track = recording.tracks["robot1"]
+        tared = replace(track, channels={**track.channels, "force": track.channels["force"] - first})
+        recordings.append(replace(recording, tracks={**recording.tracks, "robot1": tared}))
+    found = JointTeam().identify(made.log.with_recordings(*recordings))
+    assert found.mass == pytest.approx(made.truth.body.mass, abs=4 * found.std[0])
+    assert off(found, made)[1] < 2.5
+    assert "grasp-yields" in found.codes()
 
 
 def test_passive_gimbals_yield_along_their_axes_only() -> None:

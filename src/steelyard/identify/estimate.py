@@ -108,7 +108,7 @@ class Estimate:
         told = replace(self, identified=known, findings=tuple(others))
         return told.with_findings(Finding.of("inertia-not-identified", message))
 
-    def with_remedies(self, remedies: Mapping[str, str]) -> Estimate:
+    def with_remedies(self, remedies: Mapping[str, str]) -> Self:
         """Return the estimate with the remedies that `remedies` have for the codes of its findings."""
         return replace(self, findings=tuple(finding.instead(remedies) for finding in self.findings))
 

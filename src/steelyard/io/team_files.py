@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Container, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -21,7 +21,7 @@ from steelyard.io.teams.joint_angles import require_likely
 from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, read_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
-from steelyard.logs.team_streams import in_grasp_axes, on_one_clock
+from steelyard.logs.team_streams import in_grasp_axes, on_one_clock, used_once
 from steelyard.logs.team_track import Track
 from steelyard.robots.omnid import Omnid
 from steelyard.robots.serial import SerialArm
@@ -172,6 +172,7 @@ def _stream(name: str, spec: StreamSpec, channels: Mapping[str, Array], time: Ar
 def _track(robot: RobotSpec, own: RecordingSpec, streams: Sequence[Stream]) -> Track:
     """Return one robot's samples in SI on one clock: poses, wrench on the payload, what else it measured."""
     with _at(own.where):
+        streams, repeated = used_once(streams)
         time, channels = on_one_clock(streams)
         carrying = _carrying(streams, time)
         channels.pop("carrying", None)
@@ -181,7 +182,7 @@ def _track(robot: RobotSpec, own: RecordingSpec, streams: Sequence[Stream]) -> T
         for name in ("force", "torque"):
             if name in channels:
                 channels[name] = robot.wrench_sign * channels[name]
-        return Track.of(time, carrying, **channels)
+        return replace(Track.of(time, carrying, **channels), repeated=repeated)
 
 
 def _carrying(streams: Sequence[Stream], time: Array) -> np.ndarray[Any, np.dtype[np.bool_]] | None:

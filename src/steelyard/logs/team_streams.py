@@ -13,12 +13,20 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Mount, Stream
+from steelyard.logs.repeated_rows import repeats, rising
 from steelyard.logs.team_rows import between, near_samples
 from steelyard.spatial import Rotation, cross
 
 # Whose clock is kept: what is differentiated is not to be interpolated.
 _LEADING = ("joint_position", "rotation", "angular_velocity", "position")
 _SAME = 1e-9  # [s]
+
+
+def used_once(streams: Sequence[Stream]) -> tuple[list[Stream], int]:
+    """Return streams with rising clocks, without rows that were logged more than once, and how many those were."""
+    again = [repeats(stream)[0] for stream in streams]
+    kept = [rising(stream.rows(~rows) if rows.any() else stream) for stream, rows in zip(streams, again, strict=True)]
+    return kept, sum(int(rows.sum()) for rows in again)
 
 
 def on_one_clock(streams: Sequence[Stream]) -> tuple[Array, dict[str, Array]]:

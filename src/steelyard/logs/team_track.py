@@ -46,12 +46,14 @@ class Track:
               identity. A force without a torque channel comes from a passive gimbal: its moment is zero
     valid     name -> (T,) mask of the rows that were measured
     carrying  (T,) rows in which the robot is known to hold the payload or not; None = not known, so to be found
+    repeated  how many rows of its streams were logged more than once, and were left out
     """
 
     time: Array
     channels: Mapping[str, Array]
     valid: Mapping[str, Mask]
     carrying: Mask | None = None
+    repeated: int = 0
 
     def __post_init__(self) -> None:
         time = check.finite("time", self.time)
@@ -133,6 +135,7 @@ class Track:
             {name: values[index] for name, values in self.channels.items()},
             {name: values[index] for name, values in self.valid.items()},
             None if self.carrying is None else self.carrying[index],
+            self.repeated,
         )
 
     def shifted(self, seconds: float) -> Track:

@@ -18,13 +18,14 @@ import numpy as np
 
 from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import UNEXPLAINED, Finding, counted
 from steelyard.identify.fit import within_numbers
 from steelyard.identify.scale import allow_scale
 from steelyard.logs.recording import STANDARD_GRAVITY
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
+from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clipped import without_clipped
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
@@ -64,9 +65,15 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     log, moving = with_moves_as_motion(log)
     whole, clipped = without_clipped(log)
     found = ESTIMATORS[method].identify(whole)
-    before = (*stuck_forces(log), *clipped, *_missing_rows(log), *_missing_wrenches(log, method))
-    found = replace(found, findings=(*before, *found.findings), notes=(*moving, *found.notes))
-    return _weighed(_with_gravity(found, log))
+    lost = (*_repeated_rows(log), *_missing_rows(log), *_missing_wrenches(log, method))
+    seen = (*stuck_forces(log), *clipped, *found.findings, *lost)
+    found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
+    return _weighed(_with_gravity(_remedied(found), log))
+
+
+def _remedied(found: TeamEstimate) -> TeamEstimate:
+    """Return the estimate with remedies that help where its wrenches are no body's."""
+    return found.with_remedies(UNEXPLAINED) if found.codes() & MISREAD else found
 
 
 def _with_gravity(found: TeamEstimate, log: TeamLog) -> TeamEstimate:
@@ -86,6 +93,15 @@ def _weighed(found: TeamEstimate) -> TeamEstimate:
     noticed = "".join(f" Noticed: {finding.message} {finding.remedy}" for finding in found.findings[:1])
     weighed = f"{found.mass:.2g} kg, with a standard deviation of {found.std[0]:.2g} kg"
     raise CannotAnswer(f"the data do not tell the mass: {weighed}.{noticed}")
+
+
+def _repeated_rows(log: TeamLog) -> Iterator[Finding]:
+    """Yield a finding for every robot of which rows were logged more than once."""
+    for name in log.names:
+        said = [f"{counted(t.repeated, 'row')} of '{r.name}'" for r, t in log.tracks_of(name) if t.repeated]
+        if said:
+            text = f"{', '.join(said)} of '{name}' repeat the row before in every channel; each was used once."
+            yield Finding.of("rows-duplicated", text)
 
 
 def _missing_rows(log: TeamLog) -> Iterator[Finding]:
@@ -111,7 +127,7 @@ def _missing(track: Track | None) -> Iterator[tuple[str, str]]:
     step = np.diff(track.time)
     # Not the median: stamps that come in pairs lack nothing.
     absent = 1 - np.quantile(step, 0.6) / np.mean(step) if len(step) else 0.0
-    if absent > ABSENT:
+    if absent > ABSENT + track.repeated / (len(track) + track.repeated):
         yield f"about {100 * absent:.0f} % of the rows", ""
 
 

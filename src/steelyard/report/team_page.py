@@ -47,9 +47,11 @@ def team_page(
 
 def _line(estimate: TeamEstimate, name: str) -> str:
     """Return how well a robot's grasp is known."""
+    taken = estimate.wrenches_taken.get(name)
+    put_right = "" if taken is None else f" · put right: {taken}"
     if name == estimate.reference:
-        return "the reference: everything is given in its grasp frame"
+        return "the reference: everything is given in its grasp frame" + put_right
     grasp = estimate.grasps[name]
     said = f"± {general(1e3 * float(grasp.std_m.max()), 2)} mm, ± {general(float(grasp.std_deg.max()), 2)}°"
     late = estimate.clock_offsets_s.get(name)
-    return said if late is None else f"{said} · clock late by {fixed(1e3 * late, 1)} ms"
+    return (said if late is None else f"{said} · clock late by {fixed(1e3 * late, 1)} ms") + put_right

@@ -14,6 +14,7 @@ from steelyard.spatial import classical_acceleration, cross
 from steelyard.team.clocks.errors import ClockError, punctual
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.grasps import Grasps
+from steelyard.team.misread.taken import as_taken
 
 CUTOFF_HZ = 3.0
 _PAUSE_S = 0.1
@@ -22,7 +23,8 @@ _PAUSE_S = 0.1
 def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     """Return the residuals in the reference grasp of all rows with complete wrenches, below 3 Hz; None without any.
 
-    The bias that the result says each recording has is taken out, and clocks are put right by it.
+    The bias that the result says each recording has is taken out; clocks, and wrenches that were read wrongly, are put
+    right by it.
 
     None also for two bodies with a hinge: what one rigid body would need leaves their motion over.
 
@@ -36,6 +38,7 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
         )
     if estimate.hinge is not None:
         return None
+    log = as_taken(log, estimate.wrench_maps)
     grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
     late = {name: ClockError(seconds) for name, seconds in estimate.clock_offsets_s.items() if seconds}
     start, parts = 0.0, []

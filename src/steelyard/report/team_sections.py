@@ -24,6 +24,7 @@ def grasps(report: Report) -> Html:
     late = bool(seen.clock_offsets_s)
     heads = ["robot", "x", "y", "z", "roll, pitch, yaw"]
     heads += ["clock is late by"] if late else []
+    heads += ["put right"] if seen.wrench_maps else []
     heads += ["away from the truth"] if true else []
     lines = [_line(report, seen, name, true.get(name), bool(true), late) for name in seen.grasps]
     lead = (
@@ -77,6 +78,8 @@ def _line(report: Report, seen: TeamEstimate, name: str, true: Pose | None, comp
     if late:
         said = "" if own else _late(seen, name)
         cells.append(tag("td", said))
+    if seen.wrench_maps:
+        cells.append(tag("td", seen.wrenches_taken.get(name, "")))
     if compared:
         cells.append(tag("td", "" if own or true is None else _away(grasp, true)))
     return tag("tr", *cells)

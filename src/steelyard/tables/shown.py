@@ -98,5 +98,9 @@ class Carried(Weighed, Protocol):
         """Their standard deviations [s]."""
 
     @property
+    def wrenches_taken(self) -> Mapping[str, str]:
+        """By robot whose wrench was taken otherwise than given, how."""
+
+    @property
     def hinge(self) -> Any:
         """Two bodies with a hinge, None for one."""

@@ -34,6 +34,7 @@ def team_table(estimate: Carried, title: str, known: Known | None = None, marks:
         *_hinge_lines(estimate, marks),
         "",
         *_grasp_lines(estimate, known, marks),
+        *_taken_lines(estimate),
     ]
     return "\n".join(blocks) + gap + rest
 
@@ -86,6 +87,12 @@ def _grasp_lines(estimate: Carried, known: Known | None, marks: Marks) -> list[s
         place = heads.index("clock late by")
         rows = [row[:place] + row[place + 1 :] for row in rows]
     return [marks.title("  grasps, from the reference"), columns(rows)]
+
+
+def _taken_lines(estimate: Carried) -> list[str]:
+    """Return whose wrench was put right, and how."""
+    taken = estimate.wrenches_taken
+    return [f"  put right: {'; '.join(f'{said} of {name}' for name, said in taken.items())}"] if taken else []
 
 
 def _pose_cells(grasp: Any) -> list[str]:

@@ -11,6 +11,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
 from steelyard.spatial import Pose
+from steelyard.team.misread.taken import in_few_words
 
 
 @dataclass(frozen=True, eq=False)
@@ -95,6 +96,8 @@ class TeamEstimate(Estimate):
     clock_offset_std_s  their standard deviations
     wrench_biases       by recording: moment and force (6,) [N m, N] in R that the sensors of all robots together read
                         too much; none where the bias is not estimated
+    wrench_maps         of robots whose wrench was taken otherwise than given, as with its sign turned: from moment and
+                        force as given to what they were taken for (6, 6)
     hinge               where the payload is two bodies with a hinge: then everything above is for both together, with
                         the hinge at the mean of its angles; None for one body
     """
@@ -104,7 +107,13 @@ class TeamEstimate(Estimate):
     clock_offsets_s: Mapping[str, float] = field(default_factory=dict)
     clock_offset_std_s: Mapping[str, float] = field(default_factory=dict)
     wrench_biases: Mapping[str, Array] = field(default_factory=dict)
+    wrench_maps: Mapping[str, Array] = field(default_factory=dict)
     hinge: HingeEstimate | None = None
+
+    @property
+    def wrenches_taken(self) -> dict[str, str]:
+        """By robot whose wrench was taken otherwise than given, how, in a few words."""
+        return {name: in_few_words(taken) for name, taken in self.wrench_maps.items()}
 
     @property
     def at_rest(self) -> str:

@@ -16,6 +16,7 @@ from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.whose_slip import whose_slip
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.jumps import cut_at_jumps
 from steelyard.team.clocks.search import F, searched
 from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.estimate import TeamEstimate
@@ -53,6 +54,7 @@ class JointTeam:
     highest_hz  of what motion and wrench are compared at; above, a payload carried by robots hardly moves
     slipped     with two robots: which slips, the clearest first, are those of the robot that shows them less; None =
                 what the wrenches say
+    jumped      what stamps were put right by where clocks jump; looked for where `slipped` is None
     """
 
     clocks: bool = True
@@ -60,6 +62,7 @@ class JointTeam:
     wrists: Mapping[str, float] = field(default_factory=dict)
     highest_hz: float = 4.0
     slipped: tuple[bool, ...] | None = None
+    jumped: ClockErrors = NOTHING
 
     def __post_init__(self) -> None:
         check.positive("highest_hz", self.highest_hz)
@@ -69,7 +72,8 @@ class JointTeam:
         require_wrenches(log)
         self._require_wrists(log)
         if self.slipped is None:
-            return whose_slip(log, lambda slipped: replace(self, slipped=slipped).identify(log))
+            log, jumped = cut_at_jumps(log) if self.clocks else (log, NOTHING)
+            return whose_slip(log, lambda slipped: replace(self, slipped=slipped, jumped=jumped).identify(log))
         seen = self._from_twists(log) if needs_twists(log) else self._from_poses(log)
         return seen if isinstance(seen, TeamEstimate) else weighed(seen, self.wrists, self.gains, self.highest_hz)
 
@@ -111,7 +115,9 @@ class JointTeam:
         made, path = standing.rows(log, self.highest_hz)
         down = vertical(standing.gravity(log), standing.fit.team.motion)
         left = standing.fit.left
-        return Seen(log, grasps, spread, noise, late, begun, left, tuple(found), made, path, 2, down, standing.apart)
+        return Seen(
+            log, grasps, spread, noise, late, begun, left, tuple(found), made, path, 2, down, standing.apart, yields
+        )
 
     def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors, Yields]:
         """Return log, fit of poses and clocks like `_fitted`, and how far grasps yield.
@@ -132,6 +138,7 @@ class JointTeam:
         team, begun = of(log, self.clocks), NOTHING
         if self.clocks and team.rough:
             log, team, begun = searched(log, team, lambda moved: of(moved, True))
+        begun = self.jumped + begun
         if team.rough:
             return log, team, begun
         log, team, errors = steadied(log, team, lambda moved: of(moved, True))

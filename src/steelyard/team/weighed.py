@@ -23,6 +23,7 @@ from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.misread.forces import with_one_reading
 from steelyard.team.misread.length_units import require_metres
 from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign
+from steelyard.team.misread.taken import maps_of
 from steelyard.team.misread.torques import with_torque_sign
 from steelyard.team.payload.balance import require_balance
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
@@ -33,6 +34,7 @@ from steelyard.team.payload.model import Group, unit_bias, units_of_body
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
+from steelyard.team.poses.yielding import Yields
 from steelyard.team.team_findings import (
     bad_robots,
     biased_at_home,
@@ -73,6 +75,7 @@ class Seen:
     order         how often the motion that they come from is differentiated: twice for poses, once for twists
     down          (3,) gravity in R, None where nobody tells it
     apart         (2,) [rad, m] by how much robots disagree, where that may hide what the payload turned
+    yields        how far grasps yield, by what they push; None where that was not asked
     """
 
     log: TeamLog
@@ -88,6 +91,7 @@ class Seen:
     order: int
     down: Array | None
     apart: Array | None = None
+    yields: Yields | None = None
 
 
 def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz: float) -> TeamEstimate:
@@ -106,9 +110,9 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     def fitted(rows: list[tuple[BodyRows, Array]]) -> _Fitted:
         groups = _groups(rows, seen.path, highest_hz, seen.order)
         groups = tuple(replace(group, sighted=known) for group in groups)
-        groups, D, read = _with_forces_read(groups, summing(placed), log.names, known)
+        groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
-        return _Fitted(groups, D, C, tuple(read), fit_payload(groups, D, C, size, with_gain))
+        return _Fitted(groups, D, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
 
     first, touched = _untouched(seen.rows, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
@@ -122,24 +126,29 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     wrong = () if told else tuple(unexplained(payload, D, log.names))
     if wrong:
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
+    if seen.yields is not None:
+        # Of all sensors only the sum of their biases is known: it may be that of any one.
+        bias = float(np.linalg.norm(payload.biases[:, 3:], axis=1).max(initial=0.0))
+        spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), bias)
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))
+    # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
     found = (
-        *seen.findings,
+        *bad_robots(log.names, seen.noise),
+        *seen.begun.findings(log),
+        *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
+        *seen.findings,
         *(one.finding() for one in touched),
         *odd,
+        *(gains(payload.gain, payload.gainless) if known else ()),
         *wrong,
         *lost_directions(team.grasps, seen.down, seen.apart),
-        *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
-        *seen.begun.findings(log),
-        *bad_robots(log.names, seen.noise),
-        *(gains(payload.gain, payload.gainless) if known else ()),
         *open_parameters(team.identified, team.evidence.rank),
     )
     said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
     said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
-    return replace(team, findings=found, notes=(*team.notes, *said))
+    return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
 
 
 @dataclass(frozen=True, eq=False)
@@ -150,6 +159,7 @@ class _Fitted:
     D: Array
     C: Array
     read: tuple[Finding, ...]
+    taken: Mapping[str, Array]
     payload: PayloadFit
 
 
@@ -183,13 +193,14 @@ def _untouched(
 
 def _with_forces_read(
     groups: tuple[Group, ...], D: Array, names: Sequence[str], known: bool
-) -> tuple[tuple[Group, ...], Array, list[Finding]]:
-    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', and why.
+) -> tuple[tuple[Group, ...], Array, list[Finding], Mapping[str, Array]]:
+    """Return groups and D (6, 6 N) with one robot's forces read as they fit the others', why, and as what (6, 6).
 
     known  whether grasps' rotations are: forces along axes that nobody knows are not compared
     """
+    given, reading = D, None
     if known:
-        groups, read, doubtful = with_one_reading(groups, D, names)
+        groups, read, doubtful, reading = with_one_reading(groups, D, names)
     else:
         read, doubtful = (), np.zeros(len(names), np.bool_)
     D, signs = with_one_sign(groups, D, names, doubtful)
@@ -198,7 +209,7 @@ def _with_forces_read(
     if odd is not None:
         whole = sign_finding(names[odd])
         found = [*(one for one in found if one != whole), torque_sign_finding(names[odd], whole in found)]
-    return groups, D, found
+    return groups, D, found, maps_of(names, given, D, reading)
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float], size: float) -> TeamEstimate:

@@ -28,6 +28,7 @@ def team_entries(estimate: TeamEstimate) -> dict[str, Any]:
         "clock_offsets_s": dict(estimate.clock_offsets_s),
         "clock_offset_std_s": dict(estimate.clock_offset_std_s),
         "wrench_biases": dict(estimate.wrench_biases),
+        "wrench_maps": dict(estimate.wrench_maps),
         "principal_moments_kgm2": estimate.principal_moments,
         "principal_frame": {
             name: {"rotation": pose.rotation.matrix, "position_m": pose.position}
@@ -64,6 +65,7 @@ def team_of(path: Path, values: Mapping[str, Any], plain: Estimate) -> TeamEstim
         clock_offsets_s=_seconds(path, values, "clock_offsets_s"),
         clock_offset_std_s=_seconds(path, values, "clock_offset_std_s"),
         wrench_biases=_biases(path, values),
+        wrench_maps=_maps(path, values),
         hinge=hinge_of(path, values),
     )
 
@@ -96,6 +98,18 @@ def _biases(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
     if not isinstance(entry, dict):
         raise BadFile(f'{path}: "wrench_biases" must be one object with six numbers for every recording.')
     return {str(name): array_of(path, entry, name, (6,), " of wrench_biases") for name in entry}
+
+
+def _maps(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
+    """Return what (6, 6) makes of each wrench taken otherwise than given what it was taken for; raises BadFile."""
+    entry = values.get("wrench_maps") or {}
+    if not isinstance(entry, dict):
+        raise BadFile(f'{path}: "wrench_maps" must be one object with 6 x 6 numbers for every robot.')
+    maps = {str(name): array_of(path, entry, name, (6, 6), " of wrench_maps") for name in entry}
+    for name, taken in maps.items():
+        if not all(np.linalg.det(block) for block in (taken[:3, :3], taken[3:, 3:])):
+            raise BadFile(f'{path}: "{name}" of wrench_maps must leave something of moment and force; found zeros.')
+    return maps
 
 
 def _seconds(path: Path, values: Mapping[str, Any], key: str) -> dict[str, float]:

@@ -8,8 +8,8 @@ from steelyard.check import Array, Mask
 from steelyard.findings import Finding
 from steelyard.logs.clipping import NOISE_SHARE, noise_shares
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.row_values import NOISY, columns_of, left_out, run_lengths
 from steelyard.logs.runs import runs
-from steelyard.sanity.rows.row_values import NOISY, columns_of, left_out, run_lengths
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.

@@ -8,10 +8,9 @@ from __future__ import annotations
 
 from dataclasses import replace
 
-import numpy as np
-
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.repeated_rows import rising
 from steelyard.sanity.rows.clipped_rows import clipped_table, known_gravity, without_clipped
 from steelyard.sanity.rows.frozen_rows import without_frozen
 from steelyard.sanity.rows.repeated_rows import repeated_in_tables, without_repeats
@@ -30,17 +29,5 @@ def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
         for step in (without_repeats, without_clipped, without_frozen):
             stream, findings = step(stream)
             found.extend(findings)
-        streams.append(_rising(stream))
+        streams.append(rising(stream))
     return replace(recording, streams=tuple(streams)), tuple(found)
-
-
-def _rising(stream: Stream) -> Stream:
-    """Return the stream with equal stamps of a coarse clock spread evenly up to the next one."""
-    if stream.time is None or (np.diff(stream.time) > 0).all():
-        return stream
-    stamps, first, counts = np.unique(stream.time, return_index=True, return_counts=True)
-    gap = np.diff(stamps)
-    gap = np.append(gap, np.median(gap)) if len(gap) else np.ones(1)
-    gap = np.minimum(gap, 2 * np.median(gap))
-    place = np.arange(len(stream.time)) - np.repeat(first, counts)
-    return replace(stream, time=stream.time + np.repeat(gap / counts, counts) * place)

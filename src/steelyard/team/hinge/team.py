@@ -100,7 +100,7 @@ def identify_two_bodies(
     """
     parts, fit, late = fit_two_bodies(log, split, clocks)
     team, sums = fit.team, Sums.of(fit.team)
-    kinds, turned = _kinds(log, parts, fit, sums, highest_hz)
+    kinds, turned, maps = _kinds(log, parts, fit, sums, highest_hz)
     size = reach(team.grasps)
     six_axis = np.repeat([not log.force_only(name) for name in log.names], 6)
     force = of_force(len(six_axis))
@@ -129,6 +129,7 @@ def identify_two_bodies(
         frame=log.reference, reference=log.reference, grasps=grasps,
         clock_offsets_s=late if clocks else {},
         clock_offset_std_s=_late_std(fit, log) if clocks else {}, hinge=hinge, findings=turned,
+        wrench_maps=maps,
     )  # fmt: skip
     return found, payload
 
@@ -196,8 +197,8 @@ def _late_std(fit: HingedFit, log: TeamLog) -> dict[str, float]:
 
 def _kinds(
     log: TeamLog, parts: tuple[Stretch, ...], fit: HingedFit, sums: Sums, highest_hz: float
-) -> tuple[tuple[Kind, ...], tuple[Finding, ...]]:
-    """Return the recordings with complete wrenches, at rest and in motion, and whose sign was turned.
+) -> tuple[tuple[Kind, ...], tuple[Finding, ...], Mapping[str, Array]]:
+    """Return the recordings with complete wrenches, at rest and in motion, whose sign was turned, and by what (6, 6).
 
     Raises CannotAnswer where there are none.
     """
@@ -218,7 +219,7 @@ def _kinds(
             noise = _motion_noise(ones, [left for _, left, _, _ in some], fit, edges, highest_hz)
             out.append(Kind(bands, noise, np.ones(len(edges))))
     require_runs(out)
-    return tuple(out), turned
+    return tuple(out), turned, {} if wrong is None else {log.names[wrong]: -np.eye(6)}
 
 
 def _turned(body: BodyRows, robot: int) -> BodyRows:

@@ -89,8 +89,9 @@ class _Left:
 
 def with_one_reading(
     groups: Sequence[Group], D: Array, names: Sequence[str]
-) -> tuple[tuple[Group, ...], tuple[Finding, ...], Mask]:
-    """Return the groups with one robot's wrench read as it fits the others', why, and whose signs (N,) may be wrong.
+) -> tuple[tuple[Group, ...], tuple[Finding, ...], Mask, tuple[int, Array] | None]:
+    """Return the groups with one robot's wrench read as it fits the others', why, whose signs (N,) may be wrong, and
+    whose wrench was mapped by what (6, 6), None where all were left.
 
     D  (6, 6 N) sums the pushes at B
     """
@@ -99,7 +100,7 @@ def with_one_reading(
     given = _left(S, D)
     # Nothing fits better, and not much is left: so it is with most logs.
     if not np.maximum(*given.shares()).min() < 1.0 and given.misfit < UNFIT:
-        return groups, (), given.by_sign()
+        return groups, (), given.by_sign(), None
     both = (given, _left(_without_bias(groups), D))
     shares = [one.shares() for one in both]
     score = shares[0][1] * shares[1][1]
@@ -113,14 +114,14 @@ def with_one_reading(
     # A sensor that is merely loud is best left out, and every reading that makes it small seems right.
     fits &= CLEAR * left < without
     if not fits or _unlike(groups, D, robot, READINGS[number]):
-        return groups, _odd_one(groups, D, names, both), given.by_sign()
+        return groups, _odd_one(groups, D, names, both), given.by_sign(), None
     if len(equal) > 1:
         signs = given.by_sign() & any(k == SIGN for _, k in equal)
-        return groups, () if signs.any() else (_undecided(equal, names),), signs
+        return groups, () if signs.any() else (_undecided(equal, names),), signs, None
     reading = _with_torque(S, D, robot, number)
     read = tuple(_reread(group, robot, reading.wrench()) for group in groups)
     found = (_finding(names[robot], reading, score[robot, number]),)
-    return read, found, _left(scatter(read), D).by_sign()
+    return read, found, _left(scatter(read), D).by_sign(), (robot, reading.wrench())
 
 
 def _odd_one(groups: Sequence[Group], D: Array, names: Sequence[str], both: Sequence[_Left]) -> tuple[Finding, ...]:

@@ -64,14 +64,15 @@ class Yields:
 
     def widened(self, spread: Spread, grasps: Pose, reference: int) -> Spread:
         """Return the spread of the grasps (N,) with what is open of how far the mean load moves them."""
-        off = (np.where(self.size > 0, self.std, 0.0) * np.abs(self.mean)).ravel()
-        if not off.any():
-            return spread
-        # What moves the reference, in whose frame all are told, moves all others the other way.
-        moves = np.eye(len(off))
-        moves[:, 6 * reference : 6 * reference + 6] -= adjoint_inverse(grasps).reshape(-1, 6)
-        moved = moves * off
-        return replace(spread, full=spread.full + moved @ moved.T)
+        return _moved(spread, grasps, reference, np.where(self.size > 0, self.std, 0.0) * np.abs(self.mean))
+
+    def biased(self, spread: Spread, grasps: Pose, reference: int, force: float) -> Spread:
+        """Return the spread of the grasps (N,) with what a bias of any robot's forces, `force` [N] long, moves it.
+
+        Without a load a sensor reads its bias: one that was tared under load says that a grasp yields from there.
+        """
+        along = np.repeat([0.0, force / np.sqrt(3)], 3)
+        return _moved(spread, grasps, reference, self.size * along)
 
     def findings(self, log: TeamLog) -> Iterator[Finding]:
         """Yield grasp-yields for every robot whose grasp does."""
@@ -112,6 +113,17 @@ def stiffened(log: TeamLog, team: PoseTeam, of: Callable[[TeamLog], PoseTeam]) -
     if team.rough and float(np.log(team.fit.noise / fit.fit.noise).mean()) < np.log(BETTER):
         return log, team, nothing
     return stiff, fit, known
+
+
+def _moved(spread: Spread, grasps: Pose, reference: int, off: Array) -> Spread:
+    """Return the spread of the grasps (N,) with each moved by so much (N, 6) more, in its own axes."""
+    if not off.any():
+        return spread
+    # What moves the reference, in whose frame all are told, moves all others the other way.
+    moves = np.eye(off.size)
+    moves[:, 6 * reference : 6 * reference + 6] -= adjoint_inverse(grasps).reshape(-1, 6)
+    moved = moves * off.ravel()
+    return replace(spread, full=spread.full + moved @ moved.T)
 
 
 def _mean_wrench(log: TeamLog) -> Array:
