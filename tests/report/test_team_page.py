@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.identify.estimate import Evidence
+from steelyard.evidence import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.report import render
 from steelyard.report.drawing import drawing

@@ -9,13 +9,14 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.evidence import Evidence
 from steelyard.findings import Finding, counted
 from steelyard.identify.bars.correlated import NOTHING, Score
 from steelyard.identify.bars.holdout import leave_one_out
 from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.dense import eigen, product, product_transposed
 from steelyard.identify.cost.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
-from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.identify.estimate import Estimate
 from steelyard.identify.people import parameter_jacobian, people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
