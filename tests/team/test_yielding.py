@@ -2,27 +2,25 @@
 
 from __future__ import annotations
 
-from typing import Any
+from dataclasses import replace
+from functools import partial
 
+import made_teams
 import numpy as np
 import pytest
 
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import stiffened
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, torque_white_Nm=0.1)
-ALL = frozenset({0, 1, 2})
-
-
-def trial(stiffness: tuple[float, float] | None, seed: int = 700, **changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"noise": NOISY, "sensing": "poses", "six_axis": ALL, "motion_samples": 2500}
-    return simulate_team(TeamScene(stiffness=stiffness, **(scene | changes)), seed)
+NOISY = replace(made_teams.NOISY, torque_white_Nm=0.1)
+USUAL = {"kinds": made_teams.ALL_KINDS, "six_axis": frozenset({0, 1, 2}), "motion_samples": 2500}
+trial = partial(made_teams.trial, noise=NOISY, seed=700, **USUAL)
 
 
 def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float, float]:
@@ -37,8 +35,8 @@ def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("stiffness", [(3e5, 1e4), (1e5, 3e3), (3e4, 1e3)])
 def test_a_grasp_that_yields_is_named_with_its_stiffness_and_put_right(stiffness: tuple[float, float]) -> None:
-    made = trial(stiffness)
-    found, rigid = JointTeam().identify(made.log), trial(None)
+    made = trial(stiffness=stiffness)
+    found, rigid = JointTeam().identify(made.log), trial()
     said = [f for f in found.findings if f.code == "grasp-yields"]
     assert [f.message.split("'")[1] for f in said] == list(made.log.names)
     for finding in said:
@@ -53,7 +51,7 @@ def test_a_grasp_that_yields_is_named_with_its_stiffness_and_put_right(stiffness
 
 def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that the test above cannot pass for want of an effect."""
-    made = trial((1e5, 3e3))
+    made = trial(stiffness=(1e5, 3e3))
     now = off(JointTeam().identify(made.log), made)
     monkeypatch.setattr("steelyard.team.poses.yielding.SUSPECT", np.inf)
     before = off(JointTeam().identify(made.log), made)
@@ -62,7 +60,7 @@ def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_passive_gimbals_yield_along_their_axes_only() -> None:
-    made = trial((3e4, 1e3), noise=CASES["B"], sensing="joints", six_axis=frozenset())
+    made = trial(stiffness=(3e4, 1e3), noise=CASES["B"], sensing="joints", six_axis=frozenset())
     found = JointTeam().identify(made.log)
     said = [f.message for f in found.findings if f.code == "grasp-yields"]
     assert len(said) == 3
@@ -79,7 +77,7 @@ def test_stiff_grasps_are_left_alone(case: str) -> None:
 
 
 def test_a_fit_that_fails_once_it_is_put_right_stays_what_it_was() -> None:
-    made = trial((1e5, 3e3))
+    made = trial(stiffness=(1e5, 3e3))
     team = PoseTeam.of(made.log, True)
 
     def fails(_: TeamLog) -> PoseTeam:
@@ -93,11 +91,11 @@ def test_a_fit_that_fails_once_it_is_put_right_stays_what_it_was() -> None:
 
 def test_twists_of_soft_grasps_are_not_simulated() -> None:
     with pytest.raises(BadValue, match="with poses or joints"):
-        trial((1e5, 3e3), sensing="twists")
+        trial(stiffness=(1e5, 3e3), sensing="twists")
 
 
 def test_recordings_without_wrenches_do_not_bend_the_others() -> None:
-    made = trial((3e4, 1e3))
+    made = trial(stiffness=(3e4, 1e3))
     log = made.log
     first = log.recordings[0]
     assert first.kind == "grasp"
