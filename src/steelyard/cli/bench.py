@@ -101,7 +101,7 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
 def held_object(data: Path, as_json: bool, **choices: Any) -> None:
     """The paper's identification benchmark: every object, four noise scenarios, ours beside its rivals."""
     from steelyard.bench import held_object as job
-    from steelyard.bench.held_object_table import held_object_table
+    from steelyard.bench.objects.table import held_object_table
 
     result = job.run(data, progress=progress_bar("bench held-object"), **choices)
     print_json(result) if as_json else click.echo(held_object_table(result))
@@ -116,7 +116,7 @@ def held_object(data: Path, as_json: bool, **choices: Any) -> None:
 def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bool) -> None:
     """Do 95 % intervals of part masses and of the whole hold the truth, and how long does an answer take?"""
     from steelyard.bench import part_coverage as job
-    from steelyard.bench.part_tables import part_coverage_table
+    from steelyard.bench.objects.part_tables import part_coverage_table
 
     progress = progress_bar("bench part-coverage")
     result = job.run(data, seeds, progress, noises=tuple(noises.split(",")), workers=workers)
@@ -130,7 +130,7 @@ def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bo
 def materials(data: Path, seeds: int, as_json: bool) -> None:
     """How often is the right density picked from a list, at low noise?"""
     from steelyard.bench import materials as job
-    from steelyard.bench.part_tables import materials_table
+    from steelyard.bench.objects.part_tables import materials_table
 
     result = job.run(data, seeds, progress_bar("bench materials"))
     print_json(result) if as_json else click.echo(materials_table(result))
@@ -147,7 +147,7 @@ def materials(data: Path, seeds: int, as_json: bool) -> None:
 def segment(data: Path, as_json: bool, **choices: Any) -> None:
     """Parts of unlabelled clouds against the true ones, beside the paper's Tables I and II."""
     from steelyard.bench import segment as job
-    from steelyard.bench.segment_table import segment_table
+    from steelyard.bench.shapes.segment_table import segment_table
 
     result = job.run(data, progress_bar("bench segment"), **choices)
     print_json(result) if as_json else click.echo(segment_table(result))
@@ -165,7 +165,7 @@ def segment(data: Path, as_json: bool, **choices: Any) -> None:
 def team(trials: int, as_json: bool, **choices: Any) -> None:
     """One payload, three robots, noise from clean to that of the paper; and cost against the number of robots."""
     from steelyard.bench import team as job
-    from steelyard.bench.team_table import team_table
+    from steelyard.bench.teams.table import team_table
 
     result = job.run(trials, progress_bar("bench team"), **choices)
     print_json(result) if as_json else click.echo(team_table(result))
