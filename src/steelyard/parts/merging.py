@@ -118,7 +118,14 @@ def merge_all(
     xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
     tolerance: float, size: float, stand_ins: StandIns,
 ) -> tuple[Any, Array, Array, Array]:  # fmt: skip
-    """Return merges, cost, volume and hull of every node."""
+    """Return merges (n - 1, 2), the cost (n - 1,) of each, and volume and hull (2 n - 1,) of every node, leaves first.
+
+    xyz            (V, 3) points, in any unit of length
+    start, member  numbers of the points of leaf k: member[start[k]:start[k + 1]]
+    leaf_volume, leaf_tets, leaf_group  (n,)
+    ends           (E, 2) leaves that touch
+    size           weight of a union's size in the cost; below zero: the published cost
+    """
     n = len(leaf_volume)
     merges, cost, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), (0, n - 1)
     volume, tets = np.pad(leaf_volume, more), np.pad(leaf_tets, more)

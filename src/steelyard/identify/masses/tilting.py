@@ -169,7 +169,10 @@ def _solve(hessian: Array, curve: Array, gradient: Array) -> Array:
 def evidence_of(
     cost: float, hessian: Array, curve: Array, spread: float, wide: float, parts: int, variance: Array
 ) -> float:
-    """Return Laplace's log evidence of a mode: densities `spread` apart about a common one known to `wide`."""
+    """Return Laplace's log evidence of a mode: densities `spread` apart about a common one known to `wide`.
+
+    hessian (q, q), curve (P,), variance (F f,) as `fitted` has them; `spread` and `wide` are variances of log density.
+    """
     prior = (parts - 1) * np.log(spread) + np.log(spread + parts * wide) + np.log(variance).sum()
     full = hessian.copy()
     full[range(parts), range(parts)] += curve
