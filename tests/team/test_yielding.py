@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from functools import partial
+from typing import Any
 
 import made_teams
 import numpy as np
@@ -19,8 +19,12 @@ from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import stiffened
 
 NOISY = replace(made_teams.NOISY, torque_white_Nm=0.1)
-USUAL = {"kinds": made_teams.ALL_KINDS, "six_axis": frozenset({0, 1, 2}), "motion_samples": 2500}
-trial = partial(made_teams.trial, noise=NOISY, seed=700, **USUAL)
+ALL = frozenset({0, 1, 2})
+
+
+def trial(stiffness: tuple[float, float] | None, seed: int = 700, **changes: Any) -> TeamTrial:
+    usual: dict[str, Any] = {"noise": NOISY, "kinds": made_teams.ALL_KINDS, "six_axis": ALL, "motion_samples": 2500}
+    return made_teams.trial(seed=seed, stiffness=stiffness, **(usual | changes))
 
 
 def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float, float]:
@@ -35,8 +39,8 @@ def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float, float]:
 
 @pytest.mark.parametrize("stiffness", [(3e5, 1e4), (1e5, 3e3), (3e4, 1e3)])
 def test_a_grasp_that_yields_is_named_with_its_stiffness_and_put_right(stiffness: tuple[float, float]) -> None:
-    made = trial(stiffness=stiffness)
-    found, rigid = JointTeam().identify(made.log), trial()
+    made = trial(stiffness)
+    found, rigid = JointTeam().identify(made.log), trial(None)
     said = [f for f in found.findings if f.code == "grasp-yields"]
     assert [f.message.split("'")[1] for f in said] == list(made.log.names)
     for finding in said:
@@ -51,7 +55,7 @@ def test_a_grasp_that_yields_is_named_with_its_stiffness_and_put_right(stiffness
 
 def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) -> None:
     """So that the test above cannot pass for want of an effect."""
-    made = trial(stiffness=(1e5, 3e3))
+    made = trial((1e5, 3e3))
     now = off(JointTeam().identify(made.log), made)
     monkeypatch.setattr("steelyard.team.poses.yielding.SUSPECT", np.inf)
     before = off(JointTeam().identify(made.log), made)
@@ -60,7 +64,7 @@ def test_what_it_costs_to_take_them_as_rigid(monkeypatch: pytest.MonkeyPatch) ->
 
 
 def test_passive_gimbals_yield_along_their_axes_only() -> None:
-    made = trial(stiffness=(3e4, 1e3), noise=CASES["B"], sensing="joints", six_axis=frozenset())
+    made = trial((3e4, 1e3), noise=CASES["B"], sensing="joints", six_axis=frozenset())
     found = JointTeam().identify(made.log)
     said = [f.message for f in found.findings if f.code == "grasp-yields"]
     assert len(said) == 3
@@ -77,7 +81,7 @@ def test_stiff_grasps_are_left_alone(case: str) -> None:
 
 
 def test_a_fit_that_fails_once_it_is_put_right_stays_what_it_was() -> None:
-    made = trial(stiffness=(1e5, 3e3))
+    made = trial((1e5, 3e3))
     team = PoseTeam.of(made.log, True)
 
     def fails(_: TeamLog) -> PoseTeam:
@@ -91,11 +95,11 @@ def test_a_fit_that_fails_once_it_is_put_right_stays_what_it_was() -> None:
 
 def test_twists_of_soft_grasps_are_not_simulated() -> None:
     with pytest.raises(BadValue, match="with poses or joints"):
-        trial(stiffness=(1e5, 3e3), sensing="twists")
+        trial((1e5, 3e3), sensing="twists")
 
 
 def test_recordings_without_wrenches_do_not_bend_the_others() -> None:
-    made = trial(stiffness=(3e4, 1e3))
+    made = trial((3e4, 1e3))
     log = made.log
     first = log.recordings[0]
     assert first.kind == "grasp"
