@@ -8,7 +8,6 @@ from hypothesis import strategies as st
 from steelyard import evaluate
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters, solids
-from steelyard.spatial import Rotation
 
 # Two true parts of 6 and 4 points; segment 2 holds one point of each.
 TRUE = [0, 0, 0, 0, 0, 0, 1, 1, 1, 1]
@@ -110,9 +109,3 @@ def test_published_errors_are_floored_and_use_the_estimated_box():
     thick = evaluate.score_as_published(moved, body, 2 * edges)
     assert thick.inertia_pct == pytest.approx(found.inertia_pct / 4)
     assert thick.com_pct == pytest.approx((0 + 0 + 1) / 3)
-
-
-def test_published_box_is_turned_corner_to_corner():
-    points = np.array([[0, 0, 0], [0.1, 0.2, 0.4], [0.05, 0.1, 0.1]])
-    quarter = Rotation.exp(np.array([0, 0, np.pi / 2]))
-    np.testing.assert_allclose(evaluate.published_edges(points, quarter), [0.2, 0.1, 0.4], atol=1e-12)

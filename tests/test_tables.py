@@ -9,7 +9,7 @@ from click.testing import CliRunner
 
 import steelyard as sy
 from steelyard.cli.main import cli
-from steelyard.identify.evidence import Evidence
+from steelyard.evidence import Evidence
 from steelyard.team.estimate import GraspEstimate
 
 BODY = sy.solids.box(0.1, 0.2, 0.3, 500)

@@ -61,12 +61,7 @@ def identify(
 
     Raises BadInput where the files make no sense, CannotAnswer where they do not determine mass and centre of mass.
     """
-    if parts is not None and scan is not None:
-        raise BadValue("parts and a scan both say what the object looks like; give one of them.")
-    if options.materials and parts is None and scan is None:
-        raise BadValue("materials are of the parts of a shape: give parts or a scan with them, or leave them out.")
-    if pose_in_sensor is not None and parts is None and scan is None:
-        raise BadValue("pose_in_sensor says where a shape sits: give parts or a scan with it, or leave it out.")
+    _require_one_shape(parts, scan, pose_in_sensor, options)
     place = None if pose_in_sensor is None else _place(pose_in_sensor)
     if isinstance(log, MotionLog):
         known = _tool(tool, data)
@@ -74,12 +69,7 @@ def identify(
         seen, notes = _parts(parts) if scan is None else (shape_of(scan), ())
         where = () if place is None else (place.pose, place.std)
         return held_object.identify_rows(log, options, known, seen, *where).noted(*notes)
-    if not isinstance(log, str | Path | Recording):
-        raise BadValue(
-            f"log must be a path, a Recording or a MotionLog; got {type(log).__name__}. Arrays become one with "
-            "sy.recording(time=.., force=.., torque=.., rotation=.., ..)."
-        )
-    recording = log if isinstance(log, Recording) else read_recording(log, data)
+    recording = _recording(log, data)
     if place is not None:
         recording = replace(recording, object_pose=place.pose, object_pose_std=place.std)
     known = _tool(recording.tool if tool is None else tool, data)
@@ -102,6 +92,26 @@ def identify_team(
     from steelyard.pipelines import shared_payload
 
     return shared_payload.identify_team(log if isinstance(log, TeamLog) else read_team(log, data), method)
+
+
+def _require_one_shape(parts: object, scan: object, pose_in_sensor: object, options: Options) -> None:
+    """Raise BadValue where a shape is given twice, or what needs one has none."""
+    if parts is not None and scan is not None:
+        raise BadValue("parts and a scan both say what the object looks like; give one of them.")
+    if options.materials and parts is None and scan is None:
+        raise BadValue("materials are of the parts of a shape: give parts or a scan with them, or leave them out.")
+    if pose_in_sensor is not None and parts is None and scan is None:
+        raise BadValue("pose_in_sensor says where a shape sits: give parts or a scan with it, or leave it out.")
+
+
+def _recording(log: str | Path | Recording, data: str | Path | None) -> Recording:
+    """Return the recording, read where it is given as a path."""
+    if not isinstance(log, str | Path | Recording):
+        raise BadValue(
+            f"log must be a path, a Recording or a MotionLog; got {type(log).__name__}. Arrays become one with "
+            "sy.recording(time=.., force=.., torque=.., rotation=.., ..)."
+        )
+    return log if isinstance(log, Recording) else read_recording(log, data)
 
 
 def _parts(parts: str | Path | Parts | None) -> tuple[Parts | None, tuple[str, ...]]:

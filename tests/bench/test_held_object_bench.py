@@ -8,8 +8,8 @@ from box_tools import write_tools
 from click.testing import CliRunner
 
 from steelyard.bench import held_object
-from steelyard.bench.held_object_cases import PART_METHODS, RIVALS
-from steelyard.bench.held_object_table import held_object_table
+from steelyard.bench.objects.cases import PART_METHODS, RIVALS
+from steelyard.bench.objects.table import held_object_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.shapes.object_writing import write_object

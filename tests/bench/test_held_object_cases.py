@@ -6,9 +6,8 @@ import numpy as np
 import pytest
 from box_tools import BOXES, BRICK, CLUB, boxes_mesh, known_boxes, write_tools
 
-from steelyard.bench import bound
-from steelyard.bench.cuts import below, interior_points, moments_about, slabs
-from steelyard.bench.held_object_cases import (
+from steelyard.bench.objects import bound
+from steelyard.bench.objects.cases import (
     PART_METHODS,
     RIVALS,
     exact_rows,
@@ -17,6 +16,7 @@ from steelyard.bench.held_object_cases import (
     noisy_rows,
     split_parts,
 )
+from steelyard.bench.objects.cuts import below, interior_points, moments_about, slabs
 from steelyard.errors import BadValue
 from steelyard.inertia import solids
 from steelyard.logs.log import Noise

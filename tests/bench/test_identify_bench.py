@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from steelyard.bench import identify, peers, tables, timing
-from steelyard.bench.methods import Method, choose, own_methods
+from steelyard.bench import identify, tables, timing
+from steelyard.bench.logs import peers
+from steelyard.bench.logs.methods import Method, choose, own_methods
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters

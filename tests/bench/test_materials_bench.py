@@ -7,8 +7,8 @@ from box_tools import write_tools
 from click.testing import CliRunner
 
 from steelyard.bench import materials
-from steelyard.bench.held_object_cases import load_case
-from steelyard.bench.part_tables import materials_table
+from steelyard.bench.objects.cases import load_case
+from steelyard.bench.objects.part_tables import materials_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue
 

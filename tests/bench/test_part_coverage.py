@@ -9,8 +9,8 @@ from click.testing import CliRunner
 
 from steelyard.bench import part_coverage
 from steelyard.bench.coverage import HALF_WIDTH
+from steelyard.bench.objects.part_tables import part_coverage_table
 from steelyard.bench.part_coverage import Outcome, summary
-from steelyard.bench.part_tables import part_coverage_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue
 from steelyard.threads import BLAS

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from steelyard import evaluate
-from steelyard.bench import peers
+from steelyard.bench.logs import peers
 from steelyard.identify.regressor import basis
 from steelyard.simulate import bounds, simulate_log
 

@@ -9,7 +9,7 @@ import pytest
 from click.testing import CliRunner
 
 from steelyard.bench import team
-from steelyard.bench.team_table import team_table
+from steelyard.bench.teams.table import team_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadValue
 from steelyard.simulate.team import simulate_team

@@ -5,25 +5,25 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from steelyard.bench import team_laws
-from steelyard.bench.team_table import _laws
+from steelyard.bench.teams import laws
+from steelyard.bench.teams.table import _laws
 from steelyard.spatial import Pose, Rotation
 
 
-@pytest.mark.parametrize("sensed", team_laws.SENSED)
+@pytest.mark.parametrize("sensed", laws.SENSED)
 @pytest.mark.parametrize("motion", ["ball_joint", "one_axis", "one_axis_pivot", "one_axis_translation"])
 def test_what_a_motion_shows(motion: str, sensed: str) -> None:
-    row = team_laws.lost_trial((sensed, motion, team_laws.FIRST_SEED))
-    shows = team_laws.MOTIONS[motion].shows
+    row = laws.lost_trial((sensed, motion, laws.FIRST_SEED))
+    shows = laws.MOTIONS[motion].shows
     assert row["shown"] == [shows, shows]
     assert row["named"] == (shows < 6)
     assert row["deg"] < 0.1
     assert row["mm"] < 1
 
 
-@pytest.mark.parametrize("session", team_laws.SESSIONS)
+@pytest.mark.parametrize("session", laws.SESSIONS)
 def test_labels_references_and_homes_change_nothing(session: str) -> None:
-    apart = team_laws.same_trial((session, team_laws.FIRST_SEED))
+    apart = laws.same_trial((session, laws.FIRST_SEED))
     assert {"relabelled", "another_reference"} <= apart.keys()
     assert ("moved_homes" in apart) == (session == "joints")
     assert max(max(both) for both in apart.values()) < 1e-8
@@ -32,7 +32,7 @@ def test_labels_references_and_homes_change_nothing(session: str) -> None:
 def test_a_turn_that_nobody_sees_is_no_error_of_what_is_seen() -> None:
     found = Pose(Rotation.identity(), np.array([1.0, 0.0, 0.0]))
     about = Pose(Rotation.exp(np.array([0, 0, 2.0])), np.zeros(3))
-    np.testing.assert_allclose(team_laws._error(found, about @ found), [0, 0, 2, 0, 2, 0], atol=1e-12)
+    np.testing.assert_allclose(laws._error(found, about @ found), [0, 0, 2, 0, 2, 0], atol=1e-12)
 
 
 def test_the_laws_have_lines() -> None:

@@ -10,7 +10,7 @@ import pytest
 from click.testing import CliRunner
 
 from steelyard.bench.scan import scan_table
-from steelyard.bench.segment_table import segment_table
+from steelyard.bench.shapes.segment_table import segment_table
 from steelyard.bench.sheets import WITHIN, sheets_table
 from steelyard.cli.bench import bench
 from steelyard.cli.workshop import workshop

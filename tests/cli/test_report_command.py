@@ -15,7 +15,8 @@ import pytest
 from scipy.spatial import Delaunay
 
 from steelyard.cli.main import main
-from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.evidence import Evidence, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.io import write_result
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recordings.recording_files import write_recording

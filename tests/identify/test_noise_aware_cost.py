@@ -18,7 +18,7 @@ from strategies import log_choleskys
 NOISES = (Noise.of_std(0.4, 0.05, 0.3, 0.01), Noise.of_std(0.02, 0.01, 0.2, 0.004))
 GAMMA, LOG_SIZE, PRECISION = 0.5, float(np.log(0.03)), 1.0
 KNOWN_BIAS, KNOWN_PRECISION = BIAS + 0.1, np.diag([1e4, 2e4, 3e4, 10.0, 20.0, 30.0]) + 1.0
-PRIOR = (GAMMA, LOG_SIZE, PRECISION, KNOWN_BIAS, KNOWN_PRECISION)
+PRIORS = newton.Priors(GAMMA, LOG_SIZE, PRECISION, KNOWN_BIAS, KNOWN_PRECISION)
 
 
 def two_class_log() -> MotionLog:
@@ -30,7 +30,7 @@ def two_class_log() -> MotionLog:
 
 LOG = two_class_log()
 PROBLEM = Problem.of(Moments.of_log(LOG), with_bias=True)
-DATA = (PROBLEM.T, PROBLEM.scatter, PROBLEM.acceleration, PROBLEM.wrench)
+ROWS = newton.Rows(PROBLEM.T, PROBLEM.scatter, PROBLEM.acceleration, PROBLEM.wrench)
 POINT = np.concatenate([1.1 * truth("hammer").vector, BIAS + 0.2])
 bodies = log_choleskys()
 
@@ -85,7 +85,7 @@ def test_the_regressor_is_newton_euler() -> None:
 @settings(max_examples=10)
 def test_cost_is_the_sum_over_rows(theta: np.ndarray) -> None:
     linear = np.concatenate([forms.from_log_cholesky(theta), BIAS])
-    found, _ = noise_cost.value(PROBLEM.residual_map(linear), *DATA[1:])
+    found, _ = noise_cost.value(PROBLEM.residual_map(linear), *ROWS[1:])
     assert found == pytest.approx(plain_cost(linear), rel=1e-9)
 
 
@@ -101,7 +101,7 @@ def steps_of(point: np.ndarray, share: float) -> np.ndarray:
 
 
 def test_first_derivatives() -> None:
-    value, gradient, _ = noise_cost.derivatives(PROBLEM.residual_map(POINT), *DATA)
+    value, gradient, _ = noise_cost.derivatives(PROBLEM.residual_map(POINT), *ROWS)
     assert value == pytest.approx(plain_cost(POINT), rel=1e-9)
     numeric = central(plain_cost, POINT, steps_of(POINT, 1e-4))
     np.testing.assert_allclose(gradient, numeric, rtol=1e-4, atol=1e-5 * np.abs(numeric).max())
@@ -109,9 +109,9 @@ def test_first_derivatives() -> None:
 
 def test_second_derivatives() -> None:
     def gradient(linear: np.ndarray) -> np.ndarray:
-        return noise_cost.derivatives(PROBLEM.residual_map(linear), *DATA)[1]
+        return noise_cost.derivatives(PROBLEM.residual_map(linear), *ROWS)[1]
 
-    hessian = noise_cost.derivatives(PROBLEM.residual_map(POINT), *DATA)[2]
+    hessian = noise_cost.derivatives(PROBLEM.residual_map(POINT), *ROWS)[2]
     np.testing.assert_array_equal(hessian, hessian.T)
     close(hessian, central(gradient, POINT, steps_of(POINT, 1e-5)), 1e-6)
 
@@ -154,12 +154,12 @@ def test_derivatives_in_log_cholesky_coordinates() -> None:
     u = np.concatenate([truth("hammer").log_cholesky() + 0.05, BIAS + 0.1])
 
     def gradient(x: np.ndarray) -> np.ndarray:
-        return newton.cost_derivatives(x, *DATA, *PRIOR)[1]
+        return newton.cost_derivatives(x, ROWS, PRIORS)[1]
 
     def value(x: np.ndarray) -> np.ndarray:
-        return np.array(newton.cost_derivatives(x, *DATA, *PRIOR)[0])
+        return np.array(newton.cost_derivatives(x, ROWS, PRIORS)[0])
 
-    total, first, second = newton.cost_derivatives(u, *DATA, *PRIOR)
+    total, first, second = newton.cost_derivatives(u, ROWS, PRIORS)
     off = u[10:] - KNOWN_BIAS
     shape = newton.shape_prior(u[:10], GAMMA, LOG_SIZE, PRECISION)[0]
     linear = np.concatenate([forms.from_log_cholesky(u[:10]), u[10:]])
@@ -173,19 +173,19 @@ def test_derivatives_in_log_cholesky_coordinates() -> None:
 
 def test_newton_ends_where_the_gradient_vanishes() -> None:
     start = np.concatenate([truth("hammer").log_cholesky() + 0.2, BIAS + 1])
-    u, value, converged = newton.minimise(start, *DATA, *PRIOR, 60)
+    u, value, converged = newton.minimise(start, ROWS, PRIORS, 60)
     assert converged
-    _, gradient, hessian = newton.cost_derivatives(u, *DATA, *PRIOR)
+    _, gradient, hessian = newton.cost_derivatives(u, ROWS, PRIORS)
     assert float(np.linalg.eigvalsh(hessian)[0]) > 0
     assert float(gradient @ np.linalg.solve(hessian, gradient)) < 1e-8
-    assert value <= newton.cost_derivatives(start, *DATA, *PRIOR)[0]
+    assert value <= newton.cost_derivatives(start, ROWS, PRIORS)[0]
 
 
 @pytest.mark.parametrize("nudge", [0.0, 0.3, -0.4])
 def test_newton_finds_the_same_minimum_from_elsewhere(nudge: float) -> None:
     start = np.concatenate([truth("hammer").log_cholesky() + nudge * np.array([1, 1, -1, 1, 0, 0, 0, 0.1, 0, 0]), BIAS])
-    u, _, converged = newton.minimise(start, *DATA, *PRIOR, 60)
-    reference = newton.minimise(np.concatenate([truth("hammer").log_cholesky(), BIAS]), *DATA, *PRIOR, 60)[0]
+    u, _, converged = newton.minimise(start, ROWS, PRIORS, 60)
+    reference = newton.minimise(np.concatenate([truth("hammer").log_cholesky(), BIAS]), ROWS, PRIORS, 60)[0]
     assert converged
     np.testing.assert_allclose(newton.linear_of(u), newton.linear_of(reference), rtol=1e-6, atol=1e-8)
 
@@ -234,7 +234,7 @@ def test_information_and_extra_variance_against_monte_carlo() -> None:
 
 
 def test_plain_information_is_that_of_the_rows_as_measured() -> None:
-    _, _, plain = noise_cost.information(PROBLEM.residual_map(POINT), *DATA)
+    _, _, plain = noise_cost.information(PROBLEM.residual_map(POINT), *ROWS)
     total = np.zeros((16, 16))
     for row, c in zip(features(LOG), LOG.noise_class, strict=True):
         slope = design(True) @ row

@@ -45,11 +45,9 @@ def test_the_mode_is_that_of_a_general_minimiser() -> None:
             + 0.5 * (x[2:] ** 2 / variance).sum()
         )
 
-    points = (profile.weight[None], profile.features[None], profile.per_mass[None])
-    y, tilts, found, *_ = tilting.fitted(
-        information, pull, parts.per_mass, parts.volume, precision, CENTRE, np.array([1]), variance, *points, y0,
-        np.zeros(FEATURES),
-    )  # fmt: skip
+    seen = tilting.Seen(information, pull, parts.per_mass, parts.volume, precision, CENTRE)
+    free = tilting.Free(np.array([1]), variance, profile.weight[None], profile.features[None], profile.per_mass[None])
+    y, tilts, found, *_ = tilting.fitted(seen, free, y0, np.zeros(FEATURES))
     start = np.concatenate([y0, np.zeros(FEATURES)])
     other = minimize(cost, start, method="BFGS", options={"gtol": 1e-6})
     assert cost(np.concatenate([y, tilts])) == pytest.approx(found, rel=1e-9)

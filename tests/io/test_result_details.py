@@ -11,7 +11,8 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile
-from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.evidence import Evidence, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia.solids import box
 from steelyard.io import read_result, result_dict, write_result
 

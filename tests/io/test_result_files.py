@@ -12,8 +12,9 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile
+from steelyard.evidence import Evidence
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia.solids import box
 from steelyard.io import read_result, result_dict, write_result
 from steelyard.spatial import Pose, Rotation

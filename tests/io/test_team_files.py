@@ -15,7 +15,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile, BadInput
-from steelyard.identify.estimate import Evidence
+from steelyard.evidence import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.io import read_result, read_team, write_result, write_team
 from steelyard.logs.recording import Mount, Stream

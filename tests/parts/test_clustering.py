@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from scipy.spatial import ConvexHull, Delaunay
 
-from steelyard.bench.plain_clustering import plain_cluster
+from steelyard.bench.shapes.plain_clustering import plain_cluster
 from steelyard.errors import BadValue
 from steelyard.parts import clustering, merging
 from steelyard.parts.clustering import Hollow, Published, cluster

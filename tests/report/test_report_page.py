@@ -17,8 +17,9 @@ from hypothesis import strategies as st
 from scipy.spatial import Delaunay
 
 from steelyard.errors import BadFile, BadValue
+from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia.solids import box
 from steelyard.report import Report, Residuals, Truth, render, scene_of_solid, write_report
 from steelyard.report.markup import script_json, tag, text

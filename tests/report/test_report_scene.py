@@ -11,7 +11,8 @@ from scipy.spatial import ConvexHull, Delaunay
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.evidence import Evidence
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia.solids import ellipsoid
 from steelyard.report import Report, scene_of_mesh, scene_of_solid
 from steelyard.report.drawing import _magnified, drawing

@@ -14,7 +14,7 @@ import pytest
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.identify.estimate import Evidence
+from steelyard.evidence import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.io import read_result, write_result
 from steelyard.report import render

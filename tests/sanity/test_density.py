@@ -10,8 +10,9 @@ import pytest
 import steelyard as sy
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.evidence import PartMass
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Estimate, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.held_object import identify_rows

@@ -6,26 +6,17 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_teams import NOISY_TWISTS, trial
 from scipy.spatial.transform import Rotation as Turn
 
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
-from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.spatial import Rotation
 from steelyard.team.misread.angle_units import require_one_angle_unit
-
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
-
-
-def trial(robots: int, sensing: str, seed: int = 102) -> TeamTrial:
-    kinds = ("still", "motion")
-    rigid = frozenset({0} if robots == 2 else ())
-    return simulate_team(
-        TeamScene(NOISY, robots, sensing=sensing, kinds=kinds, motion_samples=1500, six_axis=rigid), seed
-    )
 
 
 def scaled(track: Track, factor: float) -> Track:
@@ -50,13 +41,13 @@ def misread(log: TeamLog, name: str, factor: float) -> TeamLog:
 )
 def test_one_robot_in_another_unit_is_named(method: Method, factor: float, said: str) -> None:
     for robots, sensing in ((3, "poses"), (4, "poses"), (3, "twists")):
-        log = misread(trial(robots, sensing).log, "robot1", factor)
+        log = misread(trial(NOISY_TWISTS, 102, robots=robots, sensing=sensing).log, "robot1", factor)
         with pytest.raises(BadValue, match=rf"'robot1' turns \d+ times {said}. Set the unit"):
             identify_team(log, method)
 
 
 def test_of_two_robots_either_may_be_wrong() -> None:
-    log = misread(trial(2, "poses").log, "robot1", np.pi / 180)
+    log = misread(trial(NOISY_TWISTS, 102, robots=2).log, "robot1", np.pi / 180)
     with pytest.raises(BadValue, match="or that of the other robot"):
         require_one_angle_unit(log)
 
@@ -68,7 +59,7 @@ def test_good_logs_pass(case: str) -> None:
 
 
 def test_what_turns_slower_but_not_in_step_is_left_to_the_fit() -> None:
-    log = trial(3, "poses").log
+    log = trial(NOISY_TWISTS, 102).log
     *others, last = log.recordings
     track = last.tracks["robot1"]
     shaken = Rotation.exp(3e-5 * np.random.default_rng(0).normal(size=(len(track), 3))).matrix
@@ -77,7 +68,7 @@ def test_what_turns_slower_but_not_in_step_is_left_to_the_fit() -> None:
 
 
 def test_short_recordings_and_lonely_robots_are_not_judged() -> None:
-    log = misread(trial(3, "poses").log, "robot1", np.pi / 180)
+    log = misread(trial(NOISY_TWISTS, 102).log, "robot1", np.pi / 180)
     *_, last = log.recordings
     short = replace(last, tracks={n: t.rows(slice(0, 150)) for n, t in last.tracks.items()})
     alone = replace(last, tracks={"robot1": last.tracks["robot1"]})

@@ -3,27 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
+import made_teams
 import numpy as np
 import pytest
+from made_teams import HINGE, NOISY_TWISTS
 
 from steelyard.logs.team_log import TeamLog
-from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, Hinge, TeamNoise, TeamScene
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.team.clocks.errors import NOTHING
 from steelyard.team.clocks.search import far_lags, searched
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.team_findings import late_clocks
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
-
-
-def trial(sensing: str, seed: int = 100, **changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"robots": 3, "kinds": ("still", "motion"), "motion_samples": 1500, "still_samples": 300}
-    moving = sensing == "twists"
-    return simulate_team(TeamScene(NOISY, sensing=sensing, bases_move=moving, **(scene | changes)), seed)  # type: ignore[arg-type]
+trial = partial(made_teams.trial, NOISY_TWISTS, still_samples=300)
 
 
 def late(log: TeamLog, **seconds: float) -> TeamLog:
@@ -35,7 +31,7 @@ def late(log: TeamLog, **seconds: float) -> TeamLog:
 @pytest.mark.parametrize("sensing", ["poses", "twists"])
 @pytest.mark.parametrize("seconds", [0.5, -0.8, 1.7])
 def test_a_clock_far_beyond_what_a_fit_finds_is_found_and_put_right(sensing: str, seconds: float) -> None:
-    made = trial(sensing)
+    made = trial(sensing=sensing, bases_move=sensing == "twists")
     right, found = JointTeam().identify(made.log), JointTeam().identify(late(made.log, robot1=seconds))
     assert found.clock_offsets_s["robot1"] == pytest.approx(seconds, abs=2e-3)
     assert found.codes() == {"clock-offset"}
@@ -46,14 +42,14 @@ def test_a_clock_far_beyond_what_a_fit_finds_is_found_and_put_right(sensing: str
 
 
 def test_a_late_reference_makes_all_others_early() -> None:
-    found = JointTeam().identify(late(trial("poses").log, robot0=0.7))
+    found = JointTeam().identify(late(trial().log, robot0=0.7))
     assert found.clock_offsets_s["robot0"] == 0.0
     for name in ("robot1", "robot2"):
         assert found.clock_offsets_s[name] == pytest.approx(-0.7, abs=2e-3)
 
 
 def test_several_late_clocks_and_missing_rows() -> None:
-    made = trial("poses", robots=4, gaps={2: ((5.0, 7.0),)}, dropout=0.02)
+    made = trial(robots=4, gaps={2: ((5.0, 7.0),)}, dropout=0.02)
     found = JointTeam().identify(late(made.log, robot1=1.1, robot3=-0.6))
     for name, seconds in (("robot1", 1.1), ("robot2", 0.0), ("robot3", -0.6)):
         assert found.clock_offsets_s[name] == pytest.approx(seconds, abs=2e-3)
@@ -66,11 +62,11 @@ def test_good_logs_are_never_searched(case: str, monkeypatch: pytest.MonkeyPatch
 
     monkeypatch.setattr("steelyard.team.joint.searched", refused)
     JointTeam().identify(simulate_team(TeamScene(CASES[case], motion_samples=1500), 7).log)
-    JointTeam(clocks=False).identify(late(trial("poses").log, robot1=0.7))
+    JointTeam(clocks=False).identify(late(trial().log, robot1=0.7))
 
 
 def test_robots_in_step_have_no_far_lag_and_clocks_stay_where_that_would_not_help() -> None:
-    made = trial("poses")
+    made = trial()
     assert not far_lags(made.log)
     team = PoseTeam.of(made.log, True)
     assert searched(made.log, team, lambda _: team) == (made.log, team, NOTHING)
@@ -82,24 +78,20 @@ def test_robots_in_step_have_no_far_lag_and_clocks_stay_where_that_would_not_hel
 
 
 def test_a_hinge_is_searched_and_stays_what_it_is() -> None:
-    held = Hinge(
-        frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
-        np.array([-0.6, 0.0, 0.0]),
-    )  # fmt: skip
-    made = trial("poses", robots=4, hinge=held)
+    made = trial(robots=4, hinge=HINGE)
     assert not far_lags(made.log)
     assert "payload-jointed" in JointTeam().identify(made.log).codes()
 
 
 # A difference of next rows of noise is noise: steps that were divided by it fell short, and stopped without a word.
-LOUD = replace(NOISY, rate_rad_s=2e-2, velocity_m_s=5e-3)
-SLOW = replace(NOISY, rate_rad_s=3e-3, velocity_m_s=2e-3, twist_spectrum="2hz")
+LOUD = replace(NOISY_TWISTS, rate_rad_s=2e-2, velocity_m_s=5e-3)
+SLOW = replace(NOISY_TWISTS, rate_rad_s=3e-3, velocity_m_s=2e-3, twist_spectrum="2hz")
 
 
 @pytest.mark.parametrize(
     ("noise", "rows", "late_s", "most"),
     [
-        (NOISY, 1500, (0.0476, -0.0217), 1.7),
+        (NOISY_TWISTS, 1500, (0.0476, -0.0217), 1.7),
         (LOUD, 1500, (0.0476, -0.0217), 1.7),
         (SLOW, 3000, (0.013, -0.02), 2.2),
     ],

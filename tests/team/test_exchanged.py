@@ -3,24 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from functools import partial
 
+import made_teams
 import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog
-from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, Hinge, TeamNoise, TeamScene
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.joint import JointTeam
 from steelyard.team.misread.exchanged import require_own_files
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
-
-
-def trial(**changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"noise": NOISY, "sensing": "poses", "motion_samples": 1200, "grasp_samples": 600}
-    return simulate_team(TeamScene(**(scene | changes)), 100)
+trial = partial(made_teams.trial, kinds=made_teams.ALL_KINDS, motion_samples=1200, grasp_samples=600)
 
 
 def exchanged(log: TeamLog, number: int, first: str, second: str) -> TeamLog:
@@ -59,11 +55,7 @@ def test_good_logs_pass(case: str) -> None:
 
 
 def test_other_disagreement_is_left_to_its_own_finding() -> None:
-    held = Hinge(
-        frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
-        np.array([-0.6, 0.0, 0.0]),
-    )  # fmt: skip
-    require_own_files(trial(robots=4, hinge=held, kinds=("still", "motion")).log)
+    require_own_files(trial(robots=4, hinge=made_teams.HINGE, kinds=("still", "motion")).log)
     made = trial()
     *others, last = made.log.recordings
     track = last.tracks["robot2"]

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
+import made_teams
 import numpy as np
 import pytest
+from made_teams import HINGE
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue, CannotAnswer
@@ -19,7 +22,7 @@ from steelyard.io.result_reading import read_result
 from steelyard.report import render
 from steelyard.report.team_page import team_page
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.team import team_table
 from steelyard.team.estimate import TeamEstimate
@@ -32,15 +35,7 @@ from steelyard.team.stacked import stretches
 from steelyard.team.team_findings import open_parameters
 
 QUIET = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.2, torque_white_Nm=0.02)
-HELD = Hinge(
-    frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
-    np.array([-0.6, 0.0, 0.0]),
-)  # fmt: skip
-
-
-def trial(seed: int, noise: TeamNoise = QUIET, **changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"robots": 4, "sensing": "poses", "kinds": ("still", "motion"), "motion_samples": 1500}
-    return simulate_team(TeamScene(noise, hinge=HELD, **(scene | changes)), seed)
+trial = partial(made_teams.trial, QUIET, robots=4, hinge=HINGE)
 
 
 @pytest.fixture(scope="module")
@@ -52,8 +47,8 @@ def quiet() -> tuple[TeamTrial, TeamEstimate]:
 def truth(made: TeamTrial, found: TeamEstimate) -> tuple[InertialParameters, InertialParameters]:
     """Return both bodies in R with the hinge at the angle that the estimate calls zero."""
     place = made.truth.payload
-    axis, point = place.rotation.apply(HELD.axis), place.apply(HELD.point)
-    second = InertialParameters.from_com(HELD.mass, HELD.centre, np.diag(HELD.moments)).in_frame(place)
+    axis, point = place.rotation.apply(HINGE.axis), place.apply(HINGE.point)
+    second = InertialParameters.from_com(HINGE.mass, HINGE.centre, np.diag(HINGE.moments)).in_frame(place)
     turned = (found.grasps["robot2"].pose.rotation @ made.truth.grasps[2].rotation.inverse()).log() @ axis
     turn = Rotation.exp(float(turned) * axis)
     return made.truth.body - second, second.in_frame(Pose(turn, point - turn.apply(point)))
@@ -63,8 +58,8 @@ def scores(made: TeamTrial, found: TeamEstimate) -> tuple[Array, Array]:
     """Return errors over standard deviations: of the whole's ten, and of moments and levers of both bodies."""
     first, second = truth(made, found)
     assert found.hinge is not None
-    point = Pose(Rotation.identity(), made.truth.payload.apply(HELD.point))
-    axis = made.truth.payload.rotation.apply(HELD.axis)
+    point = Pose(Rotation.identity(), made.truth.payload.apply(HINGE.point))
+    axis = made.truth.payload.rotation.apply(HINGE.axis)
     each = []
     for body, true in zip(found.hinge.bodies, (first, second), strict=True):
         here = true.in_frame(point.inverse())
@@ -105,9 +100,9 @@ def test_both_bodies_are_found_within_their_error_bars(quiet: tuple[TeamTrial, T
     assert found.hinge is not None
     assert found.evidence.rank == COUNT
     assert [body.robots for body in found.hinge.bodies] == [("robot0", "robot1"), ("robot2", "robot3")]
-    axis = made.truth.payload.rotation.apply(HELD.axis)
+    axis = made.truth.payload.rotation.apply(HINGE.axis)
     assert np.rad2deg(np.arccos(min(1.0, abs(float(axis @ found.hinge.axis))))) < 0.05
-    off = np.cross(axis, found.hinge.point - made.truth.payload.apply(HELD.point))
+    off = np.cross(axis, found.hinge.point - made.truth.payload.apply(HINGE.point))
     assert np.linalg.norm(off) < 1e-3
     assert found.mass == pytest.approx(16, abs=0.02)
     assert {body.hinge_moment_std / body.hinge_moment < 0.02 for body in found.hinge.bodies} == {True}
@@ -134,7 +129,7 @@ def test_a_long_log_is_used_whole(quiet: tuple[TeamTrial, TeamEstimate]) -> None
 
 
 def test_one_robot_on_a_body_is_enough_and_clocks_are_put_right() -> None:
-    held = replace(HELD, robots=frozenset({2}))
+    held = replace(HINGE, robots=frozenset({2}))
     scene = TeamScene(QUIET, 3, "poses", frozenset({0, 1, 2}), kinds=("still", "motion"), motion_samples=1500)
     made = simulate_team(replace(scene, hinge=held, late_s={1: 0.013, 2: 0.008}), 7)
     found = JointTeam().identify(made.log)

@@ -3,17 +3,20 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import made_teams
 import numpy as np
 import pytest
+from made_teams import HINGE
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.logs.team_log import TeamRecording
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, EXACT, Hinge, Presence, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, EXACT, Presence, Slip, TeamNoise, TeamScene
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import log as pose_log
@@ -32,11 +35,7 @@ QUIET = TeamNoise(
     pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.2, torque_white_Nm=0.02
 )
 X, Y, Z = np.eye(3)
-
-
-def trial(noise: TeamNoise = QUIET, seed: int = 100, **changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"sensing": "poses", "kinds": ("still", "motion"), "motion_samples": 1500} | changes
-    return simulate_team(TeamScene(noise, scene.pop("robots", 3), **scene), seed)
+trial = partial(made_teams.trial, noise=QUIET)
 
 
 def error(made: TeamTrial, found: TeamEstimate) -> Array:
@@ -60,7 +59,7 @@ def error(made: TeamTrial, found: TeamEstimate) -> Array:
 @pytest.mark.parametrize("sensing", ["poses", "twists"])
 @pytest.mark.parametrize("robots", [3, 5])
 def test_exact_logs_give_exact_answers(sensing: str, robots: int) -> None:
-    made = trial(EXACT, sensing=sensing, robots=robots, bases_move=sensing == "twists")
+    made = trial(noise=EXACT, sensing=sensing, robots=robots, bases_move=sensing == "twists")
     found = JointTeam().identify(made.log)
     assert (error(made, found) < [1e-8, 1e-8, 1e-4, 1e-5, 1e-4]).all()
     assert found.evidence.rank == 10
@@ -102,7 +101,7 @@ def same(one: TeamEstimate, two: TeamEstimate) -> None:
 
 @pytest.mark.parametrize("team", TEAMS)
 def test_relabelled_robots_give_the_same_answer(team: str) -> None:
-    log = trial(LOUD, motion_samples=1000, **TEAMS[team]).log
+    log = trial(noise=LOUD, motion_samples=1000, **TEAMS[team]).log
     one, two = (JointTeam().identify(x) for x in (log, replace(log, robots=log.robots[::-1])))
     same(one, two)
     np.testing.assert_allclose(two.std, one.std, rtol=1e-6)
@@ -110,13 +109,13 @@ def test_relabelled_robots_give_the_same_answer(team: str) -> None:
 
 @pytest.mark.parametrize("team", TEAMS)
 def test_another_reference_gives_the_same_answer(team: str) -> None:
-    log = trial(LOUD, motion_samples=1000, **TEAMS[team]).log
+    log = trial(noise=LOUD, motion_samples=1000, **TEAMS[team]).log
     same(JointTeam().identify(log), JointTeam().identify(log.with_reference("robot1")))
 
 
 @pytest.mark.parametrize("team", [name for name in TEAMS if name != "twists"])
 def test_moved_homes_give_the_same_answer(team: str) -> None:
-    log = trial(LOUD, motion_samples=1000, **TEAMS[team]).log
+    log = trial(noise=LOUD, motion_samples=1000, **TEAMS[team]).log
     homes = {
         n: Pose(Rotation.exp(np.array([0.3, -0.2, 1.0 + i])), np.array([i, 2.0, -1.0])) for i, n in enumerate(log.names)
     }
@@ -162,7 +161,7 @@ MOTIONS = {
 def test_what_a_motion_does_not_show_is_named(motion: str, sensing: str) -> None:
     freedom, lost, rank = MOTIONS[motion]
     quiet = replace(QUIET, pose_rad=1e-4, pose_m=1e-4)
-    made = trial(quiet, freedom=freedom, sensing=sensing, bases_move=sensing == "twists", kinds=("motion",))
+    made = trial(noise=quiet, freedom=freedom, sensing=sensing, bases_move=sensing == "twists", kinds=("motion",))
     found = JointTeam().identify(made.log)
     assert [len(found.grasps[n].lost) for n in made.log.names] == [0, lost, lost]
     assert found.evidence.rank == rank
@@ -187,7 +186,7 @@ def test_still_poses_alone_fix_mass_and_centre() -> None:
 
 
 def test_two_robots_with_gimbals_work_in_motion() -> None:
-    made = trial(EXACT, robots=2, six_axis=frozenset({0}), kinds=("motion",))
+    made = trial(noise=EXACT, robots=2, six_axis=frozenset({0}), kinds=("motion",))
     found = JointTeam().identify(made.log)
     assert (error(made, found) < [1e-8, 1e-8, 1e-3, 1e-4, 1e-3]).all()
 
@@ -224,16 +223,13 @@ def test_a_robot_that_leaves_is_told_from_one_whose_data_are_missing() -> None:
 
 
 def test_a_hinge_is_found() -> None:
-    held = Hinge(
-        frozenset({2, 3}), Y, np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]), np.array([-0.6, 0.0, 0.0])
-    )
-    made = trial(robots=4, hinge=held, kinds=("motion",))
+    made = trial(robots=4, hinge=HINGE, kinds=("motion",))
     team = stretches(made.log, {})
     twist, noise, rate = moving_twists(team)
     assert bodies(twist, noise) == [(0, 1), (2, 3)]
     axis, point, _, share = find_hinge(twist[:, 0], twist[:, 2], rate)
     X = (made.truth.payload.inverse() @ made.truth.grasps)[2].inverse()
-    true_axis, true_point = X.rotation.apply(held.axis), X.apply(held.point)
+    true_axis, true_point = X.rotation.apply(HINGE.axis), X.apply(HINGE.point)
     assert abs(float(axis @ true_axis)) > np.cos(np.deg2rad(1.0))
     assert np.linalg.norm(np.cross(true_axis, point - true_point)) < 0.01
     assert share > 0.9
@@ -279,7 +275,7 @@ def test_a_robot_that_disagrees_is_named_and_hardly_counts() -> None:
 
 
 def test_a_bias_in_every_recording_is_not_pretended_away() -> None:
-    made = trial(replace(QUIET, force_bias_N=0.5))
+    made = trial(noise=replace(QUIET, force_bias_N=0.5))
     found = JointTeam().identify(made.log)
     clean = JointTeam().identify(trial().log)
     assert found.std[0] > 2 * clean.std[0]
@@ -287,7 +283,7 @@ def test_a_bias_in_every_recording_is_not_pretended_away() -> None:
 
 
 def test_gain_errors_are_spoken_of() -> None:
-    made = trial(replace(QUIET, force_gain=0.03))
+    made = trial(noise=replace(QUIET, force_gain=0.03))
     found = JointTeam().identify(made.log)
     assert "common-gain-unseen" in found.codes()
     assert found.std[0] > JointTeam(gains=False).identify(trial().log).std[0]

@@ -8,21 +8,20 @@ from typing import Any
 
 import numpy as np
 import pytest
+from made_teams import ALL_KINDS, HINGE, NOISY, trial
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.logs.misread import rolled
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
-from steelyard.simulate.team import simulate_team
-from steelyard.simulate.team_cases import CASES, Hinge, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, Slip, TeamNoise
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.joint import JointTeam
 from steelyard.team.misread import poses as misread_poses
 from steelyard.team.misread.poses import require_well_read
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 Spoil = Callable[[Array, Array], tuple[Array, Array]]
 
 
@@ -55,9 +54,8 @@ EITHER = {"mm", "cm", "inches", "m as mm", "cm as mm", "inches as mm", "inverted
 
 def made(robots: int = 3, seed: int = 100, noise: TeamNoise = NOISY, **changes: Any) -> TeamLog:
     """Return a log of robots whose homes are anywhere."""
-    rigid = frozenset({0} if robots == 2 else ())
-    scene: dict[str, Any] = {"sensing": "poses", "motion_samples": 800, "grasp_samples": 400, "six_axis": rigid}
-    log = simulate_team(TeamScene(noise, robots, **(scene | changes)), seed).log
+    scene: dict[str, Any] = {"robots": robots, "kinds": ALL_KINDS, "motion_samples": 800, "grasp_samples": 400}
+    log = trial(noise, seed, **(scene | changes)).log
     rng = np.random.default_rng(seed)
     return log.with_homes({n: Pose(Rotation.exp(rng.normal(size=3)), rng.uniform(-1, 1, 3)) for n in log.names})
 
@@ -146,13 +144,9 @@ def test_good_logs_pass(robots: int, name: str) -> None:
     require_well_read(case(name, robots, 300 + robots))
 
 
-HELD = Hinge(
-    frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
-    np.array([-0.6, 0.0, 0.0]),
-)  # fmt: skip
 UPRIGHT, NONE = np.eye(3)[:, 2:], np.zeros((3, 0))
 OTHERWISE: dict[str, dict[str, Any]] = {
-    "hinge": {"robots": 4, "hinge": HELD, "kinds": ("still", "motion")},
+    "hinge": {"robots": 4, "hinge": HINGE, "kinds": ("still", "motion")},
     "slip": {"slip": Slip(1, np.array([0.03, 0.04, 0.0]), 4.0)},
     "late": {"late_s": {1: 0.5}, "kinds": ("motion",)},
     "planar": {"freedom": Freedom(UPRIGHT, np.eye(3)[:, :2]), "kinds": ("grasp", "motion")},

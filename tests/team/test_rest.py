@@ -6,15 +6,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_teams import NOISY
 
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.rest import shares_at_rest
 from steelyard.team.poses.team import PoseTeam
-
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 
 
 def rounded(log: TeamLog, step: float) -> TeamLog:

@@ -7,25 +7,16 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_teams import ALL_KINDS, HINGE, NOISY, trial
 
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import Hinge, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import TeamScene
 from steelyard.team.joint import JointTeam
 from steelyard.team.mass_and_com import require_lift
 from steelyard.team.published import PublishedTeam
 from steelyard.team.weighed import _require_one_clock
-
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
-
-
-def trial(robots: int, sensing: str = "poses", seed: int = 100) -> TeamTrial:
-    kinds = ("still", "motion")
-    rigid = frozenset({0} if robots == 2 else ())  # two gimbals alone let the payload swing
-    return simulate_team(
-        TeamScene(NOISY, robots, sensing=sensing, kinds=kinds, motion_samples=1500, six_axis=rigid), seed
-    )
 
 
 def turned(log: TeamLog, *names: str, of: tuple[str, ...] = ("force", "torque")) -> TeamLog:
@@ -44,7 +35,7 @@ def turned(log: TeamLog, *names: str, of: tuple[str, ...] = ("force", "torque"))
 @pytest.mark.parametrize("sensing", ["poses", "twists"])
 @pytest.mark.parametrize("robots", [2, 3, 6])
 def test_one_wrong_sign_is_put_right_and_named(robots: int, sensing: str) -> None:
-    made = trial(robots, sensing)  # with twists, bases stand and positions are not measured
+    made = trial(robots=robots, sensing=sensing)  # with twists, bases stand and positions are not measured
     for name in made.log.names:
         right, found = JointTeam().identify(made.log), JointTeam().identify(turned(made.log, name))
         assert "wrench-sign-flipped" in found.codes()
@@ -57,8 +48,7 @@ def test_one_wrong_sign_is_put_right_and_named(robots: int, sensing: str) -> Non
 @pytest.mark.parametrize("robots", [2, 3])
 def test_a_sign_of_forces_or_torques_alone_is_put_right(robots: int, wrong: str) -> None:
     """Torques that went along with the forces' sign had made an inertia of 0.35 kg m^2 one of 0.01 +- 0.03."""
-    scene = TeamScene(NOISY, robots, sensing="poses", kinds=("still", "motion"), motion_samples=1500)
-    made = simulate_team(replace(scene, six_axis=frozenset(range(robots))), 100)
+    made = trial(robots=robots, six_axis=frozenset(range(robots)))
     right = JointTeam().identify(made.log)
     for name in made.log.names:
         found = JointTeam().identify(turned(made.log, name, of=(wrong,)))
@@ -85,14 +75,14 @@ def tared(log: TeamLog) -> TeamLog:
 @pytest.mark.parametrize("seed", [100, 102, 104])
 def test_sensors_tared_under_load_still_weigh(robots: int, seed: int) -> None:
     """Their raw sums say a mass of about zero, of either sign; what varies with tilt says 12 kg."""
-    found = JointTeam().identify(tared(trial(robots, seed=seed).log))
+    found = JointTeam().identify(tared(trial(robots=robots, seed=seed).log))
     assert abs(found.mass - 12) < 4 * found.std[0] < 2
     assert not found.codes() & {"wrench-sign-flipped", "robot-left", "robot-joined"}
 
 
 def test_all_signs_wrong_are_refused_after_taring_under_load() -> None:
     with pytest.raises(CannotAnswer, match="the forces must hold the payload up; they add up to a mass of -1"):
-        JointTeam().identify(turned(tared(trial(3).log), "robot0", "robot1", "robot2"))
+        JointTeam().identify(turned(tared(trial().log), "robot0", "robot1", "robot2"))
 
 
 def test_a_level_payload_that_was_tared_under_load_has_no_wrong_sign() -> None:
@@ -110,13 +100,13 @@ def test_a_level_payload_that_was_tared_under_load_has_no_wrong_sign() -> None:
 
 
 def test_all_signs_wrong_are_refused() -> None:
-    made = trial(3)
+    made = trial()
     with pytest.raises(CannotAnswer, match="a mass of -12 kg"):
         JointTeam().identify(turned(made.log, *made.log.names))
 
 
 def test_both_methods_refuse_in_the_same_words() -> None:
-    wrong, said = turned(trial(3).log, "robot0", "robot1", "robot2"), []
+    wrong, said = turned(trial().log, "robot0", "robot1", "robot2"), []
     for method, forces in ((JointTeam(), "the forces"), (PublishedTeam(), "the still forces")):
         with pytest.raises(CannotAnswer) as refused:
             method.identify(wrong)
@@ -128,13 +118,7 @@ def test_both_methods_refuse_in_the_same_words() -> None:
 
 
 def hinged() -> TeamTrial:
-    held = Hinge(
-        frozenset({2, 3}), np.array([0.0, 1.0, 0.0]), np.array([-0.3, 0.0, 0.0]), 4.0, np.array([0.3, 0.4, 0.5]),
-        np.array([-0.6, 0.0, 0.0]),
-    )  # fmt: skip
-    return simulate_team(
-        TeamScene(NOISY, 4, sensing="poses", kinds=("still", "motion"), motion_samples=1500, hinge=held), 100
-    )
+    return trial(robots=4, hinge=HINGE)
 
 
 def test_a_wrong_sign_is_put_right_beside_a_hinge() -> None:
@@ -156,17 +140,14 @@ def test_all_signs_wrong_are_refused_beside_a_hinge() -> None:
 
 @pytest.mark.parametrize("seed", range(100, 106))
 def test_right_signs_are_left_alone(seed: int) -> None:
-    found = JointTeam().identify(trial(3, seed=seed).log)
+    found = JointTeam().identify(trial(seed=seed).log)
     assert "wrench-sign-flipped" not in found.codes()
 
 
 def test_a_moment_of_motion_turns_no_sign() -> None:
     """What so few rows leave beside the motion is noise, and falls to a quarter by chance."""
-    scene = TeamScene(
-        NOISY, 5, sensing="poses", kinds=("grasp", "still", "motion"), grasp_samples=100, still_samples=20,
-        motion_samples=150,
-    )  # fmt: skip
-    found = JointTeam().identify(simulate_team(scene, 1008).log)
+    rows = {"grasp_samples": 100, "still_samples": 20, "motion_samples": 150}
+    found = JointTeam().identify(trial(seed=1008, robots=5, kinds=ALL_KINDS, **rows).log)
     assert "wrench-sign-flipped" not in found.codes()
     assert abs(found.mass - 12) < 4 * found.std[0]
 

@@ -6,13 +6,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from made_teams import trial
 
-from steelyard.simulate.team import simulate_team
-from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.team.joint import JointTeam
 from steelyard.team.stacked import bridged
-
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
 
 
 @pytest.mark.parametrize("rate", [50.0, 200.0, 1000.0])
@@ -37,7 +34,7 @@ def test_a_gap_at_an_end_is_none() -> None:
 
 def test_a_robot_that_loses_four_in_ten_rows_costs_little() -> None:
     """Rows of all must be there at once: lost rows of one had left the wrench of none."""
-    made = simulate_team(TeamScene(NOISY, sensing="poses", kinds=("still", "motion"), motion_samples=3000), 100)
+    made = trial(motion_samples=3000)
     rng = np.random.default_rng(0)
     lossy = made.log.with_recordings(
         *(

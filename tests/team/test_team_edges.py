@@ -3,25 +3,23 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import made_teams
 import numpy as np
 import pytest
 
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import identify_team
-from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.simulate.team import simulate_team
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.joint import JointTeam
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.5, rate_rad_s=2e-3, velocity_m_s=5e-4)
-
-
-def trial(**changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"noise": NOISY, "sensing": "poses", "motion_samples": 1500}
-    return simulate_team(TeamScene(**(scene | changes)), 100)
+NOISY = replace(made_teams.NOISY_TWISTS, force_white_N=0.5)
+trial = partial(made_teams.trial, NOISY, kinds=made_teams.ALL_KINDS)
 
 
 def pushing(log: TeamLog, name: str, force: float) -> TeamLog:

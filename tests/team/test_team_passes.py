@@ -7,7 +7,7 @@ import pytest
 from scipy.interpolate import CubicSpline
 
 from steelyard.bench.tables import block
-from steelyard.bench.team_table import _SCALE
+from steelyard.bench.teams.table import _SCALE
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.logs.cubic import cubic

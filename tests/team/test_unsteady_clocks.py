@@ -6,25 +6,26 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
+import made_teams
 import numpy as np
 import pytest
+from made_teams import ALL_KINDS, NOISY_TWISTS
 
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, Slip, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, Slip, TeamScene
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, rate_rad_s=2e-3, velocity_m_s=5e-4)
 LATE = 0.005
 
 
 def trial(sensing: str, seed: int = 100, **changes: Any) -> TeamTrial:
-    moving = sensing == "twists"
-    noise = CASES["B"] if sensing == "joints" else NOISY
-    return simulate_team(TeamScene(noise, sensing=sensing, bases_move=moving, motion_samples=2500, **changes), seed)  # type: ignore[arg-type]
+    noise = CASES["B"] if sensing == "joints" else NOISY_TWISTS
+    scene: dict[str, Any] = {"bases_move": sensing == "twists", "kinds": ALL_KINDS, "motion_samples": 2500} | changes
+    return made_teams.trial(noise, seed, sensing=sensing, **scene)
 
 
 def restamped(log: TeamLog, kind: str, of: Callable[[Array], Array], *names: str) -> TeamLog:

@@ -5,25 +5,26 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
+import made_teams
 import numpy as np
 import pytest
 
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import stiffened
 
-NOISY = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0, torque_white_Nm=0.1)
+NOISY = replace(made_teams.NOISY, torque_white_Nm=0.1)
 ALL = frozenset({0, 1, 2})
 
 
 def trial(stiffness: tuple[float, float] | None, seed: int = 700, **changes: Any) -> TeamTrial:
-    scene: dict[str, Any] = {"noise": NOISY, "sensing": "poses", "six_axis": ALL, "motion_samples": 2500}
-    return simulate_team(TeamScene(stiffness=stiffness, **(scene | changes)), seed)
+    usual: dict[str, Any] = {"noise": NOISY, "kinds": made_teams.ALL_KINDS, "six_axis": ALL, "motion_samples": 2500}
+    return made_teams.trial(seed=seed, stiffness=stiffness, **(usual | changes))
 
 
 def off(found: TeamEstimate, made: TeamTrial) -> tuple[float, float, float]:

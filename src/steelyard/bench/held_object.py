@@ -11,10 +11,9 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench import bound
 from steelyard.bench.asked import Progress, require_known, require_one
-from steelyard.bench.conditions import condition_means, conditions
-from steelyard.bench.held_object_cases import (
+from steelyard.bench.objects import bound
+from steelyard.bench.objects.cases import (
     METHODS,
     PART_METHODS,
     PARTS,
@@ -25,7 +24,8 @@ from steelyard.bench.held_object_cases import (
     methods_for,
     noisy_rows,
 )
-from steelyard.bench.held_object_summary import SCORES, Row, bound_means, summary, table_iv
+from steelyard.bench.objects.conditions import condition_means, conditions
+from steelyard.bench.objects.summary import SCORES, Row, bound_means, summary, table_iv
 from steelyard.bench.pool import spread
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
@@ -242,7 +242,7 @@ def _correlations(outcomes: list[Outcome], rows: list[Row]) -> dict[str, Any]:
     entries = [o.entry for o in outcomes if "segmentation" in o.entry]
     if not entries:
         return {}
-    from steelyard.bench.segmented import rank_correlations
+    from steelyard.bench.objects.segmented import rank_correlations
 
     out = {}
     for method in ("ours", "paper-route"):

@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench import long_log
 from steelyard.bench.asked import Progress
-from steelyard.bench.methods import Method, choose, own_methods
-from steelyard.bench.peers import peer_methods
+from steelyard.bench.logs import long_log
+from steelyard.bench.logs.methods import Method, choose, own_methods
+from steelyard.bench.logs.peers import peer_methods
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import SteelyardError

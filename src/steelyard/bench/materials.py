@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.asked import Progress, require_one
-from steelyard.bench.held_object_cases import SAME_DENSITY, Case, load_case, noisy_rows
+from steelyard.bench.objects.cases import SAME_DENSITY, Case, load_case, noisy_rows
 from steelyard.errors import BadValue, SteelyardError
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses

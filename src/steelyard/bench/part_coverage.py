@@ -12,8 +12,8 @@ import numpy as np
 
 from steelyard.bench.asked import Progress, require_one
 from steelyard.bench.coverage import HALF_WIDTH, object_scale, rms_error, widths
-from steelyard.bench.held_object_cases import Case, load_case, noisy_rows
-from steelyard.bench.part_timing import TIMING, timings
+from steelyard.bench.objects.cases import Case, load_case, noisy_rows
+from steelyard.bench.objects.part_timing import TIMING, timings
 from steelyard.bench.pool import batches, spread
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array

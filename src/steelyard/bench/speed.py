@@ -13,8 +13,8 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
-from steelyard.bench import hull_sets
-from steelyard.bench.plain_clustering import plain_cluster
+from steelyard.bench.shapes import hull_sets
+from steelyard.bench.shapes.plain_clustering import plain_cluster
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import BadValue

@@ -116,16 +116,16 @@ def run(
 
 def _of_joint(trials: int, coverage: int, slips: int, workers: int) -> dict[str, Any]:
     """Return what is asked of the joint estimator alone: bound, times, events, troubles, laws, and its intervals."""
-    from steelyard.bench import team_bound, team_coverage, team_events, team_laws, team_troubles
+    from steelyard.bench.teams import bound, events, intervals, laws, troubles
 
     out: dict[str, Any] = {
-        "bound": team_bound.run(trials),
+        "bound": bound.run(trials),
         "times": [times(robots, rows) for robots, rows in TIMED],
-        "events": team_events.run(trials, slips, workers),
-        "troubles": team_troubles.run(trials, workers),
-        "laws": team_laws.run(max(1, trials // 4), workers),
+        "events": events.run(trials, slips, workers),
+        "troubles": troubles.run(trials, workers),
+        "laws": laws.run(max(1, trials // 4), workers),
     }
-    return out | {"coverage": team_coverage.coverage(coverage, workers=workers)} if coverage else out
+    return out | {"coverage": intervals.coverage(coverage, workers=workers)} if coverage else out
 
 
 def times(robots: int, rows: int) -> dict[str, Any]:

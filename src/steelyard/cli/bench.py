@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
 import click
 
@@ -12,9 +13,30 @@ from steelyard.cli.console import print_json, progress_bar, say
 from steelyard.cli.groups import Group
 from steelyard.cli.options import HELP, JSON
 
+Verb = TypeVar("Verb", bound=Callable[..., Any])
+
 _FOLDERS = click.option(
     "--data", required=True, type=click.Path(path_type=Path), help="Folder of object folders, or one of them."
 )
+_OBJECTS = click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+_METHODS = click.option("--methods", multiple=True, help="Only these methods.")
+
+
+def _count(name: str, default: int, said: str, *, least: int = 1, into: str | None = None) -> Callable[[Verb], Verb]:
+    """Return the option of a whole number from `least` on; `into` is the argument it goes to, where not of its name."""
+    names = (name,) if into is None else (name, into)
+    return click.option(*names, type=click.IntRange(min=least), default=default, show_default=True, help=said)
+
+
+_WORKERS = _count("--workers", 2, "Processes.")
+
+
+def _tell(result: dict[str, Any], as_json: bool, table: Callable[[dict[str, Any]], str]) -> None:
+    """Print what a bench found, as JSON or for people."""
+    if as_json:
+        print_json(result)
+    else:
+        click.echo(table(result))
 
 
 @click.group(cls=Group, context_settings=HELP)
@@ -24,18 +46,12 @@ def bench() -> None:
 
 
 @bench.command()
-@click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
-@click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+@_count("--seeds", 5, "Seeds 0, 1, ...")
+@_OBJECTS
 @click.option("--motions", multiple=True, help="Only these motions.")
 @click.option("--noise", "noises", multiple=True, help="Only these noise levels.")
-@click.option("--methods", multiple=True, help="Only these methods.")
-@click.option(
-    "--million",
-    type=click.IntRange(min=0),
-    default=1_000_000,
-    show_default=True,
-    help="Rows of the long log.",
-)
+@_METHODS
+@_count("--million", 1_000_000, "Rows of the long log.", least=0)
 @click.option("--data", type=click.Path(path_type=Path), help="Has no effect: the bench makes its own data.")
 @JSON
 def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> None:
@@ -46,11 +62,11 @@ def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> No
     result = job.run(range(seeds), progress=progress_bar("bench identify"), **choices)
     for note in result["notes"]:
         say(note)
-    print_json(result) if as_json else click.echo(identify_table(result))
+    _tell(result, as_json, identify_table)
 
 
 @bench.command()
-@click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True, help="Seeds 0, 1, ...")
+@_count("--seeds", 1000, "Seeds 0, 1, ...")
 @click.option("--motion", default="stop_go", show_default=True, help="Motion of the logs, as in bench identify.")
 @click.option("--noise", default="moderate", show_default=True, help="Noise level, as in bench identify.")
 @click.option(
@@ -69,7 +85,7 @@ def identify(seeds: int, data: Path | None, as_json: bool, **choices: Any) -> No
     show_default=True,
     help="The sensor's bias is estimated, or known to be none.",
 )
-@click.option("--workers", type=click.IntRange(min=1), default=1, show_default=True, help="Processes.")
+@_count("--workers", 1, "Processes.")
 @JSON
 def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **choices: Any) -> None:
     """Do 95 % intervals hold the truth 95 % of the time, white and correlated noise?"""
@@ -80,7 +96,7 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
     spectra = SPECTRA if spectrum == "both" else tuple(s for s in SPECTRA if s == spectrum)
     progress = progress_bar("bench coverage")
     result = job.run(seeds, spectra=spectra, declared=not noise_unknown, progress=progress, **choices)
-    print_json(result) if as_json else click.echo(coverage_table(result))
+    _tell(result, as_json, coverage_table)
 
 
 @bench.command("held-object")
@@ -92,53 +108,53 @@ def coverage(seeds: int, spectrum: str, noise_unknown: bool, as_json: bool, **ch
     show_default=True,
     help="Parts: found in the clouds with labels unseen, the true ones, each cut in pieces, or joined.",
 )
-@click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
-@click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+@_count("--seeds", 5, "Seeds 0, 1, ...")
+@_OBJECTS
 @click.option("--noise", "noises", multiple=True, help="Only these scenarios: none, low, moderate, high, high-code.")
-@click.option("--methods", multiple=True, help="Only these methods.")
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@_METHODS
+@_WORKERS
 @JSON
 def held_object(data: Path, as_json: bool, **choices: Any) -> None:
     """The paper's identification benchmark: every object, four noise scenarios, ours beside its rivals."""
     from steelyard.bench import held_object as job
-    from steelyard.bench.held_object_table import held_object_table
+    from steelyard.bench.objects.table import held_object_table
 
     result = job.run(data, progress=progress_bar("bench held-object"), **choices)
-    print_json(result) if as_json else click.echo(held_object_table(result))
+    _tell(result, as_json, held_object_table)
 
 
 @bench.command("part-coverage")
 @_FOLDERS
-@click.option("--seeds", type=click.IntRange(min=1), default=1000, show_default=True, help="Logs per case.")
+@_count("--seeds", 1000, "Logs per case.")
 @click.option("--noise", "noises", default="low,high", show_default=True, help="Scenarios, with commas between them.")
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
+@_WORKERS
 @JSON
 def part_coverage(data: Path, seeds: int, noises: str, workers: int, as_json: bool) -> None:
     """Do 95 % intervals of part masses and of the whole hold the truth, and how long does an answer take?"""
     from steelyard.bench import part_coverage as job
-    from steelyard.bench.part_tables import part_coverage_table
+    from steelyard.bench.objects.part_tables import part_coverage_table
 
     progress = progress_bar("bench part-coverage")
     result = job.run(data, seeds, progress, noises=tuple(noises.split(",")), workers=workers)
-    print_json(result) if as_json else click.echo(part_coverage_table(result))
+    _tell(result, as_json, part_coverage_table)
 
 
 @bench.command()
 @_FOLDERS
-@click.option("--seeds", type=click.IntRange(min=1), default=5, show_default=True, help="Seeds 0, 1, ...")
+@_count("--seeds", 5, "Seeds 0, 1, ...")
 @JSON
 def materials(data: Path, seeds: int, as_json: bool) -> None:
     """How often is the right density picked from a list, at low noise?"""
     from steelyard.bench import materials as job
-    from steelyard.bench.part_tables import materials_table
+    from steelyard.bench.objects.part_tables import materials_table
 
     result = job.run(data, seeds, progress_bar("bench materials"))
-    print_json(result) if as_json else click.echo(materials_table(result))
+    _tell(result, as_json, materials_table)
 
 
 @bench.command()
 @_FOLDERS
-@click.option("--objects", multiple=True, help="Only these objects (repeat the option).")
+@_OBJECTS
 @click.option("--noise-mm", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Noise of the points.")
 @click.option(
     "--colour-noise", type=click.FloatRange(min=0), default=0.0, show_default=True, help="Of channels 0..255."
@@ -147,62 +163,60 @@ def materials(data: Path, seeds: int, as_json: bool) -> None:
 def segment(data: Path, as_json: bool, **choices: Any) -> None:
     """Parts of unlabelled clouds against the true ones, beside the paper's Tables I and II."""
     from steelyard.bench import segment as job
-    from steelyard.bench.segment_table import segment_table
+    from steelyard.bench.shapes.segment_table import segment_table
 
     result = job.run(data, progress_bar("bench segment"), **choices)
-    print_json(result) if as_json else click.echo(segment_table(result))
+    _tell(result, as_json, segment_table)
 
 
 @bench.command()
-@click.option("--trials", type=click.IntRange(min=1), default=24, show_default=True, help="Seeds 100, 101, ...")
+@_count("--trials", 24, "Seeds 100, 101, ...")
 @click.option("--cases", multiple=True, help="Only these cases: A, B, C, D (repeat the option).")
-@click.option("--methods", multiple=True, help="Only these methods.")
+@_METHODS
 @click.option("--sizes", type=click.IntRange(min=2), multiple=True, help="Only these numbers of robots in the scaling.")
-@click.option("--workers", type=click.IntRange(min=1), default=2, show_default=True, help="Processes.")
-@click.option("--coverage", type=click.IntRange(min=0), default=0, show_default=True, help="Trials of the intervals.")
-@click.option("--slips", type=click.IntRange(min=0), default=40, show_default=True, help="Slips, and logs without.")
+@_WORKERS
+@_count("--coverage", 0, "Trials of the intervals.", least=0)
+@_count("--slips", 40, "Slips, and logs without.", least=0)
 @JSON
 def team(trials: int, as_json: bool, **choices: Any) -> None:
     """One payload, three robots, noise from clean to that of the paper; and cost against the number of robots."""
     from steelyard.bench import team as job
-    from steelyard.bench.team_table import team_table
+    from steelyard.bench.teams.table import team_table
 
     result = job.run(trials, progress_bar("bench team"), **choices)
-    print_json(result) if as_json else click.echo(team_table(result))
+    _tell(result, as_json, team_table)
 
 
 @bench.command()
-@click.option("--tets", type=click.IntRange(min=100), default=5000, show_default=True, help="Tetrahedra of the solid.")
-@click.option("--many", type=click.IntRange(min=0), default=150_000, show_default=True, help="And of the large one.")
-@click.option("--repeats", type=click.IntRange(min=1), default=20, show_default=True, help="Runs per time.")
-@click.option(
-    "--hull-sets", type=click.IntRange(min=0), default=12_000, show_default=True, help="Sets of points against Qhull."
-)
+@_count("--tets", 5000, "Tetrahedra of the solid.", least=100)
+@_count("--many", 150_000, "And of the large one.", least=0)
+@_count("--repeats", 20, "Runs per time.")
+@_count("--hull-sets", 12_000, "Sets of points against Qhull.", least=0)
 @JSON
 def speed(tets: int, many: int, repeats: int, hull_sets: int, as_json: bool) -> None:
     """How fast are clusters and hulls, beside the same algorithm with SciPy's Qhull?"""
     from steelyard.bench import speed as job
 
     result = job.run(tets, many, repeats, progress_bar("bench speed"), sets=hull_sets)
-    print_json(result) if as_json else click.echo(job.speed_table(result))
+    _tell(result, as_json, job.speed_table)
 
 
 @bench.command()
-@click.option("--count", type=click.IntRange(min=1), default=60, show_default=True, help="Channels, plates and tubes.")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of sizes and points.")
+@_count("--count", 60, "Channels, plates and tubes.")
+@_count("--seed", 0, "Seed of sizes and points.", least=0)
 @JSON
 def sheets(count: int, seed: int, as_json: bool) -> None:
     """Thin channels, plates and open tubes from bare points: is the volume right, and are wrong ones named?"""
     from steelyard.bench import sheets as job
 
     result = job.run(count, seed, progress_bar("bench sheets"))
-    print_json(result) if as_json else click.echo(job.sheets_table(result))
+    _tell(result, as_json, job.sheets_table)
 
 
 @bench.command()
 @click.option("--tools", multiple=True, help="Only these families (repeat the option).")
-@click.option("--seed", type=click.IntRange(min=0), default=0, show_default=True, help="Seed of pose, arc and noise.")
-@click.option("--views", "count", type=click.IntRange(min=8), default=127, show_default=True, help="Images per scan.")
+@_count("--seed", 0, "Seed of pose, arc and noise.", least=0)
+@_count("--views", 127, "Images per scan.", least=8, into="count")
 @click.option("--pose-mm", type=float, default=0.0, show_default=True, help="Error of the reported camera positions.")
 @click.option("--pose-deg", type=float, default=0.0, show_default=True, help="Error of the reported camera rotations.")
 @JSON
@@ -211,4 +225,4 @@ def scan(tools: tuple[str, ...], pose_mm: float, pose_deg: float, as_json: bool,
     from steelyard.bench import scan as job
 
     result = job.run(tools, pose_std=(pose_mm, pose_deg), progress=progress_bar("bench scan"), **choices)
-    print_json(result) if as_json else click.echo(job.scan_table(result))
+    _tell(result, as_json, job.scan_table)

@@ -12,7 +12,7 @@ from steelyard.evaluate.bodies import (
     riemannian,
     score,
 )
-from steelyard.evaluate.published import published_edges, score_as_published
+from steelyard.evaluate.published import score_as_published
 from steelyard.evaluate.segments import (
     SegmentScores,
     adjusted_rand,
@@ -39,7 +39,6 @@ __all__ = [
     "inertia_pct",
     "inertia_scale",
     "mass_pct",
-    "published_edges",
     "riemannian",
     "score",
     "score_as_published",

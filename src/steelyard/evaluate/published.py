@@ -12,24 +12,17 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from steelyard import check
-from steelyard.check import Array
 from steelyard.evaluate import bodies
 from steelyard.evaluate.bodies import Scores
 from steelyard.inertia import InertialParameters
-from steelyard.spatial import Rotation
-
-
-def published_edges(points: ArrayLike, rotation: Rotation) -> Array:
-    """Return |R (max - min)| (3,) [m] of estimated points (N, 3) in O, with R turning O into S.
-
-    These are the edges of a box along the axes of S only where R swaps axes.
-    """
-    cloud = check.vectors("points", points)
-    return np.asarray(np.abs(rotation.apply(np.ptp(cloud, axis=0))))
 
 
 def score_as_published(found: InertialParameters, true: InertialParameters, edges: ArrayLike) -> Scores:
-    """Score one body with the `edges` (3,) [m] of `published_edges` and centre-of-mass percents floored per axis."""
+    """Score one body by the box `edges` (3,) [m] of its estimated shape, centre-of-mass percents floored per axis.
+
+    The published code takes |R (max - min)| of the estimated points, with R turning O into S: these are the edges of a
+    box along the axes of S only where R swaps axes.
+    """
     box = check.vectors("edges", edges)
     floored = np.floor(100 * np.abs(found.com - true.com) / box)
     right = bodies.score(found, true, np.stack([np.zeros(3), box]))

@@ -9,13 +9,14 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.evidence import Evidence
 from steelyard.findings import Finding, counted
 from steelyard.identify.bars.correlated import NOTHING, Score
 from steelyard.identify.bars.holdout import leave_one_out
 from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.dense import eigen, product, product_transposed
 from steelyard.identify.cost.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
-from steelyard.identify.estimate import Estimate, Evidence
+from steelyard.identify.estimate import Estimate
 from steelyard.identify.people import parameter_jacobian, people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
@@ -58,10 +59,47 @@ def _taken(H: Array, problem: Problem, solution: Solution) -> float:
     return fitted(J.T @ H @ J, prior)
 
 
-def _fixed_weights(problem: Problem, linear: Array, weights: Array, variance: float) -> tuple[Array, Array]:
-    """Return the information (p, p) with fixed weights, and the variance of its score at linear (p,)."""
-    bread, _ = normal_equations(problem.T, problem.scatter, weights)
-    return bread, variance * problem.fixed_weight_score(linear, weights)
+@dataclass(frozen=True, eq=False)
+class Fit:
+    """How well a solution fits.
+
+    information                      (p, p) of the linear parameters
+    white                            (p, p) variance of the score where noise is white
+    chi2                             per degree of freedom
+    residual_torque, residual_force  rms per axis [N m], [N]
+    """
+
+    information: Array
+    white: Array
+    chi2: float
+    residual_torque: float
+    residual_force: float
+
+
+def _fit_of(problem: Problem, solution: Solution) -> Fit:
+    """Return how well a solution fits the rows of its problem."""
+    data, noise = problem.scatter, (problem.acceleration, problem.wrench)
+    K = problem.residual_map(solution.linear)
+    H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
+    cost, square = noise_cost.value(K, data, *noise)
+    H, rows = nonnegative(H, plain), problem.samples
+    left = max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0)
+    chi2 = max(cost / left, 0.0)
+    # Noise that few degrees of freedom told is uncertain itself: the variance of Student's t.
+    white = max(chi2, 1.0) * max(left, 3.0) / (max(left, 3.0) - 2) * nonnegative(H + extra, plain)
+    return Fit(H, white, chi2, *problem.rms(square / rows))
+
+
+def _information(problem: Problem, solution: Solution, fit: Fit, score: Score) -> tuple[Array, Array]:
+    """Return the information (p, p) of the linear parameters and the variance of its score, what is known of the bias
+    counted as data.
+    """
+    bread, meat = fit.information, fit.white
+    if (weights := solution.weights) is not None:
+        bread, _ = normal_equations(problem.T, problem.scatter, weights)
+        meat = max(fit.chi2, 1.0) * problem.fixed_weight_score(solution.linear, weights)
+    meat = meat if score.by_noise is None else score.by_noise
+    return problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
 
 
 def conclude(
@@ -76,36 +114,22 @@ def conclude(
     """
     if not (np.isfinite(solution.linear).all() and solution.linear[0] != 0):
         raise _lost(np.ones(4, np.bool_), problem)
-    data, noise = problem.scatter, (problem.acceleration, problem.wrench)
-    K = problem.residual_map(solution.linear)
-    H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
-    cost, square = noise_cost.value(K, data, *noise)
-    H, rows = nonnegative(H, plain), problem.samples
-    left = max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0)
-    chi2 = max(cost / left, 0.0)
-    residual_torque, residual_force = problem.rms(square / rows)
-    # Noise that few degrees of freedom told is uncertain itself: the variance of Student's t.
-    white = max(chi2, 1.0) * max(left, 3.0) / (max(left, 3.0) - 2) * nonnegative(H + extra, plain)
-    bread, meat = H, white
-    if (weights := solution.weights) is not None:
-        bread, meat = _fixed_weights(problem, solution.linear, weights, max(chi2, 1.0))
-    meat = meat if score.by_noise is None else score.by_noise
-    bread, meat = problem.plus_bias_prior(bread), problem.plus_bias_prior(meat)
+    fit = _fit_of(problem, solution)
+    bread, meat = _information(problem, solution, fit, score)
     covariance = _sandwich(bread, meat + score.by_pose, solution)
-    body = InertialParameters(solution.linear[:10])
     # Whether the data fix a number is judged by noise alone: more poses cure no error that comes back with them.
-    seen = meat if solution.weights is None else problem.plus_bias_prior(white)
-    F, G, _, _ = without_bias(problem.plus_bias_prior(H), seen)
+    seen = meat if solution.weights is None else problem.plus_bias_prior(fit.white)
+    F, G, _, _ = without_bias(problem.plus_bias_prior(fit.information), seen)
     sight = Sight(*_sight(F, G, solution.linear[:10]))
     if response is None:
         _require_answer(sight, problem)
     estimate = Estimate(
-        body,
+        InertialParameters(solution.linear[:10]),
         covariance[:10, :10],
         method,
         Evidence(
-            sight.rank, sight.condition, int(rows), int(problem.still_samples), residual_force, residual_torque, chi2,
-            spread=2 * sight.std,
+            sight.rank, sight.condition, int(problem.samples), int(problem.still_samples),
+            fit.residual_force, fit.residual_torque, fit.chi2, spread=2 * sight.std,
         ),
         sight.identified,
         solution.bias,

@@ -10,9 +10,8 @@ from typing import Any, Self
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding, by_cause
-from steelyard.identify.evidence import Evidence as Evidence
-from steelyard.identify.evidence import PartMass as PartMass
 from steelyard.identify.people import people_jacobian
 from steelyard.inertia import InertialParameters
 from steelyard.tables.words import in_a_line, in_words

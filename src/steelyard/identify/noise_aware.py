@@ -64,13 +64,13 @@ class NoiseAware:
         return fit_moments(moments, Bias.of(self.bias), self._fit, "noise-aware")
 
     def _fit(self, problem: Problem) -> Solution:
-        data = (problem.T, problem.scatter, problem.acceleration, problem.wrench)
-        options = (self.prior, float(np.log(self.size)), self.size_spread**-2)
-        known = (problem.bias_prior.mean, problem.bias_prior.precision)
-        linear = reweighted(*data, 3)
+        rows = newton.Rows(problem.T, problem.scatter, problem.acceleration, problem.wrench)
+        bias = problem.bias_prior
+        priors = newton.Priors(self.prior, float(np.log(self.size)), self.size_spread**-2, bias.mean, bias.precision)
+        linear = reweighted(*rows, 3)
         best = None
         for start in self._starts(linear):
-            found = newton.minimise(start, *data, *options, *known, self.iterations)
+            found = newton.minimise(start, rows, priors, self.iterations)
             if best is None or found[1] < best[1]:
                 best = found
             if found[2]:
@@ -78,7 +78,7 @@ class NoiseAware:
         if best is None or not np.isfinite(best[1]):
             raise CannotAnswer("The noise-aware cost has no minimum on this log; check units and signs with `doctor`.")
         u = best[0]
-        prior = newton.shape_prior(u[:10], *options)[2]
+        prior = newton.shape_prior(u[:10], priors.gamma, priors.log_size, priors.precision)[2]
         return Solution(newton.linear_of(u), newton.jacobian(u[:10], newton.factor(u[:10])), prior)
 
     def _starts(self, linear: Array) -> Iterator[Array]:

@@ -16,12 +16,13 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
+from steelyard.evidence import PartMass
 from steelyard.findings import Finding
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.conclude import conclude, widened
 from steelyard.identify.cost.linear import reweighted
-from steelyard.identify.estimate import Estimate, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings
 from steelyard.identify.masses.loosened import loosened

@@ -14,7 +14,8 @@ from scipy.optimize import nnls
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.evidence import Evidence, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import Mask, MotionLog
 from steelyard.parts.parts import Parts
 

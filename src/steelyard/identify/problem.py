@@ -178,7 +178,7 @@ def without_drift(log: MotionLog) -> MotionLog:
 
 
 def scaled_time(log: MotionLog) -> Array:
-    """Return time scaled to -1..1 over the log."""
+    """Return time (N,) scaled to -1..1 over the log."""
     if log.time is None:
         raise CannotAnswer("A drifting bias needs a clock; the log has none. Record a time column.")
     start, end = float(log.time.min()), float(log.time.max())

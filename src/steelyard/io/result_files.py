@@ -10,7 +10,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.estimate import Estimate, Evidence, PartMass
+from steelyard.evidence import Evidence, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.inertia import forms
 from steelyard.io.results.team_results import team_entries
 from steelyard.team.estimate import TeamEstimate

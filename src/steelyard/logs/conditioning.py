@@ -70,7 +70,7 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
 
 
 def lowpass_gain(frequency: Array, cutoff_hz: float, order: int = 4) -> Array:
-    """Return the share of an amplitude that `lowpass` leaves at frequencies [Hz]."""
+    """Return the share (K,) of an amplitude that `lowpass` leaves at frequencies (K,) [Hz]."""
     return np.asarray(1 / (1 + (frequency / cutoff_hz) ** (2 * order)))
 
 

@@ -120,8 +120,9 @@ def _log_share(values: Array, chosen: list[Array]) -> float:
 
 
 def features(motion: Motion, force: Array | None) -> list[Array]:
-    """Return what a body's wrench is linear in, with a constant: a - g (by the accelerometer if given) and
-    turning."""
+    """Return what a body's wrench is linear in, each (N, k), with a constant: a - g [m/s^2], by the
+    accelerometer's `force` (N, 3) if given, and turning.
+    """
     columns = [np.ones((len(motion.omega), 1)), *turning(motion)]
     if force is not None:
         return [*columns, force]

@@ -76,7 +76,7 @@ def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
 
 
 def unit_factor(specific_force: Array, gravity_size: float) -> float:
-    """Return 9.80665 where the numbers are in g, its inverse where g was applied twice, else 1."""
+    """Return 9.80665 where specific forces (N, 3) are in g, its inverse where g was applied twice, else 1."""
     size = float(np.median(np.linalg.norm(specific_force, axis=1))) / gravity_size
     if 0.07 < size < 0.14:
         return STANDARD_GRAVITY

@@ -14,5 +14,5 @@ def runs(mask: Mask) -> Integers:
 
 
 def picked(rows: int, most: int) -> Integers:
-    """Return the numbers of at most `most` rows, spread evenly over all from the first to the last."""
+    """Return the numbers (k,) of at most `most` rows, spread evenly over all from the first to the last."""
     return np.unique(np.linspace(0, rows - 1, min(rows, most)).astype(np.int64))

@@ -130,7 +130,7 @@ def between(known: Array, values: Array, time: Array) -> Array:
 
 
 def near_samples(known: Array, time: Array, step: float) -> Mask:
-    """Return which of `time` lie between two samples that are near each other."""
+    """Return which of `time` (N,) lie between two samples `known` (K,) that few of the usual `step` [s] part."""
     after = np.clip(np.searchsorted(known, time - 1e-6), 0, len(known) - 1)
     before = np.clip(np.searchsorted(known, time + 1e-6, "right") - 1, 0, len(known) - 1)
     inside = (time >= known[0] - 1e-6) & (time <= known[-1] + 1e-6)

@@ -82,7 +82,7 @@ class Hierarchy:
         return None if below is None else (int(below[0]), int(below[1]))
 
     def leaves(self, node: int) -> Integers:
-        """Return the pieces inside a node, rising."""
+        """Return the numbers (k,) of the pieces inside a node, rising."""
         return np.flatnonzero(self._owner([self._node(node)]) >= 0)
 
     def nodes(self, count: int) -> list[int]:

@@ -114,7 +114,7 @@ def _squeeze(vertex: Any, face: Any, offset: Any, length: Any, state: Any, gone:
 
 @numba.njit(cache=True, nogil=True)
 def six_volumes(xyz: Array, a: int, b: int, c: int, d: int) -> float:
-    """Return six times the volume of a tet, positive where d lies above a, b, c."""
+    """Return six times the volume of a tet of rows of xyz (V, 3), positive where d lies above a, b, c."""
     ax, ay, az = xyz[a, 0], xyz[a, 1], xyz[a, 2]
     ux, uy, uz = xyz[b, 0] - ax, xyz[b, 1] - ay, xyz[b, 2] - az
     vx, vy, vz = xyz[c, 0] - ax, xyz[c, 1] - ay, xyz[c, 2] - az
@@ -124,7 +124,7 @@ def six_volumes(xyz: Array, a: int, b: int, c: int, d: int) -> float:
 
 @numba.njit(cache=True, nogil=True)
 def four_faces(xyz: Array, hulls: Hulls, c: int) -> None:
-    """Keep the faces of a cluster of four points."""
+    """Keep the faces of cluster c, which has four of the points xyz (V, 3)."""
     vertex, at = hulls.vertex, hulls.offset[c]
     turned = six_volumes(xyz, vertex[at], vertex[at + 1], vertex[at + 2], vertex[at + 3]) < 0
     for k in range(4):

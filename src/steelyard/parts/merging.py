@@ -56,6 +56,33 @@ class Edges(NamedTuple):
     stage: Any
 
 
+class Making(NamedTuple):
+    """What hulls are made of and with: points (V, 3), how level is level, room, and hulls that Qhull stands in for."""
+
+    xyz: Any
+    tolerance: float
+    work: HullWork
+    stand_ins: StandIns
+
+
+class Measure(NamedTuple):
+    """What a merge is measured by: the number of first clusters, the volume and the tets of all of them, and the
+    weight of a union's size (below zero: the published cost).
+    """
+
+    n: int
+    whole: float
+    tets: float
+    size: float
+
+
+class Tree(NamedTuple):
+    """The merges (n - 1, 2), the lower number first, and the cost (n - 1,) of each."""
+
+    merges: Any
+    cost: Any
+
+
 @numba.njit(cache=True, nogil=True)
 def _five_points(xyz: Array, rows: Any) -> float:
     """Return the volume of the hull of five points: the positive of the tets that leave one out fill it, and so do the
@@ -75,8 +102,9 @@ def _five_points(xyz: Array, rows: Any) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, whole: float, size: float) -> float:
+def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, measure: Measure) -> float:
     """Return what orders merges, the cost or a number that rises with it; from a bound of the hull, a bound of it."""
+    whole, size = measure.whole, measure.size
     grains = (hull - va - vb) / (GRAIN * whole)
     hollow: float = GRAIN * max(0.0, np.rint(grains if exact else grains - 1e-3))
     if size >= 0:
@@ -90,31 +118,34 @@ def merge_all(
     xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
     tolerance: float, size: float, stand_ins: StandIns,
 ) -> tuple[Any, Array, Array, Array]:  # fmt: skip
-    """Return merges, cost, volume and hull of every node."""
+    """Return merges (n - 1, 2), the cost (n - 1,) of each, and volume and hull (2 n - 1,) of every node, leaves first.
+
+    xyz            (V, 3) points, in any unit of length
+    start, member  numbers of the points of leaf k: member[start[k]:start[k + 1]]
+    leaf_volume, leaf_tets, leaf_group  (n,)
+    ends           (E, 2) leaves that touch
+    size           weight of a union's size in the cost; below zero: the published cost
+    """
     n = len(leaf_volume)
     merges, cost, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), (0, n - 1)
     volume, tets = np.pad(leaf_volume, more), np.pad(leaf_tets, more)
     group, gone, head = np.pad(leaf_group, more), np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
     latest = np.full((2 * n - 1, 2), -1, np.int32)
     clusters = Clusters(volume, np.zeros(2 * n - 1), tets, group, gone, head, latest)
-    hulls, work = hulls_of(start, member, 2 * n - 1, len(xyz)), hull_work(len(xyz))
+    hulls = hulls_of(start, member, 2 * n - 1, len(xyz))
+    making, tree = Making(xyz, tolerance, hull_work(len(xyz)), stand_ins), Tree(merges, cost)
     edges = Edges(np.empty((len(ends), 4), np.int32), np.empty(len(ends)), np.zeros(len(ends), np.int8))
-    _begin(xyz, n, tolerance, clusters, hulls, ends, edges, work, stand_ins)
-    heap = empty_heap(len(ends))
-    made = _join_neighbours(
-        xyz, n, tolerance, size, clusters, hulls, edges, heap, work, room(), merges, cost, stand_ins
-    )
+    _begin(making, n, clusters, hulls, ends, edges)
+    made = _join_neighbours(making, n, size, clusters, hulls, edges, empty_heap(len(ends)), room(), tree)
     if made < n - 1:
-        _join_bodies(xyz, n, made, tolerance, clusters, hulls, work, merges, cost, stand_ins)
+        _join_bodies(making, n, made, clusters, hulls, tree)
     return merges, cost, volume, clusters.hull
 
 
 @numba.njit(cache=True, nogil=True)
-def _begin(
-    xyz: Array, n: int, tolerance: float, clusters: Clusters, hulls: Hulls, ends: Any, edges: Edges, work: HullWork,
-    stand_ins: StandIns,
-) -> None:  # fmt: skip
+def _begin(making: Making, n: int, clusters: Clusters, hulls: Hulls, ends: Any, edges: Edges) -> None:
     """Find the hulls of the first clusters and hang their edges on them."""
+    xyz, tolerance, work, stand_ins = making
     volume, hull, head, end = clusters.volume, clusters.hull, clusters.head, edges.end
     for k in range(n):
         if hulls.length[k] == 4:
@@ -131,18 +162,18 @@ def _begin(
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _priced(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, whole: float, size: float) -> int:
+def _priced(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, measure: Measure) -> int:
     """Put an edge where its key belongs in the heap; return how many there are."""
     a, b = edges.end[e, 0], edges.end[e, 1]
     volume, tets = clusters.volume, clusters.tets
-    key = _key(edges.known[e], edges.stage[e] == _EXACT, volume[a], volume[b], tets[a], tets[b], whole, size)
+    key = _key(edges.known[e], edges.stage[e] == _EXACT, volume[a], volume[b], tets[a], tets[b], measure)
     return int(settle(heap.edge, heap.order, heap.place, heaped, e, key, volume[a] + volume[b]))
 
 
 @numba.njit(cache=True, nogil=True)
 def _join_neighbours(
-    xyz: Array, n: int, tolerance: float, size: float, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges,
-    full_heap: Heap, work: HullWork, space: Room, merges: Any, cost: Array, stand_ins: StandIns,
+    making: Making, n: int, size: float, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges, full_heap: Heap,
+    space: Room, tree: Tree,
 ) -> int:  # fmt: skip
     """Join clusters that touch, always the two of least cost; return how often."""
     c, h, d, p = all_clusters, all_hulls, all_edges, full_heap
@@ -157,12 +188,13 @@ def _join_neighbours(
     edges = Edges(borrowed(d.end), borrowed(d.known), borrowed(d.stage))
     heap = Heap(borrowed(p.edge), borrowed(p.order), borrowed(p.place))
     end, stage, group = edges.end, edges.stage, clusters.group
-    whole, in_all = clusters.volume[:n].sum(), float(clusters.tets[:n].sum())
+    measure = Measure(n, clusters.volume[:n].sum(), float(clusters.tets[:n].sum()), size)
+    xyz, tolerance, work, stand_ins = making
     across, made, heaped, stamp = False, integer(0), integer(0), integer(1)
     last, kept = integer(-1), integer(0)  # the edge whose hull was made last, and its number of vertices
     for e in range(len(end)):
         if group[end[e, 0]] == group[end[e, 1]]:
-            heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+            heaped = _priced(clusters, edges, heap, heaped, e, measure)
     while made < n - 1:
         if heaped == 0:
             if across:
@@ -170,24 +202,24 @@ def _join_neighbours(
             across = True
             for e in range(len(end)):
                 if stage[e] != _GONE:
-                    heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+                    heaped = _priced(clusters, edges, heap, heaped, e, measure)
             continue
         e = integer(heap.edge[0])
         if stage[e] == _HELD:
             stamp = _grow(xyz, clusters, hulls, edges, e, space, stamp)
-            heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+            heaped = _priced(clusters, edges, heap, heaped, e, measure)
         elif stage[e] == _GROWN:
             count = both(hulls, end[e, 0], end[e, 1])
             edges.known[e], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
             stage[e], last = _EXACT, e
-            heaped = _priced(clusters, edges, heap, heaped, e, whole, size)
+            heaped = _priced(clusters, edges, heap, heaped, e, measure)
         else:
-            _note(clusters, edges, e, heap.order[0, 0], n, made, in_all, size, merges, cost)
+            _note(clusters, edges, e, heap.order[0, 0], made, measure, tree)
             if last != e:
-                kept = _hull_again(xyz, hulls, end[e, 0], end[e, 1], tolerance, work, stand_ins)
+                kept = _hull_again(making, hulls, end[e, 0], end[e, 1])
             last = integer(-1)
             keep(hulls, n + made, clusters.gone, work.point, work.stack, kept, clusters.hull[n + made] > 0)
-            heaped = _hand_over(clusters, edges, heap, heaped, e, n, made, across, whole, size)
+            heaped = _hand_over(clusters, edges, heap, heaped, e, made, across, measure)
             made += 1
     return int(made)
 
@@ -211,34 +243,25 @@ def _grow(xyz: Array, clusters: Clusters, hulls: Hulls, edges: Edges, e: int, sp
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _note(
-    clusters: Clusters,
-    edges: Edges,
-    e: int,
-    key: float,
-    n: int,
-    made: int,
-    in_all: float,
-    size: float,
-    merges: Any,
-    cost: Array,
-) -> None:
+def _note(clusters: Clusters, edges: Edges, e: int, key: float, made: int, measure: Measure, tree: Tree) -> None:
     """Make a cluster of the ends of an edge."""
-    a, b, c = edges.end[e, 0], edges.end[e, 1], n + made
+    a, b, c = edges.end[e, 0], edges.end[e, 1], measure.n + made
+    (merges, cost), in_all = tree, measure.tets
     volume, tets, group = clusters.volume, clusters.tets, clusters.group
     merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
     volume[c], tets[c], clusters.hull[c] = volume[a] + volume[b], tets[a] + tets[b], edges.known[e]
     group[c] = group[a] if group[a] == group[b] else -1
     clusters.gone[a] = clusters.gone[b] = True
-    if size >= 0:
+    if measure.size >= 0:
         cost[made] = key
     else:
         cost[made] = 1 + edges.known[e] - volume[a] - volume[b] if key > 0 else -1.0 / (key * in_all * in_all)
 
 
 @numba.njit(cache=True, nogil=True)
-def _hull_again(xyz: Array, hulls: Hulls, a: int, b: int, tolerance: float, work: HullWork, stand_ins: StandIns) -> int:
+def _hull_again(making: Making, hulls: Hulls, a: int, b: int) -> int:
     """Make the hull of two clusters, which was made before, or is that of five points; return its vertices."""
+    xyz, tolerance, work, stand_ins = making
     count = both(hulls, a, b)
     if count == 5:
         five_faces(xyz, hulls.rows, work.point, work.stack)
@@ -248,12 +271,11 @@ def _hull_again(xyz: Array, hulls: Hulls, a: int, b: int, tolerance: float, work
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
 def _hand_over(
-    clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, n: int, made: int, across: bool, whole: float,
-    size: float,
-) -> int:  # fmt: skip
+    clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, made: int, across: bool, measure: Measure
+) -> int:
     """Give the edges of two clusters to the one made of them, two to one cluster as one; return the heap's size."""
     end, known, stage = edges.end, edges.known, edges.stage
-    head, latest, group, c = clusters.head, clusters.latest, clusters.group, n + made
+    head, latest, group, c = clusters.head, clusters.latest, clusters.group, measure.n + made
     stage[e] = _GONE
     heaped = remove(heap.edge, heap.order, heap.place, heaped, e)
     for node in (integer(end[e, 0]), integer(end[e, 1])):
@@ -279,17 +301,16 @@ def _hand_over(
         known[f] = max(known[f], clusters.hull[c])
         stage[f] = _HELD
         if across or group[c] == group[end[f, 1 - side]]:
-            heaped = _priced(clusters, edges, heap, heaped, f, whole, size)
+            heaped = _priced(clusters, edges, heap, heaped, f, measure)
         half = integer(end[f, 2 + side])
     return heaped
 
 
 @numba.njit(cache=True, nogil=True)
-def _join_bodies(
-    xyz: Array, n: int, made: int, tolerance: float, clusters: Clusters, hulls: Hulls, work: HullWork,
-    merges: Any, cost: Array, stand_ins: StandIns,
-) -> None:  # fmt: skip
+def _join_bodies(making: Making, n: int, made: int, clusters: Clusters, hulls: Hulls, tree: Tree) -> None:
     """Join separate bodies: always the two of least volume, until one is left."""
+    xyz, tolerance, work, stand_ins = making
+    merges, cost = tree
     volume, gone = clusters.volume, clusters.gone
     bodies = [(volume[k], k) for k in range(n + made) if not gone[k]]
     heapq.heapify(bodies)

@@ -27,27 +27,40 @@ MOST = 512
 _ROUNDING = 2e-14
 
 
-class Room(NamedTuple):
-    """Room for one hull of up to MOST points.
-
-    x, y, z         the points, from the lower corner of their box
-    nx, ny, nz, of  of each face: its normal, twice the area long; the product of that with a corner
-    height          of a point above each face, times the normal's length
-    corner          (4 MOST, 3) of each face, numbers of points
-    seen            faces below the point that is joined
-    rim             (4 MOST, 2) edges of their border
-    edge            (MOST^2,) the last point joined that saw a face with this edge, from and to
-    """
+class Points(NamedTuple):
+    """The points of a hull (MOST,), from the lower corner of their box."""
 
     x: Any
     y: Any
     z: Any
+
+
+class Faces(NamedTuple):
+    """The faces of a hull, up to 4 MOST.
+
+    nx, ny, nz, of  of each: its normal, twice the area long; the product of that with a corner
+    corner          (4 MOST, 3) numbers of points
+    """
+
     nx: Any
     ny: Any
     nz: Any
     of: Any
-    height: Any
     corner: Any
+
+
+class Room(NamedTuple):
+    """Room for one hull of up to MOST points.
+
+    height  of a point above each face, times the normal's length
+    seen    faces below the point that is joined
+    rim     (4 MOST, 2) edges of their border
+    edge    (MOST^2,) the last point joined that saw a face with this edge, from and to
+    """
+
+    points: Points
+    faces: Faces
+    height: Any
     seen: Any
     rim: Any
     edge: Any
@@ -57,8 +70,9 @@ def room() -> Room:
     """Return room for the hulls of clusters."""
     n, m = MOST, 4 * MOST
     return Room(
-        np.empty(n), np.empty(n), np.empty(n), np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty(m),
-        np.empty((m, 3), np.int32), np.empty(m, np.int32), np.empty((m, 2), np.int32), np.zeros(n * n, np.int64),
+        Points(np.empty(n), np.empty(n), np.empty(n)),
+        Faces(np.empty(m), np.empty(m), np.empty(m), np.empty(m), np.empty((m, 3), np.int32)),
+        np.empty(m), np.empty(m, np.int32), np.empty((m, 2), np.int32), np.zeros(n * n, np.int64),
     )  # fmt: skip
 
 
@@ -72,22 +86,27 @@ def reach(
     hull      the volume of those faces
     stamp     a positive number; that of the next call in the same room is at least `count` larger
     """
-    x, y, z = borrowed(room.x), borrowed(room.y), borrowed(room.z)
-    nx, ny, nz, of = borrowed(room.nx), borrowed(room.ny), borrowed(room.nz), borrowed(room.of)
-    height, corner, seen = borrowed(room.height), borrowed(room.corner), borrowed(room.seen)
-    rim, edge = borrowed(room.rim), borrowed(room.edge)
-    noise = _placed(xyz, rows, count, x, y, z)
-    faces = integer(0)
+    room_p, room_f = room.points, room.faces
+    points = Points(borrowed(room_p.x), borrowed(room_p.y), borrowed(room_p.z))
+    faces = Faces(
+        borrowed(room_f.nx), borrowed(room_f.ny), borrowed(room_f.nz), borrowed(room_f.of),
+        borrowed(room_f.corner),
+    )  # fmt: skip
+    x, y, z = points
+    nx, ny, nz, of, corner = faces
+    height, seen, rim, edge = borrowed(room.height), borrowed(room.seen), borrowed(room.rim), borrowed(room.edge)
+    noise = _placed(xyz, rows, count, points)
+    made = integer(0)
     for f in range(at, at + 3 * (2 * length - 4), 3):
         if face[f] >= 0:
-            _plane(x, y, z, nx, ny, nz, of, corner, faces, integer(face[f]), face[f + 1], face[f + 2])
-            faces += 1
+            _plane(points, faces, made, integer(face[f]), face[f + 1], face[f + 2])
+            made += 1
     grown = 0.0
     for p in range(length, count):
         px, py, pz = x[p], y[p], z[p]
-        for f in range(faces):
+        for f in range(made):
             height[f] = nx[f] * px + ny[f] * py + nz[f] * pz - of[f]
-        above, gain = _above(height, seen, faces, noise)
+        above, gain = _above(height, seen, made, noise)
         if above > 0:
             grown += gain
             rims = _border(corner, seen, above, rim, edge, count, stamp + p)
@@ -95,20 +114,21 @@ def reach(
                 if i < above:
                     f = integer(seen[i])
                 else:
-                    f = faces
-                    faces += 1
-                _plane(x, y, z, nx, ny, nz, of, corner, f, integer(rim[i, 0]), rim[i, 1], p)
+                    f = made
+                    made += 1
+                _plane(points, faces, f, integer(rim[i, 0]), rim[i, 1], p)
             for i in range(above - 1, rims - 1, -1):  # fewer faces than before: the last fill the holes
                 f = integer(seen[i])
-                faces -= 1
-                nx[f], ny[f], nz[f], of[f] = nx[faces], ny[faces], nz[faces], of[faces]
-                corner[f, 0], corner[f, 1], corner[f, 2] = corner[faces, 0], corner[faces, 1], corner[faces, 2]
+                made -= 1
+                nx[f], ny[f], nz[f], of[f] = nx[made], ny[made], nz[made], of[made]
+                corner[f, 0], corner[f, 1], corner[f, 2] = corner[made, 0], corner[made, 1], corner[made, 2]
     return hull + grown / 6
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _placed(xyz: Array, rows: Any, count: int, x: Array, y: Array, z: Array) -> float:
+def _placed(xyz: Array, rows: Any, count: int, points: Points) -> float:
     """Write the points from the lower corner of their box; return the rounding of a determinant of them."""
+    x, y, z = points
     low_x = low_y = low_z = np.inf
     high_x = high_y = high_z = -np.inf
     for p in range(count):
@@ -124,21 +144,10 @@ def _placed(xyz: Array, rows: Any, count: int, x: Array, y: Array, z: Array) -> 
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _plane(
-    x: Array,
-    y: Array,
-    z: Array,
-    nx: Array,
-    ny: Array,
-    nz: Array,
-    of: Array,
-    corner: Any,
-    f: int,
-    a: int,
-    b: int,
-    c: int,
-) -> None:
+def _plane(points: Points, faces: Faces, f: int, a: int, b: int, c: int) -> None:
     """Make face f of three points."""
+    x, y, z = points
+    nx, ny, nz, of, corner = faces
     corner[f, 0], corner[f, 1], corner[f, 2] = a, b, c
     ax, ay, az = x[a], y[a], z[a]
     ux, uy, uz = x[b] - ax, y[b] - ay, z[b] - az

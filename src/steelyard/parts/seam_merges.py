@@ -203,7 +203,10 @@ def _next_pair(
 def merge(
     xyz: Array, at: Clusters, hulls: Hulls, tolerance: float, work: HullWork, stand_ins: StandIns
 ) -> tuple[Any, Array, Array, Array, Array]:
-    """Return merges, cost, seam, volume and hull of every node; `hulls` holds the vertices of the leaves."""
+    """Return merges (n - 1, 2) with cost and seam (n - 1,) of each, and volume and hull (2 n - 1,) of every node.
+
+    xyz (V, 3); `hulls` holds the vertices of the leaves.
+    """
     n = len(at.alive)
     merges, gone = np.empty((n - 1, 2), np.int64), np.zeros(2 * n - 1, np.bool_)
     cost, seam = np.empty(n - 1), np.empty(n - 1)

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from steelyard.evidence import PartMass
 from steelyard.findings import counted
-from steelyard.identify.estimate import PartMass
 from steelyard.report.contents import Report
 from steelyard.report.drawing import colours_of
 from steelyard.report.markup import Html, joined, tag

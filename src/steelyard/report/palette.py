@@ -26,7 +26,7 @@ def part_colour(number: int) -> tuple[int, int, int]:
 
 
 def density_colours(density: Array) -> list[tuple[int, int, int]]:
-    """Return a colour for each density, on a logarithmic scale from the lowest to the highest."""
+    """Return a colour for each density (P,), on a logarithmic scale from the lowest to the highest."""
     logs = np.log(np.maximum(density, 1e-6))
     low, high = logs.min(initial=np.inf), logs.max(initial=-np.inf)
     place = (logs - low) / (high - low) * (len(_SCALE) - 1) if high - low > 1e-9 else np.full(len(logs), 2.0)

@@ -28,27 +28,12 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str, rm
     time = residuals.time
     start, length = float(time[0]), max(float(time[-1] - time[0]), 1e-9)
     column = np.clip(((time - start) / length * COLUMNS).astype(np.int64), 0, COLUMNS - 1)
-    used, place = np.unique(column, return_inverse=True)
-    low, high = np.full((len(used), 3), np.inf), np.full((len(used), 3), -np.inf)
-    np.minimum.at(low, place, values)
-    np.maximum.at(high, place, values)
-    top = max(float(np.abs([low, high]).max()), 1e-12)
+    top = max(float(np.abs(values).max()), 1e-12)
     step = round_step(top)
     reach = step * np.ceil(top / step - 1e-9) * 1.06
-    x = used + 0.5
-
-    def y(v: Array) -> Array:
-        return np.asarray(50 - 50 * v / reach)
-
-    layers = [*_still_bands(residuals, start, length)]
-    for k, axis in enumerate("xyz"):
-        edge = np.concatenate([np.stack([x, y(high[:, k])], 1), np.stack([x, y(low[:, k])], 1)[::-1]])
-        layers.append(tag("polygon", points=_points(edge), class_=f"band {axis}"))
-    for k, axis in enumerate("xyz"):
-        middle, mean = _means(column, values[:, k])
-        layers.append(tag("polyline", points=_points(np.stack([middle, y(mean)], 1)), class_=f"curve {axis}"))
     inner = tag(
-        "svg", *layers, x=0, y=_TOP, width="100%", height=_HEIGHT - _TOP - _BOTTOM,
+        "svg", *_still_bands(residuals, start, length), *_curves(column, values, reach),
+        x=0, y=_TOP, width="100%", height=_HEIGHT - _TOP - _BOTTOM,
         viewBox=f"0 0 {COLUMNS} 100", preserveAspectRatio="none",
     )  # fmt: skip
     each = [f" {general(r)} {unit}" if rms is None else "" for r in np.sqrt((values**2).mean(0))]
@@ -64,6 +49,26 @@ def residual_plot(residuals: Residuals, values: Array, unit: str, title: str, rm
             aria_label=f"{title}: residuals over time, at most {general(top)} {unit}",
         ),
     )  # fmt: skip
+
+
+def _curves(column: Integers, values: Array, reach: float) -> list[Html]:
+    """Return a band from lowest to highest of each column for every axis, and the means over it."""
+    used, place = np.unique(column, return_inverse=True)
+    low, high = np.full((len(used), 3), np.inf), np.full((len(used), 3), -np.inf)
+    np.minimum.at(low, place, values)
+    np.maximum.at(high, place, values)
+    x = used + 0.5
+
+    def y(v: Array) -> Array:
+        return np.asarray(50 - 50 * v / reach)
+
+    bands, means = [], []
+    for k, axis in enumerate("xyz"):
+        edge = np.concatenate([np.stack([x, y(high[:, k])], 1), np.stack([x, y(low[:, k])], 1)[::-1]])
+        bands.append(tag("polygon", points=_points(edge), class_=f"band {axis}"))
+        middle, mean = _means(column, values[:, k])
+        means.append(tag("polyline", points=_points(np.stack([middle, y(mean)], 1)), class_=f"curve {axis}"))
+    return bands + means
 
 
 def _means(column: Integers, values: Array) -> tuple[Array, Array]:

@@ -28,7 +28,7 @@ def turned_view(frame: Frame) -> Array:
 
 
 def picture(scene: Scene, colours: dict[int, tuple[int, int, int]], com: Array | None) -> Html:
-    """Return the parts as an SVG: triangles from far to near, lit from above left; the centre of mass as a mark."""
+    """Return the parts as an SVG: triangles from far to near, lit from above left; `com` (3,) [m] as a mark."""
     view = turned_view(Frame.of(scene))
     corners, fill = _lit(scene, colours, view)
     if not len(corners):

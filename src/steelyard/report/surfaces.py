@@ -45,13 +45,13 @@ def evened(vertices: Array, triangles: Integers) -> Array:
 
 
 def compact(vertices: Array, triangles: Integers) -> tuple[Array, Integers]:
-    """Return only the vertices that are used."""
+    """Return the vertices (V, 3) that triangles (T, 3) use, and the triangles in numbers of these."""
     used, corners = np.unique(triangles, return_inverse=True)
     return vertices[used], corners.reshape(-1, 3)
 
 
 def thinned(vertices: Array, triangles: Integers, most: int) -> tuple[Array, Integers]:
-    """Return a surface of at most `most` triangles: vertices in one cell of a grid become their mean.
+    """Return vertices (V, 3), triangles (T, 3) of at most `most`: vertices in one cell of a grid become their mean.
 
     The grid is as fine as it can be to a fifth; a surface that is small enough is returned as it is.
     """

@@ -53,7 +53,7 @@ class Motion(Protocol):
 
 
 def minimum_jerk(s: Array) -> tuple[Array, Array, Array]:
-    """Return 10 s^3 - 15 s^4 + 6 s^5 and its first two derivatives in s, s clipped to 0..1."""
+    """Return 10 s^3 - 15 s^4 + 6 s^5 and its first two derivatives in s (N,), s clipped to 0..1."""
     s = np.clip(s, 0.0, 1.0)
     value = s**3 * (10 + s * (-15 + 6 * s))
     slope = 30 * s**2 * (1 - s) ** 2

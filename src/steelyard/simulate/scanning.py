@@ -13,7 +13,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import TriangleMesh, part_moments
-from steelyard.shape.views import Intrinsics, Views
+from steelyard.shape.views import Depths, Intrinsics, Views
 from steelyard.simulate.camera import D435, VIEWS, DepthNoise, disturbed, wrist_arc
 from steelyard.spatial import Pose, Rotation, unit_vectors
 
@@ -71,17 +71,7 @@ def scan_mesh(
     target = np.array([*(low + high)[:2] / 2, 0.4 * high[2]] if aim is None else aim)
     distance = distance or max(_CLOSEST, _FILL * float(np.linalg.norm(high - low)))
     X_WC = wrist_arc(target, distance, count, start=rng.uniform(0, 360))
-    size = (intrinsics.height, intrinsics.width)
-    depth, rgb = np.zeros((count, *size), np.uint16), np.zeros((count, *size, 3), np.uint8)
-    exact = np.zeros_like(depth)
-    colour = _shaded(placed)
-    for k in range(count):
-        z, cosine, rgb[k] = render(placed, colour, intrinsics, X_WC[k])
-        exact[k] = np.minimum(np.round(z / depth_unit), 65535)
-        if noise is not None:
-            z = _measured(z, cosine, noise, rng)
-            rgb[k] = _grainy(rgb[k], noise.rgb, rng)
-        depth[k] = np.minimum(np.round(z / depth_unit), 65535)
+    depth, exact, rgb = _images(placed, intrinsics, X_WC, depth_unit, noise, rng)
     reported = disturbed(X_WC, *pose_std, rng) if any(pose_std) else X_WC
     return Scanned(
         Views(depth, rgb, intrinsics, reported, depth_unit),
@@ -89,6 +79,28 @@ def scan_mesh(
         X_WO,
         X_WC,
     )
+
+
+def _images(
+    placed: TriangleMesh,
+    intrinsics: Intrinsics,
+    X_WC: Pose,
+    depth_unit: float,
+    noise: DepthNoise | None,
+    rng: np.random.Generator,
+) -> tuple[Depths, Depths, Colours]:
+    """Return the depth (V, H, W) of every view as measured and as it is, in `depth_unit`, and the colours."""
+    size = (len(X_WC.position), intrinsics.height, intrinsics.width)
+    depth, exact, rgb = np.zeros(size, np.uint16), np.zeros(size, np.uint16), np.zeros((*size, 3), np.uint8)
+    colour = _shaded(placed)
+    for k in range(size[0]):
+        z, cosine, rgb[k] = render(placed, colour, intrinsics, X_WC[k])
+        exact[k] = np.minimum(np.round(z / depth_unit), 65535)
+        if noise is not None:
+            z = _measured(z, cosine, noise, rng)
+            rgb[k] = _grainy(rgb[k], noise.rgb, rng)
+        depth[k] = np.minimum(np.round(z / depth_unit), 65535)
+    return depth, exact, rgb
 
 
 def resting_pose(mesh: TriangleMesh, yaw: float = 0.0) -> Pose:

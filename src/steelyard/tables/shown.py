@@ -3,14 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import TYPE_CHECKING, Any, Protocol, runtime_checkable
+from typing import Any, Protocol, runtime_checkable
 
 from steelyard.check import Array, Mask
+from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-
-if TYPE_CHECKING:
-    from steelyard.identify.evidence import Evidence, PartMass
 
 
 class Weighed(Protocol):

@@ -7,7 +7,7 @@ from collections.abc import Mapping
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.estimate import Evidence
+from steelyard.evidence import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import people_jacobian
 from steelyard.inertia.parameters import frame_change

@@ -13,8 +13,8 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
+from steelyard.evidence import Evidence
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Evidence
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import people_jacobian
 from steelyard.logs.team_conditioning import all_conditioned

@@ -76,7 +76,7 @@ def reweighted(T: Array, scatter: Array, acceleration: Array, wrench: Array, pas
 
 
 def loosest(linear: Array) -> Array:
-    """Return the information (p, p) that keeps a body within the sizes that held ones have; it hardly pulls."""
+    """Return the information (p, p) that keeps a body `linear` (p,) within the sizes of held ones; it hardly pulls."""
     mass = max(abs(float(linear[0])), LIGHTEST)
     out = np.zeros((len(linear), len(linear)))
     out[_DIAGONAL, _DIAGONAL] = np.repeat([HEAVIEST, mass * FARTHEST, mass * LOOSEST_RADIUS**2], [1, 3, 6]) ** -2
@@ -93,7 +93,7 @@ def fitted(H: Array, prior: Array) -> float:
 
 @numba.njit(cache=True)
 def inverse_scaled(matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
-    """Return the pseudo-inverse of a symmetric matrix after scaling it to a unit diagonal.
+    """Return the pseudo-inverse of a symmetric matrix (p, p) after scaling it to a unit diagonal.
 
     tolerance  directions with an eigenvalue below this share of the largest are left at zero
     """
@@ -121,7 +121,7 @@ def inverse_scaled(matrix: Array, tolerance: float = RANK_TOLERANCE) -> Array:
 
 @numba.njit(cache=True)
 def nonnegative(matrix: Array, reference: Array) -> Array:
-    """Return a symmetric matrix with negative eigenvalues set to zero, scaled by the diagonal of `reference`.
+    """Return a symmetric matrix (p, p), negative eigenvalues set to zero, scaled by the diagonal of `reference` (p, p).
 
     Noise taken out of a scatter matrix leaves directions that the log does not excite slightly below zero.
     """

@@ -9,6 +9,8 @@ centre and size profiled out); the second a wide log-normal pull of the radius o
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -31,6 +33,35 @@ HALVINGS = 30
 # theta = [alpha, d1, d2, d3, s12, s23, s13, t1, t2, t3]: where each sits in U.
 _ROW = np.array([0, 0, 1, 2, 0, 1, 0, 0, 1, 2])
 _COLUMN = np.array([0, 0, 1, 2, 1, 2, 2, 3, 3, 3])
+
+
+class Rows(NamedTuple):
+    """What a log says, with its noise.
+
+    T                     (p, 6, Z) design of the linear parameters, p = 10 or 16 with the wrench bias
+    scatter               (C, Z, Z) scatter matrix of every noise class
+    acceleration, wrench  (C, 6) variances of a class: moment or angular part first
+    """
+
+    T: Array
+    scatter: Array
+    acceleration: Array
+    wrench: Array
+
+
+class Priors(NamedTuple):
+    """What is taken to hold beforehand.
+
+    gamma                 weight of the entropic term
+    log_size, precision   log of the radius of gyration [m], with the inverse of its variance
+    bias, bias_precision  mean (6,) and inverse covariance (6, 6) of the wrench bias, moment first [N m, N]
+    """
+
+    gamma: float
+    log_size: float
+    precision: float
+    bias: Array
+    bias_precision: Array
 
 
 @numba.njit(cache=True)
@@ -166,32 +197,23 @@ def linear_of(u: Array) -> Array:
     return out
 
 
-def cost_derivatives(
-    u: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array,
-) -> tuple[float, Array, Array]:  # fmt: skip
-    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias] (p,), where p is 10 or 16.
-
-    T                     (p, 6, Z) design of the linear parameters
-    scatter               (C, Z, Z) scatter matrix of every noise class
-    acceleration, wrench  (C, 6) variances of a class: moment or angular part first
-    bias, bias_precision  mean (6,) and inverse covariance (6, 6) of the prior of the bias, moment first [N m, N]
-    """
+def cost_derivatives(u: Array, rows: Rows, priors: Priors) -> tuple[float, Array, Array]:
+    """Return Q/2 + priors with gradient (p,) and Hessian (p, p) in u = [theta, bias] (p,), where p is 10 or 16."""
     U = factor(u)
-    Q, g, H = derivatives(residual_map_of(T, linear_of(u)), T, scatter, acceleration, wrench)
+    Q, g, H = derivatives(residual_map_of(rows.T, linear_of(u)), *rows)
     J = np.eye(len(u))
     J[:10, :10] = jacobian(u, U)
-    prior, prior_gradient, prior_hessian = shape_prior(u, gamma, log_size, precision)
+    prior, prior_gradient, prior_hessian = shape_prior(u, priors.gamma, priors.log_size, priors.precision)
     gradient, hessian = 0.5 * (J.T @ g), 0.5 * (J.T @ H @ J)
     gradient[:10] += prior_gradient
     hessian[:10, :10] += 0.5 * _curvature(u, U, g) + prior_hessian
     total = 0.5 * Q + prior
     if len(u) > 10:
-        off = u[10:16] - bias
-        pull = bias_precision @ off
+        off = u[10:16] - priors.bias
+        pull = priors.bias_precision @ off
         total += 0.5 * float(off @ pull)
         gradient[10:16] += pull
-        hessian[10:16, 10:16] += bias_precision
+        hessian[10:16, 10:16] += priors.bias_precision
     return total, gradient, hessian
 
 
@@ -214,30 +236,24 @@ def _downhill(gradient: Array, hessian: Array) -> Array:
     return step
 
 
-def minimise(
-    start: Array, T: Array, scatter: Array, acceleration: Array, wrench: Array,
-    gamma: float, log_size: float, precision: float, bias: Array, bias_precision: Array, iterations: int,
-) -> tuple[Array, float, bool]:  # fmt: skip
+def minimise(start: Array, rows: Rows, priors: Priors, iterations: int) -> tuple[Array, float, bool]:
     """Return the minimum u (p,), its cost and whether Newton converged, from `start` (p,) by damped Newton steps.
-
-    The data and priors are those of `cost_derivatives`.
 
     A Hessian that is not positive definite has its negative curvatures turned round (saddle-free Newton); the step is
     kept within a trust length of 1 in log coordinates and halved until the cost falls.
     """
-    data = (T, scatter, acceleration, wrench, gamma, log_size, precision, bias, bias_precision)
     u = start
-    current, gradient, hessian = cost_derivatives(u, *data)
+    current, gradient, hessian = cost_derivatives(u, rows, priors)
     for _ in range(iterations):
         step = _downhill(gradient, hessian)
         fall = -float(gradient @ step)
         if 0.5 * fall < NEAR:
-            current, gradient, hessian = cost_derivatives(u + step, *data)
+            current, gradient, hessian = cost_derivatives(u + step, rows, priors)
             return u + step + _downhill(gradient, hessian), current, True
         share = 1 / max(1.0, float(np.abs(step[:7]).max()))
         for _ in range(HALVINGS):
             trial, least = u + share * step, current - 1e-4 * share * abs(fall)
-            now, gradient, hessian = cost_derivatives(trial, *data)
+            now, gradient, hessian = cost_derivatives(trial, rows, priors)
             if now < least or now < current - 1e-10 * abs(current):
                 break
             share *= 0.5

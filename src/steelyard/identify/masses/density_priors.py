@@ -85,7 +85,7 @@ def _cost(
 
 @numba.njit(cache=True)
 def log_det(matrix: Array) -> float:
-    """Return log det of a symmetric matrix, with eigenvalues kept above zero."""
+    """Return log det of a symmetric matrix (n, n), with eigenvalues kept above zero."""
     low, positive = cholesky(matrix, FLATTEST)
     total = 0.0
     if positive:
@@ -129,7 +129,7 @@ def spread_masses(volume: Array, group: Integers, y: Array, hessian: Array, mass
 
 @numba.njit(cache=True)
 def partition_prior(group: Integers, G: int) -> float:
-    """Return the log probability of a partition in a Chinese restaurant with concentration one."""
+    """Return the log probability of G groups, `group` (P,), in a Chinese restaurant with concentration one."""
     P = len(group)
     total = 0.0
     for k in range(1, P + 1):
@@ -145,7 +145,7 @@ def partition_prior(group: Integers, G: int) -> float:
 
 @numba.njit(cache=True)
 def canonical(group: Integers) -> tuple[Integers, int]:
-    """Return the partition with groups numbered in the order of their first part, and their number."""
+    """Return the partition (P,) with groups numbered in the order of their first part, and their number."""
     out, seen = np.empty(len(group), np.int64), np.zeros(len(group) + 1, np.int64)
     G = 0
     for k in range(len(group)):

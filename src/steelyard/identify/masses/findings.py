@@ -130,7 +130,7 @@ def _material_findings(
 
 
 def seen_rank(parts: Parts, information: Array, mass: float) -> int:
-    """Return how many combinations of part masses the data fix to half of the whole mass."""
+    """Return how many combinations of part masses information (10, 10) fixes to half of the whole `mass` [kg]."""
     A = parts.per_mass.T @ information @ parts.per_mass
     return int((np.linalg.eigvalsh(A) > (SEEN_SHARE * mass) ** -2).sum())
 

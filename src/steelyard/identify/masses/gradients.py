@@ -104,16 +104,15 @@ class Search:
         variance = np.tile(_widths(width) ** 2, len(free))
         chance = len(free) * np.log(COMMON) + (P - len(free)) * np.log(1 - COMMON)
         chance -= np.log(len(density_priors.LADDER)) + (np.log(len(LADDER)) if free else 0.0)
-        points = _stacked([self.profile(k) for k in free])
+        freed = tilting.Free(np.array(free, np.int64), variance, *_stacked([self.profile(k) for k in free]))
         data = (self.data.information, self.data.pull, self.parts.per_mass, self.parts.volume)
         out: list[Fit] = []
         tilts = tilts.ravel()
         for level in range(len(density_priors.LADDER) - 1, -1, -1):
             near = density_priors.LADDER[level] ** 2
             precision = density_priors.apart(P, near, wide)
-            y, tilts, cost, curve, hessian, J, phi = tilting.fitted(
-                *data, precision, density_priors.CENTRE, np.array(free, np.int64), variance, *points, y, tilts
-            )
+            seen = tilting.Seen(*data, precision, density_priors.CENTRE)
+            y, tilts, cost, curve, hessian, J, phi = tilting.fitted(seen, freed, y, tilts)
             evidence = tilting.evidence_of(cost, hessian, curve, near, wide, P, variance) + chance
             out.append(
                 Fit(free, width, level, y, tilts.reshape(len(free), FEATURES), phi, J, hessian, curve, float(evidence))

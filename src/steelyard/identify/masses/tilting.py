@@ -8,6 +8,8 @@ Source: own; the score test is Rao's (1948).
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numba
 import numpy as np
 
@@ -22,6 +24,38 @@ STEPS, HALVINGS, FALL = 40, 12, 1e-3
 LONGEST_DENSITY, LONGEST_TILT = 1.0, 0.7
 # A tilt beyond this puts the whole part into one point.
 STEEPEST = 30.0
+
+
+class Seen(NamedTuple):
+    """What a log and the priors of densities say of P parts.
+
+    information, pull  (10, 10) and (10,) of the log: its cost is 1/2 phi^T F phi - pull^T phi
+    per_mass           (10, P) the parameters of a kilogram of each part, its density even
+    volume             (P,) [m^3]
+    precision, centre  (P, P) of the log densities, and their mean
+    """
+
+    information: Array
+    pull: Array
+    per_mass: Array
+    volume: Array
+    precision: Array
+    centre: float
+
+
+class Free(NamedTuple):
+    """The f parts whose density may change within, by F tilts each.
+
+    row                         (f,) among all parts
+    variance                    (F f,) of the tilts
+    weight, features, per_mass  (f, N), (f, N, F), (f, N, 10) of N points in each
+    """
+
+    row: Integers
+    variance: Array
+    weight: Array
+    features: Array
+    per_mass: Array
 
 
 @numba.njit(cache=True, nogil=True)
@@ -51,21 +85,14 @@ def tilted(weight: Array, features: Array, per_mass: Array, tilt: Array) -> tupl
     return b, slope
 
 
-def fitted(
-    information: Array, pull: Array, B: Array, volume: Array, precision: Array, centre: float,
-    free: Integers, variance: Array, weight: Array, features: Array, per_mass: Array, y: Array, tilts: Array,
-) -> tuple[Array, Array, float, Array, Array, Array, Array]:  # fmt: skip
+def fitted(seen: Seen, free: Free, y: Array, tilts: Array) -> tuple[Array, Array, float, Array, Array, Array, Array]:
     """Return the mode y (P,), tilts (F f,), its cost, what masses bend it by (P,), the Hessian (q, q) without that,
-    d phi (10, q) and phi (10,), q = P + F f.
-
-    B (10, P) per kilogram of even parts; `free` (f,) rows of the free ones, and of these the `variance` (F f,) of
-    tilts, and points: weight (f, N), features (f, N, F), per_mass (f, N, 10). y, tilts: where to start.
+    d phi (10, q) and phi (10,), q = P + F f; y, tilts: where to start.
     """
-    P = len(volume)
-    data = (information, pull, B, volume, precision, centre, free, variance, weight, features, per_mass)
-    longest = np.repeat([LONGEST_DENSITY, LONGEST_TILT], [P, len(variance)])
+    P = len(seen.volume)
+    longest = np.repeat([LONGEST_DENSITY, LONGEST_TILT], [P, len(free.variance)])
     x = np.concatenate([y, tilts])
-    found = _cost(*data, x)
+    found = _cost(seen, free, x)
     for _ in range(STEPS):
         before, gradient, curve, hessian = found[:4]
         step = _solve(hessian, curve, gradient)
@@ -73,7 +100,7 @@ def fitted(
             break
         step /= max(1.0, float((np.abs(step) / longest).max()))
         for _ in range(HALVINGS):
-            trial = _cost(*data, x + step)
+            trial = _cost(seen, free, x + step)
             if trial[0] < before:
                 x, found = x + step, trial
                 break
@@ -85,21 +112,20 @@ def fitted(
 
 
 @numba.njit(cache=True, nogil=True)
-def _cost(
-    information: Array, pull: Array, B: Array, volume: Array, precision: Array, centre: float, free: Integers,
-    variance: Array, weight: Array, features: Array, per_mass: Array, x: Array,
-) -> tuple[float, Array, Array, Array, Array, Array]:  # fmt: skip
+def _cost(seen: Seen, free: Free, x: Array) -> tuple[float, Array, Array, Array, Array, Array]:
     """Return the cost at x = [y, tilts] (q,), its gradient (q,), what masses bend it by (P,), the Gauss-Newton Hessian,
     d phi and phi.
     """
+    information, pull, B, volume, precision, centre = seen
+    row, variance, weight, features, per_mass = free
     P, F, q = len(volume), features.shape[2], len(x)
     J, phi, mass = np.zeros((10, q)), np.zeros(10), np.empty(P)
     for k in range(P):
         mass[k] = volume[k] * np.exp(min(x[k], 20.0))
         for j in range(10):
             J[j, k] = mass[k] * B[j, k]
-    for f in range(len(free)):
-        k, first = free[f], P + f * F
+    for f in range(len(row)):
+        k, first = row[f], P + f * F
         b, slope = tilted(weight[f], features[f], per_mass[f], x[first : first + F])
         for j in range(10):
             J[j, k] = mass[k] * b[j]
@@ -108,11 +134,11 @@ def _cost(
     for j in range(10):
         for k in range(P):
             phi[j] += J[j, k]
-    seen, cost = times(information, phi), 0.0
+    pushed, cost = times(information, phi), 0.0
     for j in range(10):
-        cost += phi[j] * (0.5 * seen[j] - pull[j])
+        cost += phi[j] * (0.5 * pushed[j] - pull[j])
     back = transposed(J)
-    gradient, hessian = times(back, moved(seen, pull, -1.0)), product(back, product(information, J))
+    gradient, hessian = times(back, moved(pushed, pull, -1.0)), product(back, product(information, J))
     curve = gradient[:P].copy()
     off = np.empty(P)
     for k in range(P):
@@ -143,7 +169,10 @@ def _solve(hessian: Array, curve: Array, gradient: Array) -> Array:
 def evidence_of(
     cost: float, hessian: Array, curve: Array, spread: float, wide: float, parts: int, variance: Array
 ) -> float:
-    """Return Laplace's log evidence of a mode: densities `spread` apart about a common one known to `wide`."""
+    """Return Laplace's log evidence of a mode: densities `spread` apart about a common one known to `wide`.
+
+    hessian (q, q), curve (P,), variance (F f,) as `fitted` has them; `spread` and `wide` are variances of log density.
+    """
     prior = (parts - 1) * np.log(spread) + np.log(spread + parts * wide) + np.log(variance).sum()
     full = hessian.copy()
     full[range(parts), range(parts)] += curve

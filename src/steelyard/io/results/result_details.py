@@ -10,7 +10,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile
-from steelyard.identify.estimate import Evidence, PartMass
+from steelyard.evidence import Evidence, PartMass
 from steelyard.inertia import forms
 from steelyard.io.json_arrays import array_or_none
 

@@ -11,8 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.evidence import PartMass
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Estimate, PartMass
+from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.sanity.fitted.plausible import DENSEST
 

@@ -9,8 +9,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
+from steelyard.evidence import Evidence
 from steelyard.findings import Finding
-from steelyard.identify.estimate import Evidence
 from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.parameters import frame_change

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 
-from steelyard.bench.held_object_cases import exact_rows, load_case, noisy_rows
+from steelyard.bench.objects.cases import exact_rows, load_case, noisy_rows
 from steelyard.bench.timing import thread_ms
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate

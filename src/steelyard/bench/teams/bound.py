@@ -14,7 +14,7 @@ import numpy as np
 from scipy.fft import dct
 
 from steelyard.bench.asked import Progress
-from steelyard.bench.team_coverage import errors
+from steelyard.bench.teams.intervals import errors
 from steelyard.check import Array
 from steelyard.identify.people import people_jacobian
 from steelyard.identify.regressor import basis, motion_map

@@ -11,7 +11,7 @@ import numpy as np
 from scipy.linalg import null_space
 
 from steelyard.bench.pool import spread
-from steelyard.bench.team_events import TWISTS
+from steelyard.bench.teams.events import TWISTS
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import simulate_team

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from steelyard.bench.cuts import interior_points, slabs
+from steelyard.bench.objects.cuts import interior_points, slabs
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
@@ -30,7 +30,7 @@ from steelyard.shape.nesting import solids_of
 from steelyard.simulate.handling import STILL_ANGULAR_SPEED, STILL_SPEED, with_noise
 
 if TYPE_CHECKING:
-    from steelyard.bench.segmented import Segmented
+    from steelyard.bench.objects.segmented import Segmented
 
 PARTS = ("segmented", "truth", "truth-split", "truth-merged", "truth-merged-mixed")
 PART_METHODS = ("ours", "ours-still", "hps")
@@ -78,7 +78,7 @@ def load_case(folder: Path, parts: str) -> Case | None:
     masses = known.part_masses
     seen = None
     if parts == "segmented":
-        from steelyard.bench.segmented import segmented
+        from steelyard.bench.objects.segmented import segmented
 
         seen = segmented(known)
         chosen, masses = seen.parts, None

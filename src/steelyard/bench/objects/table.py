@@ -4,8 +4,8 @@ from __future__ import annotations
 
 from typing import Any
 
-from steelyard.bench.conditions import condition_lines
-from steelyard.bench.held_object_summary import HALVES
+from steelyard.bench.objects.conditions import condition_lines
+from steelyard.bench.objects.summary import HALVES
 from steelyard.bench.tables import block
 
 _COLUMNS = (

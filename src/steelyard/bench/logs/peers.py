@@ -16,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.methods import Method
+from steelyard.bench.logs.methods import Method
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.inertia import InertialParameters, solids

@@ -1,0 +1,1 @@
+"""What clusters, hulls and segments are held against: plain Python, sets of points, the table."""
