@@ -20,6 +20,7 @@ from steelyard.sanity import (
     drift_of,
     examine_body,
     examine_masses,
+    examine_motion,
     examine_sensor,
     examine_wrench_unit,
     row_noise,
@@ -80,6 +81,8 @@ def of_sensor_and_body(
     known  all that was found so far
     """
     estimate, found = examine_sensor(load.log, recording, estimate, known, load.bias.drift)
+    if not rows.unmeasured:
+        found = (*found, *examine_motion(load.log, (*known, *found)))
     if load.shape is None:
         size, noise = float(np.linalg.norm(recording.gravity)), row_noise(load.log, recording, "torque")
         found = (*found, *examine_body(estimate, (*known, *found), size, noise))

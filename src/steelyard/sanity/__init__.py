@@ -3,6 +3,7 @@
 from steelyard.sanity.after import after, drift_of, row_noise
 from steelyard.sanity.before import examine
 from steelyard.sanity.fitted.density import impossible_density, maybe_hollow
+from steelyard.sanity.fitted.free_motion import examine_motion
 from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import examine_place
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
@@ -22,6 +23,7 @@ __all__ = [
     "examine",
     "examine_body",
     "examine_masses",
+    "examine_motion",
     "examine_place",
     "examine_sensor",
     "examine_wrench_unit",
