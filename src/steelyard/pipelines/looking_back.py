@@ -16,6 +16,7 @@ from steelyard.pipelines.rows import FitRows
 from steelyard.sanity import (
     after,
     allow_filter,
+    allow_sag,
     allow_softness,
     drift_of,
     examine_body,
@@ -86,6 +87,7 @@ def of_sensor_and_body(
     if load.shape is None:
         size, noise = float(np.linalg.norm(recording.gravity)), row_noise(load.log, recording, "torque")
         found = (*found, *examine_body(estimate, (*known, *found), size, noise))
+        estimate = allow_sag(load.log, estimate, (*known, *found))
         if rows.aligned.acceleration_from in ENCODERS:
             estimate = allow_softness(load.log, estimate)
             estimate = allow_filter(load.log, estimate, rows.aligned.wrench_late_s)

@@ -7,6 +7,7 @@ from steelyard.sanity.fitted.free_motion import examine_motion
 from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import examine_place
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.fitted.sagging import allow_sag
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
 from steelyard.sanity.fitted.slow_sensor import allow_filter
 from steelyard.sanity.fitted.soft_arm import allow_softness
@@ -17,6 +18,7 @@ from steelyard.sanity.rows.frozen_rows import dead_channels
 __all__ = [
     "after",
     "allow_filter",
+    "allow_sag",
     "allow_softness",
     "dead_channels",
     "drift_of",

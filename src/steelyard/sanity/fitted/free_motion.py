@@ -11,7 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
@@ -23,8 +23,8 @@ EXPLAINED, SHARE = 0.25, 0.1
 _FEWEST_ROWS, _FEWEST_BLOCKS = 100, 6
 _TOLD = ELSEWHERE | {"sensor-turned", "gains-differ", "bias-drift"}
 _REMEDY = (
-    "Check the stamps, filters and smoothing of poses and wrench. In a simulator that damps joints implicitly (MuJoCo), "
-    "take the wrench of the acceleration that the step made."
+    "Check the stamps, filters and smoothing of poses and wrench. In a simulator that damps joints implicitly "
+    "(MuJoCo), take the wrench of the acceleration that the step made."
 )
 _KINDS = {"torque": slice(0, 3), "force": slice(3, 6)}
 
@@ -39,8 +39,8 @@ def examine_motion(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
     kind = max(followed, key=lambda k: followed[k])
     text = (
         f"What a body leaves of the {kind} follows the accelerations as that of no body does: they explain "
-        f"{100 * followed[kind]:.0f} % of it in stretches that were left out. The load was not accelerated as the poses "
-        "say, and the inertia does not hold."
+        f"{100 * followed[kind]:.0f} % of it in stretches that were left out. The load was not accelerated as the "
+        "poses say, and the inertia does not hold."
     )
     return (Finding("motion-mismatch", text, _REMEDY),)
 
@@ -68,7 +68,7 @@ def following(log: MotionLog) -> dict[str, float]:
     return out
 
 
-def _unseen(features: Array, values: Array, block: Array) -> Array:
+def _unseen(features: Array, values: Array, block: Integers) -> Array:
     """Return values (N, 6) as features (N, k) explain them, each block by what all others tell."""
     out = np.zeros_like(values)
     for b in np.unique(block):
