@@ -5,13 +5,19 @@ from __future__ import annotations
 import json
 import re
 from pathlib import Path
+from typing import Any
 
+import numpy as np
 import pytest
 from click.testing import CliRunner
+from scipy.spatial.transform import Rotation as SciPyRotation
 
+import steelyard as sy
 from steelyard.cli.main import cli
 from steelyard.findings import AT_REST, REMEDIES, UNMEASURED, Finding
 from steelyard.io import write_team
+from steelyard.simulate import scenarios
+from steelyard.simulate.handling import motion_arrays
 from steelyard.simulate.three_omnids import three_omnids
 
 ROOT = Path(__file__).parents[1]
@@ -90,3 +96,24 @@ def test_code_of_the_python_page_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     for block in blocks:
         exec(block.replace("cloud.ply", "points.npz"), names)
     assert {"recording", "again", "team"} <= names.keys()
+
+
+def test_code_of_the_mujoco_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """What its first block writes, with MuJoCo at hand, is made here: force on the load, quaternions with w first."""
+    monkeypatch.chdir(tmp_path)
+    body = scenarios.body("wrench").parameters()
+    made = motion_arrays(body=body)
+    turns = SciPyRotation.from_matrix(made["rotation_world_from_sensor"]).as_quat(scalar_first=True)
+    run = {"ft_force": made["force_sensor"], "ft_torque": made["torque_sensor"], "ft_pos": made["position_world"]}
+    np.savez("run.npz", time=made["time"], ft_quat=turns, **run)
+    page = (ROOT / "docs" / "mujoco.md").read_text()
+    blocks = re.findall(r"^```python\n(.*?)^```", page, re.MULTILINE | re.DOTALL)
+    for block in blocks:
+        compile(block, "mujoco.md", "exec")
+    names: dict[str, Any] = {}
+    exec(next(block for block in blocks if "import mujoco" not in block), names)
+    Path("run.toml").write_text(re.findall(r"^```toml\n(.*?)^```", page, re.MULTILINE | re.DOTALL)[0])
+    for log in (names["recording"], "run.toml"):
+        estimate = sy.identify(log)
+        assert estimate.mass == pytest.approx(body.mass, rel=1e-3)
+        assert "wrench-sign-flipped" not in estimate.codes()

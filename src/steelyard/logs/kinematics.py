@@ -193,8 +193,8 @@ def _passed(channels: Mapping[str, Channel], order: Mapping[str, int]) -> float:
 def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: float | None) -> Kinematics:
     """Smooth the motion channels of timed streams; of each quantity the first stream that has it counts.
 
-    Given accelerations are low-passed at `cutoff_hz` [Hz] only; a given angular velocity is smoothed where
-    the angular acceleration must come from it. Raises BadDescription when W-frame channels come without a
+    Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the
+    acceleration must come from them, positions always. Raises BadDescription when W-frame channels come without a
     rotation.
     """
     found: dict[str, tuple[Stream, Array]] = {}
@@ -206,12 +206,10 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
         "angular_acceleration": lambda s, v: _plain_channel(s, v, "angular_acceleration", cutoff_hz),
         "linear_acceleration": lambda s, v: _plain_channel(s, v, "linear_acceleration", cutoff_hz),
         "gravity": lambda s, v: _plain_channel(s, v, "gravity", cutoff_hz),
+        # Beside a given acceleration a position still tells the velocity, and with it what is at rest.
+        "position": lambda s, v: _smooth_channel(s, v, "position", cutoff_hz),
     }
-    for quantity, better in (
-        ("angular_velocity", "angular_acceleration"),
-        ("linear_velocity", "linear_acceleration"),
-        ("position", "linear_acceleration"),
-    ):
+    for quantity, better in (("angular_velocity", "angular_acceleration"), ("linear_velocity", "linear_acceleration")):
         known = better in found
         makers[quantity] = (
             (lambda s, v, q=quantity: _plain_channel(s, v, q, cutoff_hz))  # type: ignore[misc]

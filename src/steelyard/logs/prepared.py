@@ -96,6 +96,7 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     if feeling is not None and "linear_acceleration" not in moving.channels:
         sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
     used = {*moving.streams, *([sensor.name] if sensor is not None else [])}
+    seen = set(used)
     if cutoff is None or source.delay is not None or "specific_force" in source.channels:
         used -= {source.name}
     known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
@@ -106,7 +107,7 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     # A low-pass smears what a smoother makes of a hole over its surroundings.
     smeared = 0.0 if cutoff is None else SMEARED / cutoff
     wider = np.array([-smeared, smeared])
-    unseen = {s.name: unknown_motion(s) + wider for s in streams if s.name in (*moving.streams, *used)}
+    unseen = {s.name: unknown_motion(s) + wider for s in streams if s.name in seen}
     return Prepared(
         recording, options, stamps_of(wrench_stream), felt, cutoff, moving, sensor, known, tuple(sought), unseen
     )  # fmt: skip

@@ -16,10 +16,12 @@ from steelyard.pipelines.rows import FitRows
 from steelyard.sanity import (
     after,
     allow_filter,
+    allow_sag,
     allow_softness,
     drift_of,
     examine_body,
     examine_masses,
+    examine_motion,
     examine_sensor,
     examine_wrench_unit,
     row_noise,
@@ -80,9 +82,12 @@ def of_sensor_and_body(
     known  all that was found so far
     """
     estimate, found = examine_sensor(load.log, recording, estimate, known, load.bias.drift)
+    if not rows.unmeasured:
+        found = (*found, *examine_motion(load.log, (*known, *found)))
     if load.shape is None:
         size, noise = float(np.linalg.norm(recording.gravity)), row_noise(load.log, recording, "torque")
         found = (*found, *examine_body(estimate, (*known, *found), size, noise))
+        estimate = allow_sag(load.log, estimate, (*known, *found))
         if rows.aligned.acceleration_from in ENCODERS:
             estimate = allow_softness(load.log, estimate)
             estimate = allow_filter(load.log, estimate, rows.aligned.wrench_late_s)

@@ -3,9 +3,11 @@
 from steelyard.sanity.after import after, drift_of, row_noise
 from steelyard.sanity.before import examine
 from steelyard.sanity.fitted.density import impossible_density, maybe_hollow
+from steelyard.sanity.fitted.free_motion import examine_motion
 from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import examine_place
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.fitted.sagging import allow_sag
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
 from steelyard.sanity.fitted.slow_sensor import allow_filter
 from steelyard.sanity.fitted.soft_arm import allow_softness
@@ -16,12 +18,14 @@ from steelyard.sanity.rows.frozen_rows import dead_channels
 __all__ = [
     "after",
     "allow_filter",
+    "allow_sag",
     "allow_softness",
     "dead_channels",
     "drift_of",
     "examine",
     "examine_body",
     "examine_masses",
+    "examine_motion",
     "examine_place",
     "examine_sensor",
     "examine_wrench_unit",

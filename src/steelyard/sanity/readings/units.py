@@ -8,6 +8,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import BadDescription
 from steelyard.findings import Finding
 from steelyard.logs.imu import unit_factor
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording, Stream
@@ -21,7 +22,11 @@ ONE_G = (0.9, 1.1)
 
 
 def examine_units(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording with gravity in m/s^2 and lengths in m where the numbers leave no doubt, and findings."""
+    """Return the recording with gravity in m/s^2 and lengths in m where the numbers leave no doubt, and findings.
+
+    Raises BadDescription where an acceleration holds gravity.
+    """
+    _require_no_gravity(recording)
     found: list[Finding] = []
     for step in (_gravity, _gravity_channel, _specific_force, _positions):
         recording, findings = step(recording)
@@ -37,6 +42,19 @@ def scaled(recording: Recording, stream: Stream, quantities: tuple[str, ...], fa
 
     changed = replace(stream, channels={q: multiply(q, v) for q, v in stream.channels.items()})
     return replace(recording, streams=tuple(changed if s is stream else s for s in recording.streams))
+
+
+def _require_no_gravity(recording: Recording) -> None:
+    """Raise BadDescription where a linear acceleration is as long as gravity most of the time: no arm moves so."""
+    gravity = float(np.linalg.norm(recording.gravity))
+    for stream, _, values in channel(recording, "linear_acceleration"):
+        size = float(np.median(np.linalg.norm(values, axis=1)))
+        if gravity > ONE_G[1] and ONE_G[0] * gravity < size < ONE_G[1] * gravity:
+            raise BadDescription(
+                f"linear_acceleration of '{stream.name}' is {size:.4g} m/s^2 long in the median, as gravity is: it "
+                "holds gravity, as what accelerometers read does (and MuJoCo's framelinacc). Give an accelerometer as "
+                "specific_force, in its own axes, or leave linear_acceleration out where there are positions."
+            )
 
 
 def _gravity(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
