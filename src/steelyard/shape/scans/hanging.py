@@ -27,7 +27,7 @@ _BESIDE = 1.5  # cells: what was seen to be empty up to so near a side ends ther
 _SHEER, _ABOUT, _LEVEL, _TOP, _FEWEST = 0.85, 9, 0.2, 0.85, 8
 _OFF_TABLE = 3.0  # times the depth noise
 _LEVELS = 12  # at which a column is asked whether views see through it
-_MUCH = 0.1  # of the volume: rods and hammers leave 0.04
+_MUCH = 0.06  # of the volume: rods and hammers leave 0.04
 
 
 def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple[tuple[Finding, ...], float]:
