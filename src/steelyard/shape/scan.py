@@ -19,6 +19,7 @@ from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.points.thinning import in_cubes, spread, spread_to
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.hanging import hanging
 from steelyard.shape.scans.lens_error import lens_by_table
 from steelyard.shape.scans.patches import surface_of, surfels
 from steelyard.shape.scans.placement import Placement, placement
@@ -107,16 +108,19 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     placed = None if found.shift is None else _placed(scene, xyz.mean(0))
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
     rough, more = uneven(scene, bottom, found.disagree)
+    hangs, closed = hanging(scene, bottom, found.xyz, found.normal)
+    unsure_m3 = float(np.linalg.norm([unsure, more, closed]))
     findings = (
         *said,
         *rough,
+        *hangs,
         *findings_of(scene, found, level, placed, mistake),
         *few_seen(seen / len(xyz), len(scene.views)),
     )
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
         disagree=found.disagree, moved_m=found.shift, placement=placed, findings=findings, stages=clock.laps,
-        space=SeenSpace(_empty(scene, bottom), _guessed(scene), 1 - seen / len(cloud), float(np.hypot(unsure, more))),
+        space=SeenSpace(_empty(scene, bottom), _guessed(scene), 1 - seen / len(cloud), unsure_m3),
     )  # fmt: skip
 
 

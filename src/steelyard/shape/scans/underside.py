@@ -37,12 +37,16 @@ class Underside:
     pitch   width of its cells [m]
     height  (I, J) [m], inf where there is no object above
     seen    (I, J) whether surface points lie on that underside already
+    top     (I, J) highest seen surface [m], -inf without
+    empty   (I, J) height up to which views saw that nothing is there [m], 0 where there is no object above
     """
 
     low: Array
     pitch: float
     height: Array
     seen: Any
+    top: Array
+    empty: Array
 
     def points(self) -> tuple[Array, Array]:
         """Return points (N, 3) that close the underside, in the table's frame, and their normals (N, 3)."""
@@ -160,12 +164,13 @@ def underside(
     steep = under & (_steepness(smooth, under) / pitch > _STEEPER * sight)
     rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
     bare = rim & ~steep
-    height = np.where(bare, _median_along(height, rim), height)
+    height = np.where(bare, median_along(height, rim), height)
     span = _spanned(height, rim, steep, under)
-    return Underside(low, pitch, np.where(under, np.clip(span, 0.0, np.where(under, top, 0.0)), np.inf), seen & under)
+    closed = np.where(under, np.clip(span, 0.0, np.where(under, top, 0.0)), np.inf)
+    return Underside(low, pitch, closed, seen & under, top, np.where(under, empty_to, 0.0))
 
 
-def _median_along(height: Array, rim: Any) -> Array:
+def median_along(height: Array, rim: Any) -> Array:
     """Return for each cell the median height of the cells of the rim within two cells of it, 0 without any."""
     padded = np.pad(np.where(rim, height, np.nan), 2, constant_values=np.nan)
     i, j = height.shape
