@@ -13,6 +13,7 @@ from __future__ import annotations
 from dataclasses import dataclass, replace
 
 import numpy as np
+from numba import njit
 
 from steelyard.check import Array
 from steelyard.logs.clock import median_step
@@ -30,6 +31,7 @@ BIN_S, LEAST_S = 0.1, 2.5
 # By how much [s] a clock that is called must have jumped; either part's own shift leaves less by this factor than the
 # other's; both together leave less than a shift that grows steadily; and robots turn alike but for this share.
 JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
+_WIDTH = round(BIN_S / STEP_S)
 # A gap of the stamps is the jump's where it is as long to within SAME_S and so near to where shifts change [s].
 SAME_S, NEAR_S = 0.05, 1.0
 # [s] to either side of a jump that leaves no gap, which are left out; and jumps of one recording.
@@ -100,7 +102,8 @@ class _Split:
 
     left    share of how the speed varies that they leave
     fits    how many times as much either part is left by the other's shift, the lesser of the two
-    steady  how many times as much is left by a shift that grows steadily
+    both    what they leave in all, of `cost`
+    cost    (S, K) what every shift leaves of every bin
     """
 
     at: float
@@ -108,12 +111,14 @@ class _Split:
     after: float
     left: float
     fits: float
-    steady: float
+    both: float
+    cost: Array
 
     @property
     def sure(self) -> bool:
         far = abs(self.after - self.before) > JUMPS_S
-        return far and self.fits > FITS and self.steady > BETTER and self.left < LEFT
+        # What a steady drift leaves takes longest to tell, and is asked last.
+        return far and self.fits > FITS and self.left < LEFT and _steady(self.cost) > BETTER * self.both
 
 
 def _split(x: Array, y: Array, common: int, most: int) -> _Split | None:
@@ -135,7 +140,7 @@ def _split(x: Array, y: Array, common: int, most: int) -> _Split | None:
     return _Split(
         STEP_S * begin + BIN_S * (at + 1), before, after,
         (one + two) / float(((inner - inner.mean()) ** 2).sum() + least),
-        min(sums[j, at] / one, rest[i, at] / two), _steady(cost) / (one + two),
+        min(sums[j, at] / one, rest[i, at] / two), one + two, cost,
     )  # fmt: skip
 
 
@@ -146,13 +151,19 @@ def _speed(track: Track, time: Array) -> Array | None:
     return np.interp(time, time[good], speed[good]) if good.sum() > 0.5 * len(time) else None
 
 
+@njit(cache=True)
 def _costs(x: Array, y: Array, most: int) -> Array:
     """Return the squares (S, K) left between two speeds at every shift, summed over bins."""
-    width = round(BIN_S / STEP_S)
-    count = (len(x) - 2 * most) // width
-    inner = x[most : most + count * width]
-    rows = [((inner - y[most + s : most + s + len(inner)]) ** 2) for s in range(-most, most + 1)]
-    return np.array([row.reshape(count, width).sum(1) for row in rows])
+    count = (len(x) - 2 * most) // _WIDTH
+    out = np.empty((2 * most + 1, count))
+    for shift in range(len(out)):
+        for k in range(count):
+            total = 0.0
+            for t in range(k * _WIDTH, (k + 1) * _WIDTH):
+                off = x[most + t] - y[shift + t]
+                total += off * off
+            out[shift, k] = total
+    return out
 
 
 def _steady(cost: Array) -> float:
