@@ -22,7 +22,7 @@ FEWEST = 30
 def repeats(stream: Stream) -> tuple[Mask, int]:
     """Return which rows (N,) repeat the one before and say nothing new, and how many of them have its stamp too.
 
-    None where rows repeat no more often than the quantum of the channels explains.
+    No row does where they repeat no more often than the quantum of the channels explains.
     """
     none = np.zeros(len(stream), np.bool_)
     if stream.time is None or len(stream) < FEWEST:
