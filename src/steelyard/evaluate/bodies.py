@@ -58,12 +58,12 @@ def box_edges(bounds: ArrayLike) -> Array:
 
 
 def mass_pct(found: InertialParameters, true: InertialParameters) -> Array:
-    """Return 100 |m - m*| / m*."""
+    """Return 100 |m - m*| / m*, of the bodies' batch shape."""
     return np.asarray(100 * np.abs(found.mass - true.mass) / true.mass)
 
 
 def com_mm(found: InertialParameters, true: InertialParameters) -> Array:
-    """Return 1000 |c - c*| [mm]."""
+    """Return 1000 |c - c*| [mm], of the bodies' batch shape; c in S."""
     return np.asarray(1000 * np.linalg.norm(found.com - true.com, axis=-1))
 
 
@@ -83,7 +83,10 @@ def inertia_scale(mass: ArrayLike, edges: ArrayLike) -> Array:
 
 
 def inertia_pct(found: InertialParameters, true: InertialParameters, edges: ArrayLike) -> Array:
-    """Return the mean of the six 100 |(J_ij - J*_ij) / D_ij|, J about the S origin, D of `inertia_scale`."""
+    """Return the mean of the six 100 |(J_ij - J*_ij) / D_ij|, J about the S origin, D of `inertia_scale`.
+
+    edges  (3,) of the true box [m]; the answer has the bodies' batch shape
+    """
     scale = inertia_scale(true.mass, edges)
     return np.asarray(100 * np.mean(np.abs((found.vector[..., 4:] - true.vector[..., 4:]) / scale), axis=-1))
 

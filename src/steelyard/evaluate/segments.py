@@ -76,6 +76,8 @@ def impurity(table: Array) -> float:
 def undersegmentation(table: Array) -> float:
     """Return the mean over true parts of (points of all segments that touch the part - its points) / its points.
 
+    table  (G, S) points of true part g in segment s
+
     Source: Levinshtein et al. 2009, "TurboPixels", eq. 17.
     """
     parts, segments = table.sum(1), table.sum(0)
@@ -85,6 +87,8 @@ def undersegmentation(table: Array) -> float:
 
 def global_consistency(table: Array) -> float:
     """Return min over direction of the mean share of a point's own part that lies outside its other part.
+
+    table  (G, S) points of true part g in segment s
 
     Source: Martin et al. 2001, "A database of human segmented natural images", eq. 2.
     """

@@ -26,7 +26,7 @@ class Solution:
 
     @classmethod
     def unconstrained(cls, linear: Array, weights: Array | None = None) -> Solution:
-        """Return a solution whose coordinates are the parameters themselves, without a prior."""
+        """Return a solution whose coordinates are the parameters `linear` (10,) or (16,), without a prior."""
         return cls(linear, np.eye(10), np.zeros((10, 10)), weights)
 
     def chain(self, size: int) -> Array:

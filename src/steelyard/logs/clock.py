@@ -22,7 +22,7 @@ def median_step(time: Array) -> float:
 
 
 def sampling_rate(time: Array) -> float:
-    """Return the median sampling rate [Hz] of a rising clock [s]."""
+    """Return the median sampling rate [Hz] of a rising clock (N,) [s]; raises BadValue below two samples."""
     if len(time) < 2:
         raise BadValue("a clock needs at least two samples.")
     return 1.0 / median_step(time)

@@ -82,11 +82,11 @@ class _Layout:
         return replace(self, width=width)
 
     def get(self, theta: Array, name: str, default: Array) -> Array:
-        """Return one block of theta."""
+        """Return one block (k,) of theta (U,), `default` where the layout has none."""
         return theta[self.slices[name]] if name in self.slices else default
 
     def mounting(self, theta: Array, imu: Imu) -> Mounting:
-        """Return the accelerometer's mounting in theta."""
+        """Return the accelerometer's mounting in theta (U,)."""
         rotation = imu.rotation if imu.rotation is not None else self.mount
         if rotation is None:
             rotation = Rotation.identity()
@@ -97,7 +97,7 @@ class _Layout:
         return Mounting(rotation, position, self.get(theta, "bias", np.zeros(3)), scale)
 
     def delays(self, theta: Array, question: Question) -> dict[str, float]:
-        """Return all delays, given and sought."""
+        """Return all delays [s], given and those in theta (U,)."""
         sought = dict(zip(question.unknown, (float(v) for v in theta[self.slices["delay"]]), strict=True))
         return {**question.known, **sought}
 

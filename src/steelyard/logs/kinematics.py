@@ -193,6 +193,8 @@ def _passed(channels: Mapping[str, Channel], order: Mapping[str, int]) -> float:
 def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: float | None) -> Kinematics:
     """Smooth the motion channels of timed streams; of each quantity the first stream that has it counts.
 
+    gravity_world  (3,) [m/s^2] in W
+
     Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the
     acceleration must come from them, positions always. Raises BadDescription when W-frame channels come without a
     rotation.

@@ -47,7 +47,10 @@ def on_one_clock(streams: Sequence[Stream]) -> tuple[Array, dict[str, Array]]:
 
 
 def in_grasp_axes(streams: Sequence[Stream], channels: Mapping[str, Array]) -> dict[str, Array]:
-    """Return the channels with vectors given in H or in a mount's frame turned into G, moments moved to its origin."""
+    """Return channels (T, ..), vectors given in H or in a mount's frame turned into G, moments moved to its origin.
+
+    Raises BadValue where a channel in H has no rotation beside it.
+    """
     out = dict(channels)
     for stream in streams:
         mount = stream.mount or Mount()

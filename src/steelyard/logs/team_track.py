@@ -74,7 +74,7 @@ class Track:
 
     @classmethod
     def of(cls, time: ArrayLike, carrying: ArrayLike | None = None, **channels: ArrayLike | None) -> Track:
-        """Return the track of raw columns, NaN where a number is missing; a channel that is None is left out.
+        """Return the track of raw columns (T, ..), NaN where a number is missing; a channel that is None is left out.
 
         A row with a NaN in one column loses that channel only; a torque is missing where the force is and the reverse,
         since half a wrench adds up to nothing.

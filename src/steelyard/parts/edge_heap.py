@@ -50,7 +50,11 @@ def _put(edge: Any, order: Array, place: Any, i: int, e: int, key: float, tie: f
 
 @numba.njit(cache=True, nogil=True)
 def settle(edge: Any, order: Array, place: Any, size: int, e: int, key: float, tie: float) -> int:
-    """Put edge e where its key belongs, whether it was in the heap (place >= 0) or not; return the new size."""
+    """Put edge e where its key belongs, whether it was in the heap (place >= 0) or not; return the new size.
+
+    edge (E,), order (E, 2)  the heap: edges, with key and what decides between equal ones
+    place (E,)               where every edge stands in it, -1 for none
+    """
     i = integer(place[e])
     if i < 0:
         i = size
@@ -78,7 +82,7 @@ def settle(edge: Any, order: Array, place: Any, size: int, e: int, key: float, t
 
 @numba.njit(cache=True, nogil=True)
 def remove(edge: Any, order: Array, place: Any, size: int, e: int) -> int:
-    """Take edge e out if it is in the heap; return the new size."""
+    """Take edge e out of the heap of `settle` if it is there; return the new size."""
     i = integer(place[e])
     if i < 0:
         return size

@@ -136,7 +136,7 @@ def four_faces(xyz: Array, hulls: Hulls, c: int) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def five_faces(xyz: Array, rows: Any, point: Any, corner: Any) -> None:
-    """Write the vertices and faces of five points as `hull_volume` would, -1 for faces where one lies inside.
+    """Write vertices and faces of the points rows (5,) of xyz (N, 3) as `hull_volume` would, -1 if one lies inside.
 
     Weights of sum zero exist with which the points cancel: the volumes of the tets of the others, signed in turn. Two
     points lie on one side of the plane of the other three, a face, where the weights of the two differ in sign.

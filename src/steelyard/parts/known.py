@@ -75,11 +75,11 @@ class Track:
 
     @classmethod
     def from_columns(cls, columns: Mapping[str, Array]) -> Track:
-        """Return the motion of columns named as in motion.npz."""
+        """Return the motion of columns (N, ..) named as in motion.npz."""
         return cls(**{field: columns[name] for field, name in MOTION.items()})
 
     def columns(self) -> dict[str, Array]:
-        """Return the columns under their names in motion.npz."""
+        """Return the columns (N, ..) under their names in motion.npz."""
         return {name: getattr(self, field) for field, name in MOTION.items()}
 
     def __len__(self) -> int:

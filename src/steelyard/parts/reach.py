@@ -82,6 +82,7 @@ def reach(
 ) -> float:
     """Return a volume that the hull of xyz[rows[:count]] holds: that of the first `length`, grown by the others.
 
+    xyz, rows  points (N, 3), and numbers of those asked for
     face, at  corners of the faces of the first, numbers among them, are face[at : at + 3 (2 length - 4)], as in `Hulls`
     hull      the volume of those faces
     stamp     a positive number; that of the next call in the same room is at least `count` larger

@@ -48,7 +48,7 @@ class Clusters(NamedTuple):
 
     @classmethod
     def of(cls, volume: Array, share: Array, colour: Integers, middle: Array, contact: Array, touch: Any) -> Clusters:
-        """Return the pieces as clusters, in arrays of their own, with hulls still to come."""
+        """Return pieces (S,) as clusters, in arrays of their own, hulls still to come; contact and touch (S, S)."""
         count, square = len(volume), touch.shape
         return cls(
             volume.copy(), share.copy(), colour.astype(np.int64), middle.copy(), np.empty(count), np.arange(count),

@@ -12,7 +12,10 @@ from steelyard.spatial import Pose, Rotation
 
 
 def below(corners: Array, normal: Array, offset: float) -> Array:
-    """Return the triangles (F', 3, 3) of a surface on the side n x < offset, cut at the plane, open there."""
+    """Return the triangles (F', 3, 3) [m] of a surface (F, 3, 3) on the side n x < offset, cut at the plane, left open.
+
+    normal  n (3,); offset [m]
+    """
     side = corners @ normal - offset
     inside = side < 0
     count = inside.sum(1)

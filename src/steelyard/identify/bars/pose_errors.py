@@ -174,7 +174,7 @@ class _Seen:
         return variance, np.repeat([self.along(axes / plain, variance) for axes, plain in (torques, forces)], 3)
 
     def at_most(self, kinds: Array, gains: Array) -> tuple[Array, Array]:
-        """Return the same, as if nothing of what is found were noise."""
+        """Return the variances of `variances` as if nothing of what is found were noise."""
         axes = [_axes(self.left, gains[:, of]) for of in (slice(0, 3), slice(3, 6))]
         square, _, count = self.of(kinds)
         each = [((a.T @ self.found) ** 2).sum() / max(float(plain @ plain), TINY) for a, plain in axes]

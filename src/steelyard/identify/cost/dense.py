@@ -21,7 +21,7 @@ def eigen(matrix: Array) -> tuple[Array, Array]:
 
 @numba.njit(cache=True, nogil=True)
 def add_product(out: Array, a: Array, b: Array) -> None:
-    """Add a b to `out`; zeros in a cost nothing."""
+    """Add a b to `out` (n, m), with a (n, k) and b (k, m); zeros in a cost nothing."""
     for i in range(a.shape[0]):
         for k in range(a.shape[1]):
             value = a[i, k]
@@ -32,7 +32,7 @@ def add_product(out: Array, a: Array, b: Array) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def product(a: Array, b: Array) -> Array:
-    """Return a b."""
+    """Return a b (n, m) of a (n, k) and b (k, m)."""
     out = np.zeros((a.shape[0], b.shape[1]))
     add_product(out, a, b)
     return out
@@ -40,7 +40,7 @@ def product(a: Array, b: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def product_transposed(a: Array, b: Array) -> Array:
-    """Return a b^T."""
+    """Return a b^T (n, m) of a (n, k) and b (m, k)."""
     out = np.empty((a.shape[0], b.shape[0]))
     for i in range(a.shape[0]):
         for j in range(b.shape[0]):
@@ -53,7 +53,7 @@ def product_transposed(a: Array, b: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def transposed(a: Array) -> Array:
-    """Return a^T, C-ordered."""
+    """Return a^T (m, n) of a (n, m), C-ordered."""
     out = np.empty((a.shape[1], a.shape[0]))
     for i in range(a.shape[0]):
         for j in range(a.shape[1]):
@@ -63,7 +63,7 @@ def transposed(a: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def times(a: Array, x: Array) -> Array:
-    """Return a x for a vector x."""
+    """Return a x (n,) of a (n, m) and x (m,)."""
     out = np.empty(a.shape[0])
     for i in range(a.shape[0]):
         total = 0.0
@@ -75,7 +75,7 @@ def times(a: Array, x: Array) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def inner(a: Array, b: Array) -> float:
-    """Return a . b of two vectors."""
+    """Return a . b of two vectors (n,)."""
     total = 0.0
     for i in range(len(a)):
         total += a[i] * b[i]
@@ -84,7 +84,7 @@ def inner(a: Array, b: Array) -> float:
 
 @numba.njit(cache=True, nogil=True)
 def moved(x: Array, step: Array, share: float) -> Array:
-    """Return x + share step of two vectors."""
+    """Return x + share step of two vectors (n,)."""
     out = np.empty(len(x))
     for i in range(len(x)):
         out[i] = x[i] + share * step[i]
@@ -93,7 +93,7 @@ def moved(x: Array, step: Array, share: float) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def mirror(a: Array) -> None:
-    """Copy what is below the diagonal above it, in place."""
+    """Copy what is below the diagonal of a (n, n) above it, in place."""
     for i in range(a.shape[0]):
         for j in range(i):
             a[j, i] = a[i, j]
@@ -120,7 +120,7 @@ def cholesky(matrix: Array, least: float) -> tuple[Array, bool]:
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
 def solved(low: Array, g: Array) -> Array:
-    """Return x of L L^T x = g."""
+    """Return x (n,) of L L^T x = g, with L (n, n) lower and g (n,)."""
     n = len(g)
     x = np.empty(n)
     for i in range(n):
@@ -159,7 +159,7 @@ def downhill(gradient: Array, hessian: Array, least: float) -> Array:
 
 @numba.njit(cache=True, nogil=True)
 def inverse_of(low: Array) -> Array:
-    """Return (L L^T)^-1."""
+    """Return (L L^T)^-1 (n, n) of L (n, n) lower."""
     n = low.shape[0]
     out = np.empty((n, n))
     for j in range(n):

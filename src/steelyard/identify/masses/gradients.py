@@ -99,7 +99,13 @@ class Search:
     def fits(
         self, free: tuple[int, ...], y: Array, tilts: Array, width: float, contender: float = CONTENDER
     ) -> list[Fit]:
-        """Return the fits of one set of free parts over the spreads of densities, from the widest as far as likely."""
+        """Return the fits of one set of free parts over the spreads of densities, from the widest as far as likely.
+
+        free       numbers of the parts whose density changes within them (F,)
+        y, tilts   where to start: log densities (P,) and the slopes of free parts (F, FEATURES)
+        width      how wide slopes may spread, a factor on their prior
+        contender  how much less evidence than the best one a spread may have before narrower ones are left out
+        """
         P, wide = len(self.parts), density_priors.WIDTH**2
         variance = np.tile(_widths(width) ** 2, len(free))
         chance = len(free) * np.log(COMMON) + (P - len(free)) * np.log(1 - COMMON)

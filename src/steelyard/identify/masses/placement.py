@@ -106,7 +106,7 @@ def lies_elsewhere(alone: Estimate, explained: bool, parts: Parts, error: ShapeE
 
 
 def with_mass(parts: Parts, mean: Array, data: Effective, least: float = 0.0) -> InertialParameters:
-    """Return the body of the parts; raise NoMasses where it has only the `least` share of what the log weighs."""
+    """Return the body of parts of masses `mean` (P,) [kg]; raises NoMasses below the `least` share of the log's."""
     if (body := parts.whole(mean)).mass > least * data.best[0]:
         return body
     raise refused(parts, data)

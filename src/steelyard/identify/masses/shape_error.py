@@ -75,7 +75,7 @@ class ShapeError:
         return replace(self, com_m=float(np.hypot(self.com_m, std_m)), turn_rad=float(np.hypot(self.turn_rad, std_rad)))
 
     def placed(self, std_m: float, std_rad: float, at: Array | None = None) -> ShapeError:
-        """Return the error with a place in the sensor that is less sure by these standard deviations, about `at`."""
+        """Return the error with a place in S that is less sure by these standard deviations, about `at` (3,) [m]."""
         x, y, z = self.grasp_at if at is None else (float(v) for v in at)
         grasp_m, grasp_rad = float(np.hypot(self.grasp_m, std_m)), float(np.hypot(self.grasp_rad, std_rad))
         return replace(self, grasp_m=grasp_m, grasp_rad=grasp_rad, grasp_at=(x, y, z))

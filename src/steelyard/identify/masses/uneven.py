@@ -38,7 +38,7 @@ class Uneven:
 
 
 def suspicious(data: Effective, vector: Array, parts: Parts) -> bool:
-    """Say whether the misfit of homogeneous parts is worth a look."""
+    """Say whether the misfit of homogeneous parts, whose whole is `vector` (10,), is worth a look."""
     return data.misfit(vector) > misfit_limit(data, len(parts), SUSPICIOUS)
 
 

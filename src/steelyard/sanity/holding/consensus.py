@@ -67,7 +67,7 @@ class Consensus:
 
 @numba.njit(cache=True)
 def solve(H: Array, g: Array) -> Array:
-    """Return x of H x = g for a small positive definite H, held finite where directions are not seen."""
+    """Return x (n,) of H x = g for a small positive definite H (n, n), held finite where directions are not seen."""
     n = len(g)
     low, scale, x = np.zeros((n, n)), np.empty(n), np.empty(n)
     for i in range(n):
@@ -210,7 +210,7 @@ def _grid(slices: Slices) -> tuple[Integers, Mask]:
 
 
 def refine(slices: Slices, x: Array, kept: Mask) -> Consensus | None:
-    """Return the self-consistent set that grows from a candidate, None where it withers."""
+    """Return the self-consistent set that grows from a candidate, x and its slices kept (M,), None where it withers."""
     for _ in range(PASSES):
         residual, tolerance, late = _misfit(slices, x, kept)
         square = ((residual / tolerance) ** 2).sum(1)

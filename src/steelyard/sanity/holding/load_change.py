@@ -47,7 +47,7 @@ class _Running:
     ridge: Array
 
     def normal(self, j: int, columns: slice) -> tuple[Array, Array]:
-        """Return the normal equations where `columns` are anew from slice j on."""
+        """Return the normal equations H (p + q, p + q) and g where the q `columns` are anew from slice j on."""
         H, g = self.H[-1], self.g[-1]
         late, late_g = H - self.H[j], g - self.g[j]
         size = late_g[columns].size

@@ -32,7 +32,10 @@ TAKEN_AWAY = "the controller, or the sensor's driver, takes the weight of a payl
 
 
 def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
-    """Return the mass that the force shows by acceleration, then by weight, their jackknife std, and the share left."""
+    """Return the mass [kg] that the force shows by acceleration, then by weight (2,), the jackknife std, the share left.
+
+    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
+    """
     seen = replace(view, acceleration=None).seen(gravity, rotation)
     slowed = view.seen(np.zeros(3), rotation).pull
     columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)

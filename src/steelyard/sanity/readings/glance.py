@@ -148,7 +148,7 @@ def in_axes(recording: Recording, world: Collection[str]) -> Recording:
 
 
 def channel(recording: Recording, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
-    """Yield stream, quantity and values of every channel that holds one of the quantities."""
+    """Yield stream, quantity and values (N, ..) of every channel that holds one of the quantities."""
     for quantity in quantities:
         for stream in recording.streams:
             if quantity in stream.channels:

@@ -26,7 +26,11 @@ REFLECTIONS = np.stack([X for X in signed_axes() if np.linalg.det(X) < 0])
 
 
 def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
-    """Return the exchange of axes and signs that explains the force best; None without rotations or all forces."""
+    """Return the exchange of axes and signs that explains the force best; None without rotations or all forces.
+
+    gravity  (3,) [m/s^2] in W
+    sign     that of the mass as read, 0 where it is not sure
+    """
     if view.rotation is None or any(view.dead[3:]):
         return None
     seen = replace(view, acceleration=None).seen(gravity, view.rotation)
@@ -38,7 +42,7 @@ def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
 
 
 def in_words(X: Array, letter: str) -> str:
-    """Say what columns must be read as whose numbers are X times those meant: "Fx = -Fy, Fy = .."."""
+    """Say what columns must be read as whose numbers are X (3, 3) times those meant: "Fx = -Fy, Fy = .."."""
     said = []
     for row, name in zip(X.T, "xyz", strict=True):  # meant_k = sum_i X_ik read_i
         k = int(np.argmax(np.abs(row)))

@@ -64,7 +64,10 @@ class Reading:
 def reading_of(
     view: Glance, words: str, gravity: Array, rotation: Array | None, misread: Misread | None = None
 ) -> Reading:
-    """Return a reading with the better of two fits: with the measured acceleration and without."""
+    """Return a reading with the better of two fits: with the measured acceleration and without.
+
+    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the reading has them
+    """
     found = fit(view.seen(gravity, rotation), view.block)
     if view.acceleration is not None:
         still = fit(replace(view, acceleration=None).seen(gravity, rotation), view.block)

@@ -52,7 +52,9 @@ class Turn:
 
 
 def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -> GlanceTilt | None:
-    """Return the gravity that fits best; None without rotations or where nothing is seen of it.
+    """Return the gravity that fits best; None without rotations (N, 3, 3) or where nothing is seen of it.
+
+    gravity  (3,) [m/s^2] in W, as given
 
     `mass` [kg] turns the measured acceleration into a force; its sign is taken from the fit as given.
     """
