@@ -32,7 +32,7 @@ TAKEN_AWAY = "the controller, or the sensor's driver, takes the weight of a payl
 
 
 def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
-    """Return the mass [kg] that the force shows by acceleration, then by weight (2,), the jackknife std, the share left.
+    """Return the mass [kg] that the force shows by acceleration, then by weight (2,), jackknife std, the share left.
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
     """
