@@ -41,7 +41,7 @@ def test_the_log_refuses_cuts_that_cannot_give_it(rod: Parts) -> None:
     _, weight = PartCuts(cuts(rod), bias="none").weighed(log_of(rod, 0))
     assert weight.sum() == pytest.approx(1)
     assert weight[0] == weight[1] == 0
-    assert weight[2] > 0.2
+    assert weight[2, 0] > 0.2
 
 
 def test_the_average_is_as_good_as_the_right_cut(rod: Parts) -> None:
@@ -84,9 +84,9 @@ def test_a_cut_that_explains_nothing_is_left_out_with_a_word(
         return whole(self, log, problem)
 
     monkeypatch.setattr(PartMasses, "answered", refusing)
-    monkeypatch.setattr(PartCuts, "_weights", lambda *_: np.array([0.5, 0.5]))
+    monkeypatch.setattr(PartCuts, "_weights", lambda *_: np.array([[0.5], [0.5]]))
     answer, weight = PartCuts((right, other), bias="none").weighed(log)
-    assert weight.tolist() == [1.0, 0.0]
+    assert weight.tolist() == [[1.0], [0.0]]
     assert answer.notes[-1] == f"the cut into {said} explains nothing and was left out"
 
 

@@ -1,4 +1,4 @@
-"""A shape that does not lie where its pose says: the log answers alone, unless the pose was said to be that unsure."""
+"""A shape that does not lie where its pose says: the log answers alone, unless the pose may be that far off."""
 
 from __future__ import annotations
 
@@ -8,6 +8,7 @@ import pytest
 import steelyard as sy
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import KNOWN_PLACE
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.held_object import identify_rows
 from steelyard.pipelines.load import Load
@@ -38,6 +39,8 @@ WRONG = {
     "140 mm across": shifted(0, 0, 140),
     "140 mm along": shifted(0, -140, 0),
 }
+FAR = ("frame of the views", "in mm", "140 mm across", "140 mm along")
+NEAR = ((10, 0, 0), (20, 0, 0), (0, 0, 20), (0, 0, -40), (-40, 0, 0))
 
 
 @pytest.fixture(scope="module")
@@ -65,7 +68,19 @@ def given(request: pytest.FixtureRequest, kind: str) -> Parts | Shape:
 def test_a_shape_that_lies_elsewhere_does_not_pull_the_answer(
     log: MotionLog, alone: Estimate, request: pytest.FixtureRequest, kind: str, place: str
 ) -> None:
-    found = identify_rows(log, parts=given(request, kind), pose=WRONG[place])
+    found = identify_rows(log, parts=given(request, kind), pose=WRONG[place], pose_std=KNOWN_PLACE)
+    assert_left_out(found, alone)
+
+
+@pytest.mark.parametrize("kind", ["mesh", "scan"])
+@pytest.mark.parametrize("place", FAR)
+def test_nor_does_one_that_lies_farther_off_than_anyone_errs_of_which_nothing_is_said(
+    log: MotionLog, alone: Estimate, request: pytest.FixtureRequest, kind: str, place: str
+) -> None:
+    assert_left_out(identify_rows(log, parts=given(request, kind), pose=WRONG[place]), alone)
+
+
+def assert_left_out(found: Estimate, alone: Estimate) -> None:
     np.testing.assert_array_equal(found.parameters.vector, alone.parameters.vector)
     np.testing.assert_array_equal(found.covariance, alone.covariance)
     assert not found.parts
@@ -81,9 +96,24 @@ def test_a_shape_that_lies_elsewhere_does_not_pull_the_answer(
 def test_a_scan_that_no_density_explains_is_left_out_though_its_centre_lies_in_the_object(
     log: MotionLog, alone: Estimate, scan: Shape, shift: tuple[float, float, float]
 ) -> None:
-    found = identify_rows(log, parts=scan, pose=shifted(*shift))
+    found = identify_rows(log, parts=scan, pose=shifted(*shift), pose_std=KNOWN_PLACE)
     np.testing.assert_array_equal(found.parameters.vector, alone.parameters.vector)
     assert "from where any masses of even parts would" in found.findings[0].message
+
+
+@pytest.mark.parametrize("kind", ["mesh", "scan"])
+@pytest.mark.parametrize("shift", NEAR)
+def test_one_that_is_less_far_off_is_named_and_in_the_bars(
+    log: MotionLog, request: pytest.FixtureRequest, kind: str, shift: tuple[float, float, float]
+) -> None:
+    found = identify_rows(log, parts=given(request, kind), pose=shifted(*shift))
+    (named,) = [finding for finding in found.findings if finding.code == "part-not-homogeneous"]
+    assert "mm from where any masses of even parts would" in named.message or "mm outside the object" in named.message
+    assert "std_mm" in named.remedy
+    truth = TOOL.truth_in_sensor
+    off = np.abs(found.parameters.inertia_com - truth.inertia_com)[np.triu_indices(3)]
+    assert found.parts
+    assert (off < 3 * found.std[4:]).all()
 
 
 @pytest.mark.parametrize("kind", ["mesh", "scan"])

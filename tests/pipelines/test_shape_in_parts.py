@@ -85,7 +85,7 @@ def test_a_pose_that_no_shape_can_follow_is_named_and_the_answer_is_that_of_the_
     (named,) = [f for f in found.findings if f.code == "part-not-homogeneous"]
     assert "mm outside the object: pose_in_sensor is wrong by at least that much. The shape cannot" in named.message
     assert "not its inverse, and in the right unit (m, mm)" in named.remedy
-    assert not any("taken as exact" in note for note in found.notes)
+    assert not any("std_mm" in note for note in found.notes)
 
 
 def test_every_cut_is_the_whole_solid(shape: Shape) -> None:

@@ -101,12 +101,11 @@ class PartMasses:
         problem = self.problem(moments)
         return self._conclude(problem, self._start(problem), None)
 
-    def seen(self, problem: Problem) -> Effective:
-        """Return what a statistic says of the whole body, the error of the shape taken into account."""
+    def seen(self, problem: Problem) -> tuple[Effective, InertialParameters]:
+        """Return what a statistic says of the whole body, and the body that the parts make of it."""
         data = self._data(problem, self._start(problem), None)
         body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), listed=False).mean)
-        data = self._data(problem, data.linear_at(body.vector), None)
-        return data.blurred(self.shape_error.with_grasp(body))
+        return self._data(problem, data.linear_at(body.vector), None), body
 
     def log_evidence(self, data: Effective) -> Array:
         """Return the log evidence (F,) of these parts per family of density models, up to what all cuts share."""

@@ -43,16 +43,16 @@ def parse_object_pose(entry: Entry) -> ObjectPose | None:
 
 
 def _std(table: Entry) -> tuple[float, float] | None:
-    """Return the standard deviations [m], [rad], of which one may be zero; None where the pose is exact."""
+    """Return the standard deviations [m], [rad], both zero where the pose is exact; None where nothing says."""
     given = [key for key in _STD if key in table]
     if not given:
         return None
     for key in _STD:
         if key not in table:
-            raise table.error(f'"{key}" is missing beside "{given[0]}". Give both, or neither where the pose is exact.')
+            raise table.error(
+                f'"{key}" is missing beside "{given[0]}". Give both, 0 where the pose is exact, or neither.'
+            )
     mm, deg = (table.spread(key) for key in _STD)
-    if not mm and not deg:
-        raise table.error('"std_mm" and "std_deg" are both 0. Leave both out where the pose is exact.')
     return mm * 1e-3, float(np.radians(deg))
 
 

@@ -26,6 +26,8 @@ ASSUMED_GRAVITY_STD = 0.0015
 POUND_FORCE, INCH = 4.4482216152605, 0.0254
 # [m/s^2] Gravity as most descriptions round it: for thresholds, which a thousandth does not move.
 ROUNDED_GRAVITY = 9.81
+# [m], [rad] Standard deviations of a pose that is known.
+KNOWN_PLACE = (0.0, 0.0)
 
 # Quantity -> number of columns (rotation is stored as matrices).
 QUANTITIES: dict[str, int] = {
@@ -138,7 +140,7 @@ class Recording:
     noise         declared standard deviations: force [N], torque [N m], acceleration [m/s^2],
                   angular_acceleration [rad/s^2]; missing ones are estimated
     tool          path of the result or log of the gripper alone, to be taken away
-    object_pose   pose of the scan's frame O in S, with its uncertainty (m, rad)
+    object_pose   pose of the scan's frame O in S, its standard deviations [m], [rad] None where nothing says
     dead          channels of the wrench [tau, f] in S that do not measure: nothing may be concluded from them
     findings      what reading it already showed: rows that missed a number and were left out
     notes         what reading it had to assume, in words

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import NamedTuple
+
 import numpy as np
 
 from steelyard.check import Array
@@ -17,10 +19,33 @@ from steelyard.logs.log import MotionLog
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.options import Options
 
-# Cuts of the object into parts, seen from S, the log weight of each beforehand, and how wrong they may be.
-Placed = tuple[tuple[Parts, ...], Array | None, ShapeError]
 # A ball's radius of gyration per axis is its diameter times this.
 BALL = 0.5 / np.sqrt(5)
+
+
+class Placed(NamedTuple):
+    """What is known of an object's shape, where it sits in the sensor.
+
+    cuts    ways to cut it into parts, seen from S
+    prior   (K,) log weight of each beforehand; equal where None
+    error   how wrong the shape may be
+    places  (S) standard deviations [m], [rad] of its place, from the surest on; the log weighs them
+    """
+
+    cuts: tuple[Parts, ...]
+    prior: Array | None
+    error: ShapeError
+    places: tuple[tuple[float, float], ...]
+
+    @property
+    def finest(self) -> Parts:
+        """The cut into most parts."""
+        return max(self.cuts, key=len)
+
+    @property
+    def loosest(self) -> ShapeError:
+        """How wrong shape and place may be at most."""
+        return self.error.placed(*self.places[-1])
 
 
 def estimator_for(
@@ -34,10 +59,10 @@ def estimator_for(
     if shape is not None and options.method != "auto":
         raise BadValue(f'method "{options.method}" knows no shape: leave it "auto", or leave parts and scan out.')
     if shape is not None:
-        cuts, weights, error = shape
+        cuts = shape.cuts
         given = f"was scanned, in {len(cuts)} cuts" if len(cuts) > 1 else f"is given in {_counted(len(cuts[0]))}"
         why = f"method: auto chose part-masses, because the shape {given}"
-        return PartCuts(cuts, weights, bias, options.materials, shape_error=error, tool=tool), (why,)
+        return PartCuts(cuts, shape.prior, bias, options.materials, shape.error, shape.places, tool), (why,)
     if options.method == "least-squares":
         return LeastSquares(bias=bias), ()
     if options.method == "geodesic":

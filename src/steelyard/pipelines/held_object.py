@@ -15,7 +15,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, within_numbers
 from steelyard.identify.tool import of_tools_run
 from steelyard.logs.log import MotionLog
-from steelyard.logs.recording import Recording
+from steelyard.logs.recording import KNOWN_PLACE, Recording
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import Load, looked_at, placed
 from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body
@@ -62,8 +62,8 @@ def identify(
     estimate = told(estimate, Noticed(before, late, of_sensor), rows, load, parts)
     if parts is not None and shape is not None:
         estimate = looked_at(estimate, parts, shape, load.shape is not None)
-        if load.shape and not any(recording.object_pose_std or ()):
-            estimate = estimate.noted("pose_in_sensor was taken as exact: give std_mm and std_deg with it if it is not")
+        if load.shape and recording.object_pose_std is None:
+            estimate = estimate.noted("give std_mm and std_deg with pose_in_sensor, both 0 where it is exact")
     moved = {stream.name: stream.moved for stream in recording.streams}
     delays_s = {name: late + moved.get(name, 0.0) for name, late in rows.aligned.delays_s.items()}
     estimate = replace(remedied(estimate, rows), delays_s=delays_s).with_findings(*of_tool).by_cause()
@@ -90,12 +90,12 @@ def identify_rows(
 ) -> Estimate:
     """Return what the robot holds, from rows made by the caller: fitted as they are, neither aligned nor checked.
 
-    tool, parts as in `identify`; `pose` is X_SO, where the object's frame sits in S (there, if None), and `pose_std`
-    its standard deviations [m], [rad].
+    tool, parts as in `identify`; `pose` is X_SO, where the object's frame sits in S (there exactly, if None), and
+    `pose_std` its standard deviations [m], [rad]; where None, the log tells how sure a given pose is.
     """
     if options.gravity == "unknown":
         raise BadValue('gravity "unknown" needs a recording with rotations: rows know gravity in the sensor only.')
-    shape = placed(parts, pose or Pose.identity(), pose_std)
+    shape = placed(parts, pose or Pose.identity(), KNOWN_PLACE if pose is None else pose_std)
     load = Load(log, Bias(options.bias, drift=options.drift), options, shape, tool)
     load, estimate = load.followed()
     estimate = load.without_tool(estimate).with_findings(*(() if tool is None else of_tools_run(tool)))

@@ -16,6 +16,7 @@ from steelyard.identify.masses.shape_error import MEASURED
 from steelyard.identify.masses.uneven import explains
 from steelyard.identify.tool import bias_prior, different_bias, shares_bias, without_tool
 from steelyard.logs.log import MotionLog
+from steelyard.logs.recording import KNOWN_PLACE
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.choice import Placed, estimator_for
 from steelyard.pipelines.options import Options
@@ -27,6 +28,9 @@ if TYPE_CHECKING:
 
 # [m] No robot holds a part that fills a cube of this edge; one of a centimetre in millimetres does.
 LARGEST = 2.0
+# [m], [rad] What a place in the sensor may err by, per axis, where nobody says: not at all, as in a fixture; as camera
+# and gripper do that are calibrated well, or fairly; as a tape measure does.
+PLACES = (KNOWN_PLACE, *((1e-3 * size, float(np.radians(size / 3))) for size in (1, 3, 10)))
 
 
 @dataclass(frozen=True)
@@ -58,9 +62,11 @@ class Load:
         estimate = replace(estimate, notes=(*notes, *estimate.notes))
         if self.shape is None:
             return estimate
-        parts, prior, error = self.shape
-        light = maybe_hollow(error, estimate.mass, float(parts[0].volume.sum()))
-        return replace(self, shape=(parts, prior, light[0])).estimate().noted(light[1]) if light else estimate
+        light = maybe_hollow(self.shape.error, estimate.mass, float(self.shape.cuts[0].volume.sum()))
+        if not light:
+            return estimate
+        error, note = light
+        return replace(self, shape=self.shape._replace(error=error)).estimate().noted(note)
 
     def followed(self) -> tuple[Load, Estimate]:
         """Return what was held, with the load, which has lost a shape that cannot follow what the log alone can say."""
@@ -86,8 +92,7 @@ class Load:
         except CannotAnswer:
             return self, estimate
         held = found if self.tool is None else without_tool(found, self.tool, shared=False)
-        cuts, _, error = self.shape
-        if lies_elsewhere(held, explains(estimate.findings), max(cuts, key=len), error):
+        if lies_elsewhere(held, explains(estimate.findings), self.shape.finest, self.shape.loosest):
             return alone, found
         return self, estimate
 
@@ -129,34 +134,37 @@ class Load:
 
 
 def placed(parts: Parts | Shape | None, pose: Pose | None, std: tuple[float, float] | None) -> Placed | None:
-    """Return cuts into parts in the sensor's frame, the weight that each has beforehand, and how wrong they may be."""
+    """Return the object's shape in the sensor's frame; None without one.
+
+    pose, std  X_SO and its standard deviations [m], [rad]; the log tells these (PLACES) where None
+    """
     if parts is None:
         return None
     if pose is None:
         raise BadValue(
             "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
         )
-    grasp = std or (0.0, 0.0)
+    places = PLACES if std is None else (std,)
     if isinstance(parts, Parts):
         _require_metres(parts)
         error = MEASURED.at_least(parts.com_std, parts.stretch, parts.turn_std)
-        return (parts.in_frame(pose),), None, error.placed(*grasp, pose.position)
+        return Placed((parts.in_frame(pose),), None, error.placed(*KNOWN_PLACE, pose.position), places)
     cuts = parts.cuts()
     in_sensor = tuple(cut.in_frame(pose) for cut in cuts.parts)
-    return in_sensor, cuts.prior, parts.error.placed(*grasp, pose.position)
+    return Placed(in_sensor, cuts.prior, parts.error.placed(*KNOWN_PLACE, pose.position), places)
 
 
 def looked_at(estimate: Estimate, parts: Parts | Shape, shape: Placed, followed: bool) -> Estimate:
     """Return the estimate with what its densities give away, and a shape that was not followed, before all findings."""
     dense = impossible_density(estimate, *_volume(parts, shape), estimate.parts)
-    lost = () if followed else (contradicted(estimate, max(shape[0], key=len)),)
+    lost = () if followed else (contradicted(estimate, shape.finest),)
     return replace(estimate, findings=(*dense, *lost, *estimate.findings))
 
 
 def _volume(parts: Parts | Shape, placed: Placed) -> tuple[float, float]:
     """Return the volume of a shape [m^3] and its standard deviation, as a share of it."""
-    std = placed[2].stretch if isinstance(parts, Parts) else parts.solid.volume_std
-    return float(placed[0][0].volume.sum()), std
+    std = placed.error.stretch if isinstance(parts, Parts) else parts.solid.volume_std
+    return float(placed.cuts[0].volume.sum()), std
 
 
 def _require_metres(parts: Parts) -> None:

@@ -14,7 +14,7 @@ import numpy as np
 from steelyard.check import Array, frozen
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import KNOWN_PLACE, Recording, Stream
 from steelyard.shape.inside import inside
 from steelyard.shape.views import Views
 from steelyard.simulate.motions import Kinematics, Step, StopAndGo
@@ -74,7 +74,8 @@ def recording(seed: int = 0) -> Example:
         Stream("wrench.csv", {"force": frozen(wrench[:, 3:]), "torque": frozen(wrench[:, :3])}, frozen(time)),
         Stream("pose.csv", {"rotation": turned.matrix, "position": frozen(position)}, frozen(poses.time)),
     )
-    made = Recording(streams, frozen(GRAVITY), -1, object_pose=tool().X_OS.inverse(), name="hammer")
+    place = tool().X_OS.inverse()
+    made = Recording(streams, frozen(GRAVITY), -1, object_pose=place, object_pose_std=KNOWN_PLACE, name="hammer")
     return Example(made, truth, tool())
 
 

@@ -62,6 +62,14 @@ class Effective:
         information = 0.5 * (found[:, :10] + found[:, :10].T)
         return replace(self, information=information, pull=found[:, 10].copy())
 
+    def cost_of(self, error: Array) -> float:
+        """Return what the log evidence of `blurred(error)` lacks beside that of other errors, up to what all share.
+
+        Half of log det(I + F G) + phi_hat^T (F^-1 + G)^-1 phi_hat: a wider error makes every log less likely.
+        """
+        size = np.linalg.slogdet(np.eye(10) + self.information @ error)[1]
+        return float(0.5 * (size + self.best @ self.blurred(error).pull))
+
     def beside(self, known: Array, covariance: Array) -> Effective:
         """Return what is said about the rest of a body, of which a part `known` (10,) up to `covariance` is taken away.
 

@@ -109,7 +109,7 @@ def _noise(noise: Mapping[str, float]) -> list[str]:
 
 
 def object_table(pose: Pose, std: tuple[float, float] | None = None, of: str = "the mesh's frame") -> str:
-    """Return the [object] table of a description: where the object's frame O sits in S; std in m and rad.
+    """Return the [object] table of a description: where the object's frame O sits in S; std [m], [rad].
 
     of  what the frame is, in words
     """

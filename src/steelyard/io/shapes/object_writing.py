@@ -16,6 +16,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recordings.recording_files import object_table
 from steelyard.io.view_folders import write_views
+from steelyard.logs.recording import KNOWN_PLACE
 from steelyard.parts.known import KnownObject
 from steelyard.shape.views import Views
 from steelyard.spatial import Pose
@@ -42,11 +43,11 @@ position = {{ columns = ["position_world"], unit = "m" }}
 force = {{ columns = ["force_sensor"], unit = "N" }}
 torque = {{ columns = ["torque_sensor"], unit = "N*m" }}
 """
-EXACT = "exact: no noise, no bias"
+NOISELESS = "exact: no noise, no bias"
 
 
 def write_object(
-    known: KnownObject, folder: Path | str, sensed: Mapping[str, Array] | None = None, said: str = EXACT
+    known: KnownObject, folder: Path | str, sensed: Mapping[str, Array] | None = None, said: str = NOISELESS
 ) -> None:
     """Write an object folder; it appears complete or not at all. Raises BadFile.
 
@@ -69,7 +70,7 @@ def write_object(
         if sensed is not None:
             write_bytes(new / "log.npz", _npz(dict(sensed)))
         log = _LOG.format(path="motion.npz" if sensed is None else "log.npz", said=said)
-        write_text(new / "log.toml", f"{log}\n{object_table(known.X_SO)}")
+        write_text(new / "log.toml", f"{log}\n{object_table(known.X_SO, KNOWN_PLACE)}")
 
 
 def write_object_views(views: Views, X_SW: Pose, folder: Path | str) -> None:
@@ -77,7 +78,7 @@ def write_object_views(views: Views, X_SW: Pose, folder: Path | str) -> None:
 
     `steelyard identify log.toml --scan FOLDER --pose-in-sensor FOLDER/object.toml` then runs as it stands.
     """
-    write_views(views, folder, {"object.toml": object_table(X_SW, of="the world of the views")})
+    write_views(views, folder, {"object.toml": object_table(X_SW, KNOWN_PLACE, of="the world of the views")})
 
 
 def _npz(arrays: dict[str, Any]) -> bytes:
