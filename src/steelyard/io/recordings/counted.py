@@ -22,6 +22,7 @@ _COUNTED = re.compile(r"(.+)_(\d+)")
 _WRENCHES = ("wrench", "ft", "force_torque", "ft_data", "ft_wrench", "forcetorque")
 _MATRICES = {"r", "rot", "rotation", "rotmat", "orientation", "ori", "xmat", "mat", "matrix"}
 _QUATERNIONS = {"q", "quat", "quats", "quaternion", "quaternions", "orientation", "rotation", "ori", "rot"}
+_OTHERS = {"d", "c", "cam", "camera", "object", "obj", "marker", "tag"}  # what is commanded (Franka), or no sensor
 _JOINTS = {"q", "joint", "joints", "qpos", "angles", "jointpositions"}
 _JOINT_STEMS = ("q", "j", "joint", "joint_", "a")
 _POSES = {"pose", "poses", "tcp", "ee", "eef", "position", "transform"}
@@ -49,7 +50,7 @@ def part_names(table: Table, runs: Mapping[str, tuple[int, ...]]) -> dict[str, i
             out |= dict(zip([*_vector(f"{simple}_force"), *_vector(f"{simple}_torque")], run, strict=True))
         elif len(run) == 9 and _MATRICES & set(simple.split("_")):
             out |= dict(zip(matrix_parts(simple), run, strict=True))
-        elif len(run) == 16:
+        elif len(run) == 16 and not (WANTED | _OTHERS) & set(name.split("_")):
             out |= _pose(simple, run, values(table, run))
     return out
 

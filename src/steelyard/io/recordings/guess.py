@@ -24,6 +24,7 @@ from steelyard.io.streams.missing_rows import stand_apart
 from steelyard.io.streams.usual_names import (
     STEMS,
     Names,
+    clock_by_unit,
     compared,
     rotation_named,
     said_unit,
@@ -50,6 +51,8 @@ def describe(table: Table) -> tuple[Description, Cells]:
     require_told(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     cells = table.read(sorted({*map(int, wanted), *stamps}), stamps)
+    if stamps and stamps == clock_by_unit(names) and not _rises(cells[stamps[0]]):
+        stamps = ()
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
     require_told(table, names, [spec.name for spec in specs])
@@ -63,6 +66,12 @@ def describe(table: Table) -> tuple[Description, Cells]:
     assumed = ASSUMED_GRAVITY_STD if notes else 0.0
     notes += _of_parts(table, names, located) + (() if rotation else left_out(table, names))
     return Description(tuple(streams), gravity, notes=notes, gravity_std=assumed), cells
+
+
+def _rises(column: np.ndarray[Any, np.dtype[Any]]) -> bool:
+    """Whether a column counts up, as a clock does."""
+    known = column[~np.isnan(column)]
+    return bool(len(known)) and bool((known[1:] >= known[:-1]).all()) and bool(known[-1] > known[0])
 
 
 def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:

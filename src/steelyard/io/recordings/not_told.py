@@ -53,7 +53,8 @@ def left_out(table: Table, names: Names) -> tuple[str, ...]:
     line = _open_lines(table, names).get("rotation")
     if line is None:
         return ()
-    return (f"an orientation was left out, which only a description can say how to read: rotation = {line}",)
+    shown = " ".join(line.split())
+    return (f"an orientation was left out, which only a description can say how to read: rotation = {shown}",)
 
 
 def cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> BadDescription:
@@ -96,10 +97,10 @@ def own_lines(table: Table, names: Names) -> dict[str, str]:
     if turn := rotation_named(names):
         numbers = [int(n) for n in turn.columns]
         lines["rotation"] = f'{{ columns = {_columns(table, numbers)}, form = "{turn.form}" }}   # S to W'
-    elif (several := rotations_named(names))[1]:
-        form, found = several
+    elif (rotations := rotations_named(names))[1]:
+        form, turns = rotations
         lines["rotation"] = (
-            f'{{ columns = {_columns(table, found[0])}, form = "{form}" }}   # S to W{_or(table, found)}'
+            f'{{ columns = {_columns(table, turns[0])}, form = "{form}" }}   # S to W{_or(table, turns)}'
         )
     for quantity, columns, rest, remark in known_lines(names):
         lines[quantity] = f"{{ columns = {_columns(table, columns)}, {rest} }}   # {remark}"

@@ -135,10 +135,15 @@ def time_columns(names: Names) -> Iterator[tuple[int, ...]]:
     yield from _whole_stamps(names, _SECONDS, True)
     if len(names.dates) == 1:
         yield names.dates
-    timed = [number for number, unit in names.units.items() if unit in TIME]
-    if len(timed) == 1:
-        yield tuple(timed)
+    if timed := clock_by_unit(names):
+        yield timed
     yield from _whole_stamps(names, _TIMES[1:], False)
+
+
+def clock_by_unit(names: Names) -> tuple[int, ...]:
+    """Return the only column with a unit of time; nothing without. It may be a duration, too, unless it rises."""
+    timed = tuple(number for number, unit in names.units.items() if unit in TIME)
+    return timed if len(timed) == 1 else ()
 
 
 def _whole_stamps(names: Names, stems: Sequence[str], alone: bool) -> Iterator[tuple[int, ...]]:
