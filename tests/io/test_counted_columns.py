@@ -164,6 +164,10 @@ def test_poses_in_one_array(tmp_path: Path, name: str, pose: np.ndarray, lines: 
     same(followed(tmp_path, caught.value), "position")
 
 
+def counted(pattern: str, count: int) -> list[str]:
+    return [pattern.format(k) for k in range(count)]
+
+
 MADE = {
     "Sunrise": (
         "ZeitInSec,ZeitInNanoSec,cartForce1_X,cartForce1_Y,cartForce1_Z,cartTorque1_TauX,cartTorque1_TauY,"
@@ -186,9 +190,7 @@ MADE = {
         [TIME, PLACE, TURN.log(), WRENCH],
     ),
     "libfranka": (
-        ",".join(
-            ["duration", "success rate", *(f"O_T_EE[{k}]" for k in range(16)), *(f"K_F_ext_hat_K[{k}]" for k in range(6))]
-        ),
+        ",".join(["duration", "success rate", *counted("O_T_EE[{}]", 16), *counted("K_F_ext_hat_K[{}]", 6)]),
         [1000 * TIME, 1 + 0 * TIME, np.swapaxes(POSE, 1, 2).reshape(ROWS, 16), WRENCH],
     ),
 }  # fmt: skip

@@ -78,6 +78,19 @@ def test_a_gyroscope_in_s_that_is_said_to_be_in_w(tmp_path: Path) -> None:
     assert read.streams[-1].frames["angular_velocity"] == "S"
 
 
+@pytest.mark.parametrize("unit", ["deg/s", "rad/s"])
+def test_a_gyroscope_in_another_unit(tmp_path: Path, unit: str) -> None:
+    made = with_gyroscope(tmp_path, "W", Rotation.identity())
+    (*others, gyro) = made.streams
+    factor = 180 / np.pi if unit == "deg/s" else np.pi / 180
+    shown = replace(gyro, channels={"angular_velocity": factor * gyro.channels["angular_velocity"]})
+    read, findings = examine(replace(made, streams=(*others, shown)))
+    assert [f.code for f in findings] == ["gravity-frame"]
+    assert findings[0].remedy == f'Set unit = "{unit}" and frame = "S" in its angular_velocity.'
+    meant = gyro.channels["angular_velocity"]
+    np.testing.assert_allclose(read.streams[-1].channels["angular_velocity"], meant, atol=1e-12)
+
+
 def test_a_gyroscope_whose_axes_are_turned(tmp_path: Path) -> None:
     made = with_gyroscope(tmp_path, "S", Rotation.exp([0.0, 0.0, 1.4]))
     read, findings = examine(made)

@@ -1,6 +1,6 @@
-"""Turning: a gyroscope's angular velocity beside that of the rotations, which shows in whose axes it is.
+"""Turning: a gyroscope's angular velocity beside that of the rotations, which shows in which axes and unit it is.
 
-Read in the wrong axes it would give accelerations that no body felt.
+Read otherwise it would give accelerations that no body felt.
 """
 
 from __future__ import annotations
@@ -19,13 +19,18 @@ from steelyard.spatial import Rotation
 # As given more than the first share of the square of the angular velocity is unlike that of the rotations; as it was
 # meant less than the second. A delay of 0.1 s leaves less.
 UNLIKE, ALIKE = 0.25, 0.1
+_DEGREE = np.pi / 180
+_ABOUT = 0.2  # a gyroscope in another unit is that much off the rotations at most
 _RATE_HZ = 60.0
 _FEWEST_ROWS = 60
 _SECOND = 0.02  # of the largest: turns about one axis do not tell how a gyroscope sits
 
 
 def examine_turning(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording with the angular velocity in the axes in which it follows the rotations, and a finding."""
+    """Return the recording with the angular velocity in the axes and unit in which it follows the rotations.
+
+    Also returns a finding where those are not the ones that it was said to be in.
+    """
     given = next(channel(recording, "angular_velocity"), None)
     turned = next(channel(recording, "rotation"), None)
     both = None if given is None or turned is None else _side_by_side(given[0], turned[0])
@@ -33,24 +38,45 @@ def examine_turning(recording: Recording) -> tuple[Recording, tuple[Finding, ...
         return recording, ()
     stream, shown, rotation, omega = given[0], *both
     frame = stream.frames.get("angular_velocity", "S")
-    in_axes = {"S": omega, "W": np.einsum("nij,nj->ni", rotation, omega)}
-    other = "S" if frame == "W" else "W"
-    unlike = _share(shown, in_axes[frame])
+    unlike = _share(shown, omega if frame == "S" else _into_world(rotation, omega))
     if unlike < UNLIKE:
         return recording, ()
-    if (left := _share(shown, in_axes[other])) < ALIKE:
-        meant = replace(stream, frames={**stream.frames, "angular_velocity": other})
-        text = f"The angular velocity of '{stream.name}' is in the axes of {other}, not of {frame}"
-        finding = Finding("gravity-frame", _text(text, left, unlike), f'Set frame = "{other}" in its angular_velocity.')
-        return _with(recording, stream, meant), (finding,)
+    factor, said, remedies = _unit(shown, omega)
+    if (other := _axes(factor * shown, rotation, omega, frame)) is not None:
+        left, meant = other
+        if meant != frame:
+            said.append(f"in the axes of {meant}, not of {frame}")
+            remedies.append(f'frame = "{meant}"')
+        text = f"The angular velocity of '{stream.name}' is {' and '.join(said)}"
+        remedy = f"Set {' and '.join(remedies)} in its angular_velocity."
+        return _read(recording, stream, factor, meant), (Finding("gravity-frame", _text(text, left, unlike), remedy),)
     mount = _mount(shown, omega)
-    if frame == "W" or mount is None or (left := _share(mount.apply(shown), omega)) > ALIKE:
+    if frame == "W" or mount is None or (left := _share(mount.apply(factor * shown), omega)) > ALIKE:
         return recording, ()
-    values = mount.apply(stream.channels["angular_velocity"])
-    meant = replace(stream, channels={**stream.channels, "angular_velocity": values})
-    text = f"The gyroscope of '{stream.name}' is turned by {np.degrees(float(mount.angle())):.1f} degrees against S"
+    degrees = f"{np.degrees(float(mount.angle())):.1f} degrees"
+    text = f"The gyroscope of '{stream.name}' is {' and '.join([*said, f'turned by {degrees} against S'])}"
     remedy = "Turn the angular velocity into the axes of S beforehand, or leave it out: the rotations tell it, too."
-    return _with(recording, stream, meant), (Finding("imu-rotated", _text(text, left, unlike), remedy),)
+    return _read(recording, stream, factor, "S", mount), (Finding("imu-rotated", _text(text, left, unlike), remedy),)
+
+
+def _into_world(rotation: Array, omega: Array) -> Array:
+    return np.asarray(np.einsum("nij,nj->ni", rotation, omega))
+
+
+def _unit(shown: Array, omega: Array) -> tuple[float, list[str], list[str]]:
+    """Return what the angular velocity must be multiplied with to be as large as that of the rotations, and words."""
+    ratio = float(np.sqrt((shown**2).sum() / max(float((omega**2).sum()), 1e-300)))
+    for factor, is_in, read_as in ((_DEGREE, "deg/s", "rad/s"), (1 / _DEGREE, "rad/s", "deg/s")):
+        if abs(ratio * factor - 1) < _ABOUT:
+            return factor, [f"in {is_in}, not in {read_as}"], [f'unit = "{is_in}"']
+    return 1.0, [], []
+
+
+def _axes(shown: Array, rotation: Array, omega: Array, frame: str) -> tuple[float, str] | None:
+    """Return the share that is left, and the axes in which an angular velocity is that of the rotations."""
+    shares = {"S": _share(shown, omega), "W": _share(shown, _into_world(rotation, omega))}
+    best = min(shares, key=lambda name: (shares[name] > ALIKE, name != frame))
+    return (shares[best], best) if shares[best] < ALIKE else None
 
 
 def _side_by_side(given: Stream, turned: Stream) -> tuple[Array, Array, Array] | None:
@@ -88,5 +114,9 @@ def _text(what: str, left: float, unlike: float) -> str:
     )
 
 
-def _with(recording: Recording, old: Stream, new: Stream) -> Recording:
+def _read(recording: Recording, old: Stream, factor: float, frame: str, mount: Rotation | None = None) -> Recording:
+    """Return the recording with the angular velocity of a stream times a factor, in a frame, or turned into S."""
+    values = factor * old.channels["angular_velocity"]
+    channels = {**old.channels, "angular_velocity": values if mount is None else mount.apply(values)}
+    new = replace(old, channels=channels, frames={**old.frames, "angular_velocity": frame})
     return replace(recording, streams=tuple(new if stream is old else stream for stream in recording.streams))
