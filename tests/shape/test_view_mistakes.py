@@ -62,6 +62,7 @@ WRONG: list[tuple[str, Callable[[Views], Views], str]] = [
     ("centimetres", lambda v: moved(v, 100), "divided by 100, .*: give them in metres"),
     ("a thousandth", lambda v: moved(v, 0.001), "times 1000, .*: give them in metres"),
     ("no scale", lambda v: moved(v, 3.7), r"poses times 0\.2[67]\d?, .*\(poses from images alone"),
+    ("inverted, no scale", lambda v: v.posed(moved(v, 3.7).X_WC.inverse()), r"then times 0\.2[67]\d?, .*\(COLMAP"),
     ("no scale, small", lambda v: moved(v, 0.13), r"poses times 7\.[5-9]\d?, .*: give them in metres \("),
     ("depth in 0.1 mm", lambda v: replace(v, depth_unit=1e-4), '"depth_unit_m": 0.001, .*: correct it in camera.json'),
     ("depth in cm", lambda v: replace(v, depth_unit=1e-2), '"depth_unit_m": 0.001, .*: correct it in camera.json'),

@@ -25,7 +25,17 @@ _NUMBERED = {
     "torque": '{ columns = [4, 5, 6], unit = "N*m" }',
     "rotation": '{ columns = [7, 8, 9, 10], form = "quaternion-wxyz" }   # S to W',
 }
-_ATTITUDES = ("rotation", "gravity", "specific_force")
+_ELSE = {
+    "time": ", or leave the line out",
+    "rotation": "; those of another file in a [[stream]] of its own",
+}
+_ATTITUDES = ("rotation", "gravity", "specific_force", "joint_position")
+_FIRST_BEYOND = {"time": 1, "force": 4, "torque": 7, "rotation": 11}
+_ROBOT = """
+[robot]
+urdf        = "arm.urdf"     # put the file of your arm here
+sensor_link = "tool0"        # S: a link at the sensor's origin, along its axes
+"""
 _WIDTH = 8
 
 
@@ -34,21 +44,24 @@ def columns_text(names: Sequence[str]) -> str:
     return f"[{', '.join(toml_string(name) for name in names)}]"
 
 
-def example_of(path: str, lines: Mapping[str, str], numbered: bool = False) -> str:
+def example_of(path: str, lines: Mapping[str, str], count: int | None = None) -> str:
     """Return a description of the file `path`.
 
-    lines     quantity -> its table; of those that are not known the usual one stands, marked as not the file's own
-    numbered  the file has no names: its columns are counted
+    lines  quantity -> its table; of those that are not known the usual one stands, marked as not the file's own
+    count  of the columns where the file has no names: they are called by number
     """
     attitude = next((name for name in _ATTITUDES if name in lines), "rotation")
     rows = [("path", toml_string(path))]
     for name in ("time", "force", "torque", attitude):
-        mark = "put your columns here" + (", or leave the line out" if name == "time" else "")
-        usual = _NUMBERED[name] if numbered else f"{_USUAL.get(name)}   # {mark}"
+        mark = "put your columns here" + _ELSE.get(name, "")
+        usual = f"{_USUAL.get(name)}   # {mark}"
+        if count is not None:
+            usual = _NUMBERED[name] if _FIRST_BEYOND[name] <= count and not lines else f"{_NUMBERED[name]}   # {mark}"
         rows.append((name, lines.get(name, usual)))
     if "position" in lines:
         rows.append(("position", lines["position"]))
-    return HEAD + "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows)
+    robot = _ROBOT if attitude == "joint_position" else ""
+    return HEAD + "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows) + robot
 
 
 EXAMPLE = example_of("data.csv", _USUAL)

@@ -18,12 +18,16 @@ class Header:
     count   number of columns
     groups  arrays with several columns (NPZ, lists in cells): name -> its column numbers
     dates   numbers of the columns of a text that hold dates
+    words   numbers of the columns of a text that hold neither numbers nor dates
+    shapes  shape of every array of an NPZ, also of those that are no columns
     """
 
     names: tuple[str, ...] | None
     count: int
     groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
     dates: tuple[int, ...] = ()
+    words: tuple[int, ...] = ()
+    shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     def shown(self) -> list[str]:
         """Return the names to list in a message: arrays with several columns appear once."""

@@ -12,6 +12,7 @@ from steelyard.sanity.readings.clock_offset import examine_offset
 from steelyard.sanity.readings.clock_unit import examine_clock
 from steelyard.sanity.readings.conventions import examine_conventions, examine_turns
 from steelyard.sanity.readings.silent import without_silent
+from steelyard.sanity.readings.turning import examine_turning
 from steelyard.sanity.readings.units import examine_units
 from steelyard.sanity.rows.frozen_rows import dead_channels
 from steelyard.sanity.rows.judged import examine_rows
@@ -38,7 +39,8 @@ def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     recording, offset = examine_offset(recording)
     recording, turns = examine_turns(recording)
     recording, conventions = examine_conventions(examine_memory(recording))
-    conventions = (*turns, *conventions)
+    recording, turning = examine_turning(recording)
+    conventions = (*turns, *conventions, *turning)
     # Misread rotations leave a channel unexplained, too.
     recording, silent = (recording, ()) if conventions else without_silent(recording)
     return recording, (*read, *clock, *rows, *units, *offset, *conventions, *silent)

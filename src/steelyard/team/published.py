@@ -31,7 +31,7 @@ from steelyard.team.mass_and_com import MassAndCom, mass_and_com
 
 _STILL_RATE, _STILL_SPEED = 0.02, 0.005  # [rad/s, m/s] as for one arm: below them a row of a moving log is at rest
 FORMAL = (
-    "Standard deviations are formal, from white residuals of each step by itself: the paper gives none, and with "
+    "standard deviations are formal, from white residuals of each step by itself: the paper gives none, and with "
     "correlated noise or force bias these are too small."
 )
 

@@ -198,7 +198,7 @@ def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:
     if not team.identified[0] or moved < 2 * float(team.std[0]):
         return ()
     return (
-        f"Error bars hold no gain error that lasts: 1 % on every force axis would move the mass by {moved:.2g} kg, "
+        f"error bars hold no gain error that lasts: 1 % on every force axis would move the mass by {moved:.2g} kg, "
         "and the centre of mass with it.",
     )
 

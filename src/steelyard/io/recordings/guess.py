@@ -14,15 +14,17 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.io.entries import listed
+from steelyard.io.recordings.counted import counted, part_names
 from steelyard.io.recordings.description import ASSUMED, Description, default_gravity
-from steelyard.io.recordings.not_told import cannot_tell, own_lines, require_told
+from steelyard.io.recordings.not_told import cannot_tell, left_out, numbered_lines, own_lines, require_told
+from steelyard.io.recordings.sizes import SLOWEST, median_size, stamp_unit, unit_by_size
 from steelyard.io.streams.channels import channel_with_gaps
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.streams.missing_rows import stand_apart
 from steelyard.io.streams.usual_names import (
     STEMS,
     Names,
-    array_names,
+    clock_by_unit,
     compared,
     rotation_named,
     said_unit,
@@ -31,17 +33,12 @@ from steelyard.io.streams.usual_names import (
     vector_named,
 )
 from steelyard.io.tables.files import Table
-from steelyard.io.units import TIME, UNITS
+from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 _UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
 
-_EPOCH = (1e9, 1e10)  # [s] stamps since 1970 lie here from 2001 to 2286
-_SLOWEST = 10.0  # [s] longer steps than this are not seconds
-_ONE_G = (0.8, 1.25)  # size of an accelerometer reading in g
-_GRAVITY = (9.7, 9.9)
-_SPECIFIC_FORCE = (8.0, 12.0)
 _NEW_POSE = float(np.cos(np.radians(5)))
 
 
@@ -54,6 +51,8 @@ def describe(table: Table) -> tuple[Description, Cells]:
     require_told(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     cells = table.read(sorted({*map(int, wanted), *stamps}), stamps)
+    if stamps and stamps == clock_by_unit(names) and not _rises(cells[stamps[0]]):
+        stamps = ()
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
     require_told(table, names, [spec.name for spec in specs])
@@ -64,7 +63,15 @@ def describe(table: Table) -> tuple[Description, Cells]:
     located = [QuantitySpec(s.name, s.columns, s.unit, f"{where}, {s.name}", s.form, s.frame) for s in specs]
     time = time and replace(time, where=f"{where}, time")
     streams = [StreamSpec(where, topic, where, time, poses) for topic in _topics(located, cells, time)]
-    return Description(tuple(streams), gravity, notes=notes, gravity_std=ASSUMED_GRAVITY_STD if notes else 0.0), cells
+    assumed = ASSUMED_GRAVITY_STD if notes else 0.0
+    notes += _of_parts(table, names, located) + (() if rotation else left_out(table, names))
+    return Description(tuple(streams), gravity, notes=notes, gravity_std=assumed), cells
+
+
+def _rises(column: np.ndarray[Any, np.dtype[Any]]) -> bool:
+    """Whether a column counts up, as a clock does."""
+    known = column[~np.isnan(column)]
+    return bool(len(known)) and bool((known[1:] >= known[:-1]).all()) and bool(known[-1] > known[0])
 
 
 def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
@@ -82,10 +89,23 @@ def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) 
     return [tuple(group) for _, group in topics]
 
 
+def _of_parts(table: Table, names: Names, specs: Sequence[QuantitySpec]) -> tuple[str, ...]:
+    """Return notes on counted columns whose parts were taken by their number."""
+    used = {spec.name: set(spec.columns) for spec in specs}
+    out = []
+    for run in names.counted.values():
+        name = (table.header.names or ())[run[0]].removesuffix("[0]").removesuffix("_0")
+        if len(run) == 6 and used["force"] | used["torque"] == set(run):
+            out.append(f"the six numbers of '{name}' were taken as force, then torque")
+        if len(run) == 16 and used.get("rotation", set()) < set(run):
+            out.append(f"the 4 x 4 matrices of '{name}' were taken as poses of S in W")
+    return tuple(out)
+
+
 def _simplified(table: Table) -> Names:
     header = table.header
     if header.names is None:
-        raise cannot_tell(table, "the file has no header", {})
+        raise cannot_tell(table, "the file has no header", numbered_lines(table))
     plain: dict[str, int] = {}
     units: dict[int, str] = {}
     inner = {n for group in header.groups.values() for n in group}
@@ -95,10 +115,11 @@ def _simplified(table: Table) -> Names:
             units[number] = unit.group(1)
         simple = compared(name[: unit.start()] if unit else name)
         if simple in plain:
-            known = Names(plain, units, header.dates)
+            known = Names(plain, units, header.dates, header.words)
             raise cannot_tell(table, f'two columns are called "{simple}"', own_lines(table, known))
         plain[simple] = number
-    return Names({**plain, **array_names(header)}, units, header.dates)
+    runs = counted(plain)
+    return Names({**plain, **part_names(table, runs)}, units, header.dates, header.words, runs)
 
 
 def _vector_spec(
@@ -114,17 +135,8 @@ def _vector_spec(
         reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
         raise cannot_tell(table, reason, own_lines(table, names))
     if unit is None:
-        unit = _unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
+        unit = unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))
     return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)
-
-
-def _unit_by_size(quantity: str, values: Array) -> str | None:
-    """Return SI; an accelerometer shows whether it counts in g, and gravity that it is gravity."""
-    size = _size(values) if len(values) else 0.0
-    if quantity == "specific_force" and _ONE_G[0] < size < _ONE_G[1]:
-        return "g"
-    low, high = {"specific_force": _SPECIFIC_FORCE, "gravity": _GRAVITY}.get(quantity, (-1.0, np.inf))
-    return next(iter(UNITS[quantity])) if low < size < high or not np.isfinite(size) else None
 
 
 def _time_units(table: Table, names: Names, stamps: Sequence[int], cells: Cells) -> tuple[str, ...]:
@@ -138,22 +150,11 @@ def _time_unit(table: Table, names: Names, number: int, cells: Cells) -> str:
         return said
     if cells[number].dtype.kind == "M":
         return "s"
-    stamps = cells[number].astype(np.float64)
-    stamps = stamps[np.isfinite(stamps)]
-    for unit, per_second in TIME.items():
-        if len(stamps) and _EPOCH[0] < stamps[0] / per_second < _EPOCH[1]:
-            return unit
-    step = float(np.median(np.diff(stamps))) if len(stamps) > 1 else 0.0
-    if step > _SLOWEST:
+    unit, step = stamp_unit(cells[number])
+    if unit is None and step > SLOWEST:
         reason = f"time rises by {step:g} per row, which can hardly be seconds"
         raise cannot_tell(table, reason, own_lines(table, names))
-    return "s"
-
-
-def _size(values: Array) -> float:
-    """Return the median length of the rows of (N, 3) that hold numbers; NaN where none does."""
-    sizes = np.linalg.norm(values[np.isfinite(values).all(-1)], axis=-1)
-    return float(np.median(sizes)) if len(sizes) else float("nan")
+    return unit or "s"
 
 
 def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[str, ...]]:
@@ -161,7 +162,7 @@ def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[
     for spec in specs:
         if spec.name == "gravity":
             values = np.stack([cells[int(n)] for n in spec.columns], -1)
-            return np.array([0.0, 0.0, -_size(values)]), ()
+            return np.array([0.0, 0.0, -median_size(values)]), ()
     way = " along -z of the world" if any(spec.name == "rotation" for spec in specs) else ""
     return default_gravity(), (
         f"the file does not say gravity: {ASSUMED}{way} was assumed ([log] gravity of a description)",

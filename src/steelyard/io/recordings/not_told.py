@@ -8,52 +8,80 @@ from steelyard.errors import BadDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
 from steelyard.io.recordings.controllers import known_lines
+from steelyard.io.recordings.counted import joints, open_pose, open_quaternion, values
+from steelyard.io.recordings.sizes import SLOWEST, angle_unit, length_unit, stamp_unit
 from steelyard.io.streams.usual_names import (
     ANGLES,
     Names,
     rotation_named,
+    rotations_named,
     said_unit,
     said_units,
     time_columns,
     vector_named,
+    vectors_named,
 )
 from steelyard.io.tables.files import Table
-from steelyard.io.units import UNITS
+from steelyard.io.units import ANGLE, UNITS
+
+_ORDERS = ("quaternion-xyzw", "quaternion-wxyz")
 
 
 def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
     """Raise BadDescription where the wrench or the direction of gravity is not among the quantities found."""
     missing = [name for name in ("force", "torque") if name not in found]
     if missing:
-        raise cannot_tell(table, f"no {' and no '.join(missing)} was recognised", own_lines(table, names))
-    if not {"rotation", "gravity", "specific_force"} & set(found):
-        _require_no_angles(table, names)
-        reason = "nothing says where gravity points in the sensor frame"
+        reason = f"no {' and no '.join(missing)} was recognised"
+        if all(len(vectors_named(names, name)) > 1 for name in missing):
+            reason = f"several columns may be the {' and the '.join(missing)}"
         raise cannot_tell(table, reason, own_lines(table, names))
-
-
-def _require_no_angles(table: Table, names: Names) -> None:
-    """Raise BadDescription with the line to write where the orientation is there, but as angles."""
-    for three, (form, unit) in ANGLES.items():
-        found = names.all_of(three, len(three[0]) < 3)
-        if found:
-            line = f'{{ columns = {_columns(table, found)}, form = "{form}", unit = "{unit}" }}   # S to W; check both'
-            raise cannot_tell(
-                table,
+    if not {"rotation", "gravity", "specific_force"} & set(found):
+        lines = own_lines(table, names)
+        reason = "nothing says where gravity points in the sensor frame"
+        if "rotation" in lines:
+            reason = "only a description can say how the columns of the orientation turn the sensor"
+        if three := next((three for three in ANGLES if names.all_of(three, False)), None):
+            reason = (
                 f"{', '.join(three)} turn the sensor, but only a description can say in which form (rpy or "
-                "rotation-vector) and unit (deg or rad)",
-                {**own_lines(table, names), "rotation": line},
+                "rotation-vector) and unit (deg or rad)"
             )
+        raise cannot_tell(table, reason, lines)
+
+
+def left_out(table: Table, names: Names) -> tuple[str, ...]:
+    """Return a note on columns that seem to be the orientation, and were not read because they do not say how."""
+    line = _open_lines(table, names).get("rotation")
+    if line is None:
+        return ()
+    shown = " ".join(line.split())
+    return (f"an orientation was left out, which only a description can say how to read: rotation = {shown}",)
 
 
 def cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> BadDescription:
     """Return the error; `lines` are those of a description that the names of the file do tell."""
     names = table.header.names
-    shown = f"Columns here: {listed(table.header.shown())}." if names else f"It has {table.header.count} columns."
+    shown = f"Columns here: {listed(_shown(table))}." if names else f"It has {table.header.count} columns."
+    example = example_of(table.path.name, lines, None if names else table.header.count)
     return BadDescription(
-        f"{table.path}: cannot tell what the columns are: {reason}. {shown} "
-        f"Write a description that says it, for example:\n{example_of(table.path.name, lines, not names)}"
+        f"{table.path}: cannot tell what the columns are: {reason}. {shown}{_lying(table)} "
+        f"Write a description that says it, for example:\n{example}"
     )
+
+
+def _shown(table: Table) -> list[str]:
+    """Return the names of the columns; of arrays with several with their number, as "wrench[0..5]"."""
+    groups = table.header.groups
+    return [f"{name}[0..{len(groups[name]) - 1}]" if name in groups else name for name in table.header.shown()]
+
+
+def _lying(table: Table) -> str:
+    """Return what to do with arrays that have one column per row of the others."""
+    shapes = table.header.shapes
+    rows = max((shape[0] for shape in shapes.values() if len(shape) == 1), default=0)
+    lying = [name for name, shape in shapes.items() if len(shape) == 2 and shape[1] == rows > shape[0]]
+    if not lying:
+        return ""
+    return f' Arrays need one row per sample; "{lying[0]}" has {rows} columns: save {lying[0]}.T.'
 
 
 def own_lines(table: Table, names: Names) -> dict[str, str]:
@@ -61,21 +89,108 @@ def own_lines(table: Table, names: Names) -> dict[str, str]:
     lines = {}
     stamps = next(time_columns(names), ())
     if stamps:
-        told = None if len(stamps) > 1 else said_unit(names, stamps[0])
-        units = '["s", "ns"]' if len(stamps) > 1 else f'"{told or "s"}"'
-        mark = "" if told or len(stamps) > 1 else "   # check the unit: s, ms, us or ns"
-        lines["time"] = f"{{ columns = {_columns(table, stamps)}, unit = {units} }}{mark}"
+        lines["time"] = _time_line(table, names, stamps)
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
-        if (found := vector_named(names, quantity)) and len(said := said_units(names, quantity, found)) < 2:
-            unit = said[0] if said and said[0] in UNITS[quantity] else next(iter(UNITS[quantity]))
-            mark = "   # of S in W; check the unit" if quantity == "position" else ""
-            lines[quantity] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}{mark}'
+        if line := _vector_line(table, names, quantity):
+            lines[quantity] = line
+    lines |= _open_lines(table, names)
     if turn := rotation_named(names):
         numbers = [int(n) for n in turn.columns]
         lines["rotation"] = f'{{ columns = {_columns(table, numbers)}, form = "{turn.form}" }}   # S to W'
-    for quantity, columns, rest, remark in known_lines(names.plain):
+    elif (rotations := rotations_named(names))[1]:
+        form, turns = rotations
+        lines["rotation"] = (
+            f'{{ columns = {_columns(table, turns[0])}, form = "{form}" }}   # S to W{_or(table, turns)}'
+        )
+    for quantity, columns, rest, remark in known_lines(names):
         lines[quantity] = f"{{ columns = {_columns(table, columns)}, {rest} }}   # {remark}"
+    if not {"rotation", "gravity", "specific_force"} & set(lines) and (found := joints(names)):
+        unit = angle_unit(values(table, found)) or "rad"
+        lines["joint_position"] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}   # from base to sensor'
     return lines
+
+
+def numbered_lines(table: Table) -> dict[str, str]:
+    """Return the lines of a file without header that begins as `ros2 topic echo --csv` writes it, else none."""
+    first = values(table, (0, 1)) if table.header.count > 2 else None
+    if first is None or 2 not in table.header.words or stamp_unit(first[:, 0])[0] != "s":
+        return {}
+    lines = {"time": '{ columns = [0, 1], unit = ["s", "ns"] }   # columns are counted from 0'}
+    if table.header.count == 9:
+        lines["force"] = '{ columns = [3, 4, 5], unit = "N" }   # as a WrenchStamped of ROS 2'
+        lines["torque"] = '{ columns = [6, 7, 8], unit = "N*m" }'
+    return lines
+
+
+def _time_line(table: Table, names: Names, stamps: Sequence[int]) -> str:
+    columns = _columns(table, stamps)
+    if len(stamps) > 1:
+        return f'{{ columns = {columns}, unit = ["s", "ns"] }}'
+    if told := said_unit(names, stamps[0]):
+        return f'{{ columns = {columns}, unit = "{told}" }}'
+    found = values(table, stamps) if stamps[0] not in names.dates else None
+    unit, step = stamp_unit(found[:, 0]) if found is not None else (None, 0.0)
+    if unit is None and step > SLOWEST:
+        unit = next(unit for unit, longest in (("ms", 1e3), ("us", 1e6), ("ns", float("inf"))) if step < longest)
+    return f'{{ columns = {columns}, unit = "{unit or "s"}" }}   # check the unit: s, ms, us or ns'
+
+
+def _vector_line(table: Table, names: Names, quantity: str) -> str | None:
+    """Return the line of a vector, with the other columns that may be meant; None where there is none."""
+    several = vectors_named(names, quantity)
+    found = vector_named(names, quantity) or next(iter(several), ())
+    said = said_units(names, quantity, found)
+    if not found or len(said) > 1:
+        return None
+    unit, mark = next(iter(UNITS[quantity])), ""
+    if said and said[0] in UNITS[quantity]:
+        unit = said[0]
+    elif quantity == "position":
+        unit = length_unit(values(table, found))
+    if quantity == "position":
+        mark = "   # of S in W; check the unit"
+    elif found in several and len(several) > 1:
+        mark = f"   #{_or(table, several)}"
+    return f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}{mark}'
+
+
+def _or(table: Table, several: Sequence[tuple[int, ...]]) -> str:
+    return "".join(f" or {_columns(table, other)}" for other in several[1:])
+
+
+def _open_lines(table: Table, names: Names) -> dict[str, str]:
+    """Return lines of columns that turn the sensor in a form that they leave open, and of the position beside them."""
+    for three, (form, unit) in ANGLES.items():
+        if found := names.all_of(three, False):
+            said = next((names.units[n] for n in found if names.units.get(n) in ANGLE), None)
+            return {"rotation": _angle_line(table, found, form, said or angle_unit(values(table, found)) or unit)}
+    four, scalar_first = open_quaternion(names)
+    if four:
+        return {"rotation": _quaternion_line(table, four, scalar_first)}
+    if pose := open_pose(names):
+        place, turn = pose[:3], pose[3:]
+        unit = length_unit(values(table, place))
+        angles = angle_unit(values(table, turn)) or "rad"
+        return {
+            "position": f'{{ columns = {_columns(table, place)}, unit = "{unit}" }}   # of S in W; check the unit',
+            "rotation": _quaternion_line(table, turn, False)
+            if len(turn) == 4
+            else _angle_line(table, turn, "rotation-vector", angles),
+        }
+    return {}
+
+
+def _quaternion_line(table: Table, columns: Sequence[int], scalar_first: bool) -> str:
+    form, other = _ORDERS[::-1] if scalar_first else _ORDERS
+    shown = f'{{ columns = {_columns(table, columns)}, form = "{form}" }}'
+    return f'{shown}   # S to W; or "{other}": the file does not tell which of the four is w'
+
+
+def _angle_line(table: Table, columns: Sequence[int], form: str, unit: str) -> str:
+    """Return the line of three angles; in degrees no maker gives a rotation vector."""
+    form, other = ("rpy", "rotation-vector") if unit == "deg" or form == "rpy" else ("rotation-vector", "rpy")
+    shown = f'{{ columns = {_columns(table, columns)}, form = "{form}", unit = "{unit}" }}'
+    return f'{shown}   # S to W; check both: the form may be "{other}", too'
 
 
 def _columns(table: Table, numbers: Sequence[int]) -> str:

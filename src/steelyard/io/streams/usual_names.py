@@ -7,52 +7,69 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 from steelyard.io.streams.entries import QuantitySpec
-from steelyard.io.table_header import Header
 from steelyard.io.units import TIME, spelled
 
 # Quantity -> stems of its three names, each followed by x, y, z. Position and velocities are in W or S as in
 # descriptions; a linear velocity does not say its frame, and is not needed, so it is not read.
 STEMS: dict[str, tuple[str, ...]] = {
-    "force": ("f", "force"),
-    "torque": ("t", "torque", "tau", "moment", "m"),
+    "force": ("f", "force", "forces", "ft_f", "wrench_f", "kraft"),
+    "torque": ("t", "torque", "tau", "moment", "m", "torques", "ft_t", "ft_m", "wrench_t", "wrench_m", "drehmoment"),
     "specific_force": ("a", "acc", "accel", "acceleration", "specific_force", "linear_acceleration"),
     "gravity": ("g", "gravity"),
-    "position": ("", "p", "pos", "position", "translation"),
+    "position": ("", "p", "pos", "position", "translation", "positions", "tcp"),
     "angular_velocity": ("w", "omega", "angular_velocity"),
     "angular_acceleration": ("alpha", "angular_acceleration"),
 }
-_QUATERNION = ("q", "quat", "quaternion", "orientation", "rotation")
+_QUATERNION = ("q", "quat", "quaternion", "orientation", "rotation", "ori")
 # Angles leave open in which order they turn and whether they are degrees. Names -> the form and unit that are usual.
 ANGLES = {("roll", "pitch", "yaw"): ("rpy", "deg"), ("rx", "ry", "rz"): ("rotation-vector", "rad")}
 _MATRIX = tuple(f"r{i}{j}" for i in "123" for j in "123")
-_TIMES = ("t", "time", "timestamp", "stamp")
+_TIMES = ("t", "time", "timestamp", "stamp", "times", "timestamps", "sample_times", "zeit")
 _SECONDS = ("secs", "seconds")  # the whole stamp, unless its nanoseconds stand beside it
-_SPLIT = (("sec", "nanosec"), ("secs", "nsecs"))  # ROS; "header.stamp." may stand in front
+# ROS ("header.stamp." may stand in front), KUKA's Sunrise
+_SPLIT = (("sec", "nanosec"), ("secs", "nsecs"), ("zeitinsec", "zeitinnanosec"))
+# Words of a name that say what was wanted, not what was measured.
+WANTED = {"desired", "target", "goal", "cmd", "command", "commanded", "ref", "reference", "setpoint"}
 _SEPARATOR = re.compile(r"[^a-z0-9]+")
 
 
 @dataclass(frozen=True)
 class Names:
-    """Column numbers by simplified name, units by column number, and the numbers of columns that hold dates."""
+    """Columns by what they are called.
+
+    plain   simplified name -> number
+    units   number -> the unit that stands in its name
+    dates   numbers of the columns that hold dates, `words` of those that hold neither dates nor numbers
+    counted name -> numbers of the columns that are counted behind it from 0, as those of an array are
+    """
 
     plain: dict[str, int]
     units: dict[int, str]
     dates: tuple[int, ...] = ()
-
-    def find(self, name: str, alone: bool) -> int | None:
-        """Return the column called `name`, or, unless `alone`, the only one ending in it after a prefix."""
-        if alone or name in self.plain:
-            return self.plain.get(name)
-        ends = [number for key, number in self.plain.items() if key.endswith(f"_{name}")]
-        return ends[0] if len(ends) == 1 else None
+    words: tuple[int, ...] = ()
+    counted: dict[str, tuple[int, ...]] = field(default_factory=dict)
 
     def all_of(self, names: Sequence[str], alone: bool) -> tuple[int, ...]:
-        """Return the columns of all `names`; nothing where one is missing."""
-        found = [self.find(name, alone) for name in names]
-        return tuple(number for number in found if number is not None) if None not in found else ()
+        """Return the columns called `names`, or, unless `alone`, all of them behind the only prefix that has them."""
+        if all(name in self.plain for name in names):
+            return tuple(self.plain[name] for name in names)
+        found = [] if alone else self.behind(names)
+        return found[0] if len(found) == 1 else ()
+
+    def behind(self, names: Sequence[str]) -> list[tuple[int, ...]]:
+        """Return the columns of all `names` behind each prefix that has them all, of a measurement if there is one."""
+        prefixes = [key.removesuffix(names[0]) for key in self.plain if key.endswith(f"_{names[0]}")]
+        found = [each for each in prefixes if all(each + name in self.plain for name in names)]
+        measured = [each for each in found if not WANTED & set(each.split("_"))]
+        return [tuple(self.plain[each + name] for name in names) for each in measured or found]
+
+
+def matrix_parts(name: str) -> list[str]:
+    """Return what the nine parts of a matrix are called, row by row."""
+    return [f"{name}_{part}" for part in _MATRIX]
 
 
 def compared(name: str) -> str:
@@ -60,56 +77,81 @@ def compared(name: str) -> str:
     return _SEPARATOR.sub("_", name.lower()).strip("_")
 
 
-def array_names(header: Header) -> dict[str, int]:
-    """Return names for the columns inside arrays: force -> force_x .., rotation (N, 3, 3) -> r11 .."""
-    out: dict[str, int] = {}
-    for name, group in header.groups.items():
-        simple = compared(name).removesuffix("_sensor").removesuffix("_world")
-        if len(group) == 3:
-            out |= {f"{simple}_{axis}": n for axis, n in zip("xyz", group, strict=True)}
-        if len(group) == 9 and simple.startswith("rotation"):
-            out |= dict(zip(_MATRIX, group, strict=True))
-    return out
+def short(names: Sequence[str]) -> bool:
+    """Whether names are too short to mean the same behind any prefix."""
+    return len(names[0]) < 3
 
 
 def vector_named(names: Names, quantity: str) -> tuple[int, ...]:
     """Return the three columns of a vector, x first; nothing where there are none."""
+    return next((found for three in _three(quantity) if (found := names.all_of(three, _alone(three)))), ())
+
+
+def vectors_named(names: Names, quantity: str) -> list[tuple[int, ...]]:
+    """Return the columns of each vector that may be meant, where several prefixes have one."""
+    return next((found for three in _three(quantity) if not _alone(three) and (found := names.behind(three))), [])
+
+
+def _three(quantity: str) -> Iterator[list[str]]:
     for stem in STEMS[quantity]:
         for joint in ("", "_"):
-            found = names.all_of([f"{stem}{joint}{axis}" for axis in "xyz"] if stem else list("xyz"), len(stem) < 3)
-            if found:
-                return found
-    return ()
+            yield [f"{stem}{joint}{axis}" for axis in "xyz"] if stem else list("xyz")
+
+
+def _alone(three: Sequence[str]) -> bool:
+    """Whether the stem of three names is too short to stand behind a prefix."""
+    return len(three[0].removesuffix("x").strip("_")) < 3
 
 
 def rotation_named(names: Names) -> QuantitySpec | None:
     """Return the columns that turn S into W, None where there are none."""
+    for parts, form, alone in _rotations():
+        if found := names.all_of(parts, alone):
+            return QuantitySpec("rotation", found, "rad", "rotation", form=form)
+    return None
+
+
+def rotations_named(names: Names) -> tuple[str, list[tuple[int, ...]]]:
+    """Return the form and the columns of each rotation that may be meant, where several prefixes have one."""
+    every = ((form, names.behind(parts)) for parts, form, alone in _rotations() if not alone)
+    return next(((form, found) for form, found in every if found), ("", []))
+
+
+def _rotations() -> Iterator[tuple[Sequence[str], str, bool]]:
+    """Yield the names of parts of rotations, their form, and whether they are too short to stand behind a prefix."""
     for stem in _QUATERNION:
         for joint in ("", "_"):
-            found = names.all_of([f"{stem}{joint}{part}" for part in "wxyz"], len(stem) < 3)
-            if found:
-                return QuantitySpec("rotation", found, "rad", "rotation", form="quaternion-wxyz")
-    found = names.all_of(_MATRIX, True)
-    return QuantitySpec("rotation", found, "rad", "rotation", form="matrix") if found else None
+            yield [f"{stem}{joint}{part}" for part in "wxyz"], "quaternion-wxyz", len(stem) < 3
+    yield _MATRIX, "matrix", False
 
 
 def time_columns(names: Names) -> Iterator[tuple[int, ...]]:
     """Yield the columns that may be the clock, the likeliest first: one, or seconds and nanoseconds.
 
-    The only column of dates is the clock whatever its name, as the index of pandas, which has none.
+    The only column of dates, or with a unit of time, is the clock whatever its name: the index of pandas has none.
     """
-    yield from _whole_stamps(names, _TIMES)
+    yield from _whole_stamps(names, _TIMES, True)
     yield from (found for pair in _SPLIT if (found := names.all_of(pair, False)))
-    yield from _whole_stamps(names, _SECONDS)
+    yield from _whole_stamps(names, _SECONDS, True)
     if len(names.dates) == 1:
         yield names.dates
+    if timed := clock_by_unit(names):
+        yield timed
+    yield from _whole_stamps(names, _TIMES[1:], False)
 
 
-def _whole_stamps(names: Names, stems: Sequence[str]) -> Iterator[tuple[int, ...]]:
+def clock_by_unit(names: Names) -> tuple[int, ...]:
+    """Return the only column with a unit of time; nothing without. It may be a duration, too, unless it rises."""
+    timed = tuple(number for number, unit in names.units.items() if unit in TIME)
+    return timed if len(timed) == 1 else ()
+
+
+def _whole_stamps(names: Names, stems: Sequence[str], alone: bool) -> Iterator[tuple[int, ...]]:
     for name in stems:
         for suffix in ("", *(f"_{unit}" for unit in TIME)):
-            if name + suffix in names.plain:
-                yield (names.plain[name + suffix],)
+            found = names.all_of([name + suffix], alone)
+            if found and found[0] not in names.words:
+                yield found
 
 
 def said_units(names: Names, quantity: str, numbers: Sequence[int]) -> list[str]:

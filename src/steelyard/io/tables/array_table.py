@@ -51,7 +51,8 @@ class ArrayTable:
         names: list[str] = []
         sources: list[tuple[str, int]] = []
         groups: dict[str, tuple[int, ...]] = {}
-        for key, (shape, _) in array_headers(path).items():
+        shapes = {key: array.shape for key, array in array_headers(path).items()}
+        for key, shape in shapes.items():
             if len(shape) == 1:
                 names.append(key)
                 sources.append((key, 0))
@@ -63,7 +64,7 @@ class ArrayTable:
                 raise BadFile(f"{path}: holds more than {_MOST_COLUMNS} columns. Save the quantities of the log alone.")
         if not names:
             raise BadFile(f"{path}: no array with rows is in this NPZ. Save one array per quantity, rows first.")
-        return cls(path, Header(tuple(names), len(names), groups), tuple(sources))
+        return cls(path, Header(tuple(names), len(names), groups, shapes=shapes), tuple(sources))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
         """Return columns by number; raises BadFile where an array is damaged or not of numbers."""

@@ -13,6 +13,8 @@ from typing import BinaryIO, cast
 from steelyard.errors import BadFile
 
 _HEAD = 1 << 16
+_LONGEST_HEAD = 1 << 24
+_COMMENTS = re.compile(rb"(?:\xef\xbb\xbf)?(?:[ \t]*+(?:#[^\r\n]*+)?(?:\r\n?|\n|\Z))*+")
 _BLOCK = 1 << 23
 _LONGEST_LINE = 1 << 20
 _FREE, _DENSEST = 1 << 26, 100  # tables pack to a third or a tenth; a few kB of other texts become many GB
@@ -34,12 +36,17 @@ def _read(path: Path, stream: BinaryIO, size: int) -> bytes:
 
 
 def head_lines(path: Path) -> list[str]:
-    """Return the complete lines of the first 64 kB; raises BadFile when they are not text."""
+    """Return the complete lines of the first 64 kB, of more where those are comments; raises BadFile when not text."""
     with _open(path) as stream:
         head = _read(path, stream, _HEAD)
+        while len(head) < _LONGEST_HEAD and len(head) % _HEAD == 0 and _COMMENTS.fullmatch(head):
+            more = _read(path, stream, len(head))
+            if not more:
+                break
+            head += more
     _require_text(path, head)
     text = decoded(head.removeprefix(_BOM)).replace("\r\n", "\n").replace("\r", "\n")
-    if len(head) == _HEAD:
+    if head and len(head) % _HEAD == 0:
         text = text[: text.rfind("\n") + 1]
         if not text:
             raise BadFile(f"{path}: expected a table with one row per line; found no line end in the first 64 kB.")

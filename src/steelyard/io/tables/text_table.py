@@ -83,7 +83,7 @@ class TextTable:
         below = split(lines[rows[1]], delimiter) if len(rows) > 1 else ()
         if (are_data(cells, delimiter) or _alike(cells, below)) and not _counted(cells):
             names = _comment_header(lines[: rows[0]], delimiter, len(cells))
-            return cls(path, Header(names, len(cells), {}), delimiter, rows[0], cells)
+            return cls(path, Header(names, len(cells), words=_words(cells, delimiter)), delimiter, rows[0], cells)
         if len(rows) < 2:
             raise BadFile(f"{path}: the file has a header but no rows. Record again, or correct the path.")
         skip, first = rows[0] + 1, split(lines[rows[1]], delimiter)
@@ -98,7 +98,8 @@ class TextTable:
         if groups:
             first = split(spread(lines[skip], delimiter), delimiter)
         dates = tuple(n for n, cell in enumerate(first) if is_stamp(cell))
-        return cls(path, Header(names, len(names), groups, dates), delimiter, skip, first, bool(groups))
+        header = Header(names, len(names), groups, dates, _words(first, delimiter))
+        return cls(path, header, delimiter, skip, first, bool(groups))
 
     def read(self, columns: Sequence[int], exact: Sequence[int] = ()) -> Columns:
         """Return columns by number; raises BadFile at a cell that is not a number, with its line and text."""
@@ -209,6 +210,10 @@ def _below_preamble(lines: list[str], rows: list[int]) -> list[int]:
         if len(cells) == width:
             return rows[k:] if k and are_words(cells, delimiter) else rows
     return rows
+
+
+def _words(cells: Sequence[str], delimiter: str | None) -> tuple[int, ...]:
+    return tuple(n for n, cell in enumerate(cells) if are_words([cell], delimiter))
 
 
 def _alike(cells: Sequence[str], below: Sequence[str]) -> bool:

@@ -12,13 +12,23 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.findings import REMEDIES, Finding
+from steelyard.check import Array
+from steelyard.findings import REMEDIES, Finding, percent
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.blind_tilt import blind_tilt
 from steelyard.sanity.readings.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.readings.glance import Glance, glance
 from steelyard.sanity.readings.level import examine_level
-from steelyard.sanity.readings.rivals import Reading, as_read, best_rival, reading_of, rival_finding, sign_of
+from steelyard.sanity.readings.rivals import (
+    GOOD,
+    MUCH_BETTER,
+    Reading,
+    as_read,
+    best_rival,
+    reading_of,
+    rival_finding,
+    sign_of,
+)
 from steelyard.sanity.readings.static_fit import StaticFit
 from steelyard.sanity.readings.swapped import examine_swapped
 from steelyard.sanity.readings.tilt import blind_axis
@@ -51,6 +61,7 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     left_over = any(finding.code == "weight-compensated" for finding in masses)
     flipped, findings = (recording, ()) if left_over else _signs(recording, view, reading)
     if findings:
+        view = view if view.mirrored is None else glance(flipped) or view
         reading = reading_of(view, "", flipped.gravity, reading.rotation)
     recording = flipped
     found.extend(findings)
@@ -89,7 +100,9 @@ def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with the wrench or gravity turned round where the mass comes out negative, or with both."""
     sign = sign_of(view, reading)
-    if sign == 0 or view.sign_free:
+    if view.mirrored is not None:
+        return _mirrored(recording, view, view.mirrored, reading)
+    if sign == 0:
         return recording, ()
     if sign > 0:
         return _both_signs(recording, view, reading)
@@ -103,9 +116,35 @@ def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Record
     if upside_down:
         message = f"{mass}, so gravity points the other way in W; it was turned round{doubt}."
         return replace(recording, gravity=-recording.gravity), (Finding.of("gravity-frame", message),)
-    was, now = ("on-object", "on-sensor") if recording.wrench_sign > 0 else ("on-sensor", "on-object")
+    was, now = _sign_words(recording)
     message = f'{mass}, so the wrench has the other sign; it was taken as "{now}" instead of "{was}"{doubt}.'
     return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
+
+
+def _mirrored(
+    recording: Recording, view: Glance, pull: Array, reading: Reading
+) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the wrench turned round where an accelerometer cannot sit as its sign asks.
+
+    Turned to the force, an accelerometer gives no mass a sign; but forces of the other sign are its readings mirrored,
+    and no turn mirrors more than two directions.
+    """
+    other = reading_of(replace(view, pull=pull), "", recording.gravity, None).fit
+    well = other.sign < 0 and other.torque_share < 1.2 * reading.fit.torque_share + 1e-3
+    if not well or reading.fit.force_share < GOOD or other.force_share > MUCH_BETTER * reading.fit.force_share:
+        return recording, ()
+    was, now = _sign_words(recording)
+    message = (
+        f'As "{was}" the forces are those of the accelerometer mirrored, which no mounting is; the wrench was taken as '
+        f'"{now}": so read, {percent(other.force_share)} of the force variance is left unexplained instead of '
+        f"{percent(reading.fit.force_share)}."
+    )
+    return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
+
+
+def _sign_words(recording: Recording) -> tuple[str, str]:
+    """Return how the wrench was said to be meant, and how it is meant with the other sign."""
+    return ("on-object", "on-sensor") if recording.wrench_sign > 0 else ("on-sensor", "on-object")
 
 
 def _both_signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:

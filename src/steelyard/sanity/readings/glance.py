@@ -38,7 +38,8 @@ class Glance:
     rate          [Hz] of the rows; None for a table
     world         which of "torque" and "force" are in W axes
     accelerometer (N, 3) [m/s^2] what an accelerometer shows in its own axes, where there are rotations, too
-    sign_free     `pull` comes from an accelerometer whose mount the force itself decided, so that a mass has no sign
+    mirrored      (N, 3) `pull` as it would be with the wrench of the other sign, where the force itself decides how the
+                  accelerometer sits; else None
     dead          channels [tau, f] of S that do not measure; their wrench is zero
     position      (N, 3) [m] of the S origin in W; None where no channel tells it
     """
@@ -50,7 +51,7 @@ class Glance:
     block: Integers
     rate: float | None
     world: frozenset[str] = frozenset()
-    sign_free: bool = False
+    mirrored: Array | None = None
     accelerometer: Array | None = None
     dead: tuple[bool, ...] = (False,) * 6
     position: Array | None = None
@@ -117,8 +118,7 @@ def _into_sensor(rotation: Array, vectors: Array) -> Array:
 
 def _turning(rotation: Array, rate: float) -> tuple[Array, Array]:
     """Return lever (N, 3, 3) and spin (N, 3, 6) of rotations (N, 3, 3) sampled at `rate` [Hz]."""
-    change = np.swapaxes(rotation, 1, 2) @ np.gradient(rotation, 1 / rate, axis=0)
-    omega = 0.5 * np.stack([change[:, i, j] - change[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1)
+    omega = angular_velocity(rotation, rate)
     alpha = np.gradient(omega, 1 / rate, axis=0)
     across = cross_matrix(omega)
     lever = cross_matrix(alpha) + across @ across
@@ -127,6 +127,12 @@ def _turning(rotation: Array, rate: float) -> tuple[Array, Array]:
         entries[k, i, j] = entries[k, j, i] = 1.0
     spin = np.einsum("kij,nj->nik", entries, alpha) + across @ np.einsum("kij,nj->nik", entries, omega)
     return lever, spin
+
+
+def angular_velocity(rotation: Array, rate: float) -> Array:
+    """Return the angular velocity (N, 3) [rad/s] in S of rotations (N, 3, 3) sampled at `rate` [Hz]."""
+    change = np.swapaxes(rotation, 1, 2) @ np.gradient(rotation, 1 / rate, axis=0)
+    return np.asarray(0.5 * np.stack([change[:, i, j] - change[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1))
 
 
 def glance(recording: Recording) -> Glance | None:
@@ -194,13 +200,15 @@ def _of_table(recording: Recording, stream: Stream) -> Glance | None:
     if any(len(s) != rows for s in recording.streams) or rows < 3:
         return None
     rotation = next((v for _, _, v in channel(recording, "rotation")), None)
-    pull = None
+    pull = mirrored = None
     if rotation is None:
-        pull = _pull_channel(recording, [v for _, _, v in channel(recording, "gravity", "specific_force")], wrench)
+        given = [v for _, _, v in channel(recording, "gravity", "specific_force")]
+        pull = _pull_channel(recording, given, wrench)
         if pull is None:
             return None
-    loose, place = rotation is None and _loose(recording), next((v for _, _, v in channel(recording, "position")), None)
-    return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, loose, position=place)
+        mirrored = _pull_channel(recording, given, -wrench) if _loose(recording) else None
+    place = next((v for _, _, v in channel(recording, "position")), None)
+    return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, mirrored, position=place)
 
 
 def _pull_channel(recording: Recording, values: list[Array], wrench: Array) -> Array | None:
@@ -215,7 +223,7 @@ def _pull_channel(recording: Recording, values: list[Array], wrench: Array) -> A
 
 
 def _loose(recording: Recording) -> bool:
-    """Tell whether gravity in S can come only from an accelerometer whose mount is not given."""
+    """Tell whether gravity in S comes from an accelerometer whose mount is not given, where no rotation tells it."""
     found = next(iter(channel(recording, "gravity", "specific_force")), None)
     if found is None or found[1] == "gravity":
         return False
@@ -242,20 +250,20 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     raw, world = _wrench(recording, stream)
     wrench = np.where(recording.dead, 0.0, on_grid(stream, raw))
     rotation = next((on_grid(s, v) for s, _, v in channel(recording, "rotation") if s in used), None)
-    pull = None
+    pull = mirrored = None
     if rotation is None:
         values = [on_grid(s, v) for s, _, v in channel(recording, "gravity", "specific_force") if s in used]
         pull = _pull_channel(recording, values, wrench)
         if pull is None:
             return None
+        mirrored = _pull_channel(recording, values, -wrench) if _loose(recording) else None
     acceleration = _acceleration(recording, rotation, on_grid, rate)
     block = np.minimum(np.arange(rows) * _BLOCKS // rows, _BLOCKS - 1)
     felt = None
     if rotation is not None:
         felt = next((on_grid(s, v) for s, _, v in channel(recording, "specific_force") if s in used), None)
-    loose = rotation is None and _loose(recording)
     place = next((on_grid(s, v) for s, _, v in channel(recording, "position") if s in used), None)
-    return Glance(wrench, rotation, pull, acceleration, block, rate, world, loose, felt, recording.dead, place)
+    return Glance(wrench, rotation, pull, acceleration, block, rate, world, mirrored, felt, recording.dead, place)
 
 
 def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, rate: float) -> Array | None:

@@ -17,7 +17,7 @@ _OTHER = {"force": "torque", "torque": "force"}
 
 def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, Glance, tuple[Finding, ...]]:
     """Return recording and glance with forces and torques exchanged where that explains both, and a finding."""
-    if any(recording.dead) or view.sign_free:
+    if any(recording.dead) or view.mirrored is not None:
         return recording, view, ()
     given = fit(view.seen(recording.gravity, view.rotation), view.block)
     if given.force_share < UNEXPLAINED:

@@ -100,6 +100,12 @@ def _of_scale(scale: float) -> Mistake:
     return undone, "give them in metres (poses from images alone have no scale)", lambda g: g.scaled(scale)
 
 
+def _inverted_and_of_scale(scale: float) -> Mistake:
+    undone = f"every pose inverted, and its x, y, z then times {scale:.3g}"
+    do = "give the poses of the camera in W, in metres (COLMAP's are those of W in the camera, and have no scale)"
+    return undone, do, lambda g: replace(g, X_WC=g.X_WC.inverse()).scaled(scale)
+
+
 def likely_mistake(views: Views) -> str:
     """Return a sentence on the mistake in poses, depth unit or intrinsics that explains views; "" where none does."""
     given = _Given(views.depth_unit, views.intrinsics, views.X_WC)
@@ -107,8 +113,10 @@ def likely_mistake(views: Views) -> str:
     least = max(_MOST, before + _MORE)
     if said := _explained(views, given, _MISTAKES, before, least):
         return said
-    scale = pose_scale(views)
-    return _explained(views, given, [_of_scale(scale)], before, least) if scale else ""
+    inverted = replace(views, X_WC=views.X_WC.inverse())
+    scales = ((pose_scale(views), _of_scale), (pose_scale(inverted), _inverted_and_of_scale))
+    mistakes = [mistake(scale) for scale, mistake in scales if scale]
+    return _explained(views, given, mistakes, before, least) if mistakes else ""
 
 
 def _explained(views: Views, given: _Given, mistakes: Sequence[Mistake], before: float, least: float) -> str:

@@ -1,0 +1,122 @@
+"""Turning: a gyroscope's angular velocity beside that of the rotations, which shows in which axes and unit it is.
+
+Read otherwise it would give accelerations that no body felt.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.findings import Finding, percent
+from steelyard.logs.conditioning import lowpass
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, channel, resampled
+from steelyard.spatial import Rotation
+
+# As given more than the first share of the square of the angular velocity is unlike that of the rotations; as it was
+# meant less than the second. A delay of 0.1 s leaves less.
+UNLIKE, ALIKE = 0.25, 0.1
+_DEGREE = np.pi / 180
+_ABOUT = 0.2  # a gyroscope in another unit is that much off the rotations at most
+_RATE_HZ = 60.0
+_FEWEST_ROWS = 60
+_SECOND = 0.02  # of the largest: turns about one axis do not tell how a gyroscope sits
+
+
+def examine_turning(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the angular velocity in the axes and unit in which it follows the rotations.
+
+    Also returns a finding where those are not the ones that it was said to be in.
+    """
+    given = next(channel(recording, "angular_velocity"), None)
+    turned = next(channel(recording, "rotation"), None)
+    both = None if given is None or turned is None else _side_by_side(given[0], turned[0])
+    if given is None or both is None:
+        return recording, ()
+    stream, shown, rotation, omega = given[0], *both
+    frame = stream.frames.get("angular_velocity", "S")
+    unlike = _share(shown, omega if frame == "S" else _into_world(rotation, omega))
+    if unlike < UNLIKE:
+        return recording, ()
+    factor, said, remedies = _unit(shown, omega)
+    if (other := _axes(factor * shown, rotation, omega, frame)) is not None:
+        left, meant = other
+        if meant != frame:
+            said.append(f"in the axes of {meant}, not of {frame}")
+            remedies.append(f'frame = "{meant}"')
+        text = f"The angular velocity of '{stream.name}' is {' and '.join(said)}"
+        remedy = f"Set {' and '.join(remedies)} in its angular_velocity."
+        return _read(recording, stream, factor, meant), (Finding("gravity-frame", _text(text, left, unlike), remedy),)
+    mount = _mount(shown, omega)
+    if frame == "W" or mount is None or (left := _share(mount.apply(factor * shown), omega)) > ALIKE:
+        return recording, ()
+    degrees = f"{np.degrees(float(mount.angle())):.1f} degrees"
+    text = f"The gyroscope of '{stream.name}' is {' and '.join([*said, f'turned by {degrees} against S'])}"
+    remedy = "Turn the angular velocity into the axes of S beforehand, or leave it out: the rotations tell it, too."
+    return _read(recording, stream, factor, "S", mount), (Finding("imu-rotated", _text(text, left, unlike), remedy),)
+
+
+def _into_world(rotation: Array, omega: Array) -> Array:
+    return np.asarray(np.einsum("nij,nj->ni", rotation, omega))
+
+
+def _unit(shown: Array, omega: Array) -> tuple[float, list[str], list[str]]:
+    """Return what the angular velocity must be multiplied with to be as large as that of the rotations, and words."""
+    ratio = float(np.sqrt((shown**2).sum() / max(float((omega**2).sum()), 1e-300)))
+    for factor, is_in, read_as in ((_DEGREE, "deg/s", "rad/s"), (1 / _DEGREE, "rad/s", "deg/s")):
+        if abs(ratio * factor - 1) < _ABOUT:
+            return factor, [f"in {is_in}, not in {read_as}"], [f'unit = "{is_in}"']
+    return 1.0, [], []
+
+
+def _axes(shown: Array, rotation: Array, omega: Array, frame: str) -> tuple[float, str] | None:
+    """Return the share that is left, and the axes in which an angular velocity is that of the rotations."""
+    shares = {"S": _share(shown, omega), "W": _share(shown, _into_world(rotation, omega))}
+    best = min(shares, key=lambda name: (shares[name] > ALIKE, name != frame))
+    return (shares[best], best) if shares[best] < ALIKE else None
+
+
+def _side_by_side(given: Stream, turned: Stream) -> tuple[Array, Array, Array] | None:
+    """Return the angular velocity (N, 3) as given, rotations (N, 3, 3) and theirs in S (N, 3), on one even clock."""
+    if given.time is None or turned.time is None or min(len(given), len(turned)) < _FEWEST_ROWS:
+        return None
+    clocks = [np.asarray(s.time) - (s.delay or 0.0) for s in (given, turned)]
+    start, end = max(float(t[0]) for t in clocks), min(float(t[-1]) for t in clocks)
+    rows = int((end - start) * _RATE_HZ)
+    if rows < _FEWEST_ROWS:
+        return None
+    grid: Array = np.asarray(start + (np.arange(rows) + 0.5) / _RATE_HZ, dtype=np.float64)
+    rotation = resampled(clocks[1], turned.channels["rotation"], grid)
+    shown = resampled(clocks[0], given.channels["angular_velocity"], grid)
+    slow = lowpass(np.concatenate([shown, angular_velocity(rotation, _RATE_HZ)], 1), CUTOFF_HZ, _RATE_HZ, order=2)
+    return slow[:, :3], rotation, slow[:, 3:]
+
+
+def _share(shown: Array, meant: Array) -> float:
+    """Return the share of the square of angular velocities (N, 3) that others leave."""
+    size = float((shown**2).sum())
+    return float(((shown - meant) ** 2).sum()) / size if size > 0 else 0.0
+
+
+def _mount(shown: Array, omega: Array) -> Rotation | None:
+    """Return the turn of the gyroscope's axes into S, None where the turns are about one axis."""
+    match = omega.T @ shown
+    sizes = np.linalg.svd(match, compute_uv=False)
+    return Rotation.aligning(match) if sizes[1] > _SECOND * sizes[0] else None
+
+
+def _text(what: str, left: float, unlike: float) -> str:
+    return (
+        f"{what}: so read, {percent(left)} of its square is unlike that of the rotations instead of {percent(unlike)}."
+    )
+
+
+def _read(recording: Recording, old: Stream, factor: float, frame: str, mount: Rotation | None = None) -> Recording:
+    """Return the recording with the angular velocity of a stream times a factor, in a frame, or turned into S."""
+    values = factor * old.channels["angular_velocity"]
+    channels = {**old.channels, "angular_velocity": values if mount is None else mount.apply(values)}
+    new = replace(old, channels=channels, frames={**old.frames, "angular_velocity": frame})
+    return replace(recording, streams=tuple(new if stream is old else stream for stream in recording.streams))
