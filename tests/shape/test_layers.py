@@ -9,7 +9,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.sides.layers import Layers
 from steelyard.shape.volume import enclose
 from steelyard.workshop.sheets import Sheet, sheet_of
-from steelyard.workshop.solids import ball, block, ring, rod, threaded
+from steelyard.workshop.solids import ball, block, ring, rod, threaded, union
 
 
 def cup(across: float, height: float, wall: float) -> object:
@@ -60,6 +60,42 @@ def test_a_thin_blade_costs_no_more_than_it_holds(wall: float) -> None:
     solid = enclose(made.cloud)
     assert "thin-thickened" in {finding.code for finding in solid.findings}
     assert abs(solid.mesh.volume / made.volume - 1) < 2 * solid.volume_std < 0.2
+
+
+@pytest.mark.parametrize("noise_mm", [0.0, 0.1])
+def test_a_thin_blade_of_a_thick_tool_has_its_sides(noise_mm: float) -> None:
+    # A fifth of the points are the blade's. Nearly half of their normals looked inward, and it came in pieces.
+    blade = block((0, 280), (-6, 6), (-0.35, 0.35))
+    made = sheet(
+        blade
+        + block((-8, 2), (-8, 90), (-4, 4))
+        + block((278, 288), (-8, 90), (-4, 4))
+        + block((-8, 288), (80, 90), (-5, 5))
+        + rod(14, 0, 110).rotate([90, 0, 0]).translate([-20, 40, 0])
+    )
+    noise = 1e-3 * noise_mm * np.random.default_rng(1).standard_normal(made.cloud.xyz.shape)
+    solid = enclose(Cloud(made.cloud.xyz + noise))
+    xyz, normals = 1e3 * made.cloud.xyz, np.asarray(solid.cloud.normals)
+    on = (np.abs(xyz[:, 2]) > 0.34) & (np.abs(xyz[:, 2]) < 0.36) & (xyz[:, 0] > 5) & (xyz[:, 0] < 275)
+    assert 300 < on.sum() < 500
+    assert (normals[on, 2] * np.sign(xyz[on, 2]) < 0).mean() < 0.2
+    assert "thin-thickened" in {finding.code for finding in solid.findings}
+    assert abs(solid.mesh.volume / made.volume - 1) < 2 * solid.volume_std < 0.2
+
+
+def test_grooves_of_a_file_are_no_walls() -> None:
+    # Tops and grounds of teeth between points that are farther apart are two layers as well, and look the same way.
+    teeth = [block((1.6 * k, 1.6 * k + 0.8), (-11, 11), (2, 2.5)) for k in range(75)]
+    made = sheet(union([block((0, 120), (-11, 11), (-2, 2)), *teeth]))
+    xyz, near = made.cloud.xyz, made.cloud.near
+    found = Layers.of(xyz, near.index, float(np.median(near.spacing)))
+    assert found is not None
+    assert found.part
+    solid = enclose(made.cloud)
+    assert solid.mesh.volume / made.volume == pytest.approx(0.987, abs=0.005)
+    upward = (xyz[:, 2] > 1.99e-3) & (np.asarray(solid.cloud.normals)[:, 2] > 0)
+    assert upward.sum() > 0.97 * (xyz[:, 2] > 1.99e-3).sum()
+    assert "thin-thickened" not in {finding.code for finding in solid.findings}
 
 
 def test_layers_are_those_of_the_wall() -> None:

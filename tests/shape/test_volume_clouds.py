@@ -14,6 +14,8 @@ from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.nesting import winding_number
+from steelyard.shape.orient import SLOPE
+from steelyard.shape.sides.sheets import torn
 from steelyard.shape.sides.tree import Tree
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import Solid, enclose
@@ -194,6 +196,18 @@ def test_patches_of_normals_that_are_turned_do_not_cost_the_volume(body: object,
     assert "normals-flipped" not in codes(right)
     assert "normals-flipped" in codes(wrong)
     assert wrong.mesh.volume == pytest.approx(made.volume, rel=0.1)
+
+
+@pytest.mark.parametrize("wall", [0.5, 0.8, 1.2])
+def test_right_normals_on_both_sides_of_a_thin_wall_are_not_torn(wall: float) -> None:
+    # Links through the wall counted as those of turned patches: a channel's right normals gave way to a filled channel.
+    made = sheet(block((0, 160), (-10, 10), (-wall / 2, wall / 2)) + block((-60, 0), (-12, 12), (-10, 10)))
+    xyz, normals, *_ = spread_evenly(made.mesh, np.random.default_rng(1), 2000)
+    xyz = xyz + 1e-5 * np.random.default_rng(2).standard_normal(xyz.shape)
+    index = Cloud(xyz).near.index
+    along = xyz @ np.array([1.0, 0.4, 0.2])
+    turned = np.where((along < np.median(along))[:, None], -normals, normals)
+    assert torn(xyz, normals, index, SLOPE) < 0.004 < torn(xyz, turned, index, SLOPE)
 
 
 @pytest.mark.parametrize(

@@ -11,7 +11,7 @@ from steelyard.errors import BadValue
 from steelyard.shape.cells.cells import cells
 from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.orient import DEPTH, SLOPE, Oriented, signed_links, walled
+from steelyard.shape.orient import DEPTH, SLOPE, Oriented, one_layered, signed_links, walled
 from steelyard.shape.sides.discs import Discs
 from steelyard.shape.sides.sheets import sheet_planes, stacked
 from steelyard.shape.sides.ties import Ties
@@ -70,6 +70,7 @@ def clearer_alone(used: Cloud, surface: Oriented, found: Filled) -> tuple[Orient
     they say of their sides then turns whole rods inside out, where dipoles alone are right. Walls that are two layers
     are sheets.
     """
+    surface, found = _clearer_thick(used, surface, found)
     alone = surface.without_sheets if surface.layers is None else None
     if alone is None or float(((alone.normals * surface.normals).sum(1) < 0).mean()) < _UPSET:
         return surface, found
@@ -80,6 +81,21 @@ def clearer_alone(used: Cloud, surface: Oriented, found: Filled) -> tuple[Orient
         return surface, found
     clear = again.blur < min(CLEAR, _NO_SHEETS * found.blur)
     return (alone, again) if clear else (surface, found)
+
+
+def _clearer_thick(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
+    """Return the surface and its cells without the two layers of a thin wall, where these are no clearer for them.
+
+    Grooves finer than the points are far apart have two layers, too, but one side.
+    """
+    if surface.alone is None or surface.layers is None or not surface.layers.part:
+        return surface, found
+    thick = outward(one_layered(surface, surface.alone))
+    try:
+        again = filled(used, thick)
+    except BadValue:  # they enclose nothing
+        return surface, found
+    return (surface, found) if found.blur < again.blur else (thick, again)
 
 
 def by_walls(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:

@@ -78,9 +78,16 @@ def oriented(cloud: Cloud) -> Oriented:
     if normals is None:
         sight = Sight.of(tree, tree)
         alone = consistent(sight, spacing)
-        layers = Layers.of(xyz, near.index)
+        layers = Layers.of(xyz, near.index, spacing)
         normals = on_sheets(xyz, alone, near, delaunay, sight, spacing, None, layers)
     return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing, alone, layers)
+
+
+def one_layered(surface: Oriented, first: Array) -> Oriented:
+    """Return a surface whose sides were found anew from normals (N, 3) before any sheet, no wall as two layers."""
+    xyz, near, sight = surface.xyz, surface.near, Sight.of(surface.tree, surface.tree)
+    normals = on_sheets(xyz, first, near, surface.delaunay, sight, surface.spacing, None)
+    return replace(surface, normals=normals, area=areas(near, normals), layers=None)
 
 
 def walled(surface: Oriented) -> Oriented | None:

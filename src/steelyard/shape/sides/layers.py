@@ -26,6 +26,10 @@ _FEWEST = 0.2  # of a neighbourhood that lies on the smaller layer, at least
 _LOOKED_AT = 300  # points looked at first
 _SOME, _SOME_BLURRED = 0.2, 0.5  # share of them on two layers, clear or blurred, below which there are none
 _MANY, _MOST = 0.25, 0.6  # of all points that lie on two layers, clear or blurred, at least
+_SOME_ON_ONE, _ON_ONE = 0.07, 0.03  # the same of one thin wall of an object that is else thick: looked at first, of all
+_ALIKE = 0.9  # cosine between planes along one wall
+_MOSTLY = 0.5  # of the neighbours that are on the same wall: teeth and threads have fewer
+_THIN = 0.4  # of the spacing: the planes of thicker walls are those of their sheets anyway
 _PARALLEL = 0.7  # cosine between the planes of neighbours on one wall, at least
 _TERMS = 7  # of two quadrics: six of the lower one, and how far the other lies over it
 
@@ -37,25 +41,35 @@ class Layers(NamedTuple):
     same       (N, K) which of their nearest neighbours lie on their own layer
     plane      (N, 3) unit normals of that layer, of either sign
     thickness  median distance between the layers, in the units of the points
+    part       whether they are walls of an object that is else thick: grooves between teeth may look like them
     """
 
     two: Mask
     same: Mask
     plane: Array
     thickness: float
+    part: bool = False
 
     @classmethod
-    def of(cls, xyz: Array, index: Integers) -> Layers | None:
-        """Return the layers of points (N, 3) with neighbours (N, K), nearest first; None where they have one."""
+    def of(cls, xyz: Array, index: Integers, spacing: float = 0.0) -> Layers | None:
+        """Return the layers of points (N, 3) with neighbours (N, K), nearest first; None where they have one.
+
+        spacing  of the points; where it is given, a thin wall of an else thick object counts, too
+        """
         near = np.ascontiguousarray(index[:, :_NEIGHBOURS])
         some = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
         if near.shape[1] < _NEIGHBOURS:
             return None
-        if _two(_layers(xyz, near, some)[0], _SOME, _SOME_BLURRED) is None:
+        first = _layers(xyz, near, some)[0]
+        if _two(first, _SOME, _SOME_BLURRED) is None and (first < _TWO).mean() < _SOME_ON_ONE:
             return None
         left, same, plane, apart = _layers(xyz, near, np.arange(len(xyz)))
         two = _two(left, _MANY, _MOST)
-        return None if two is None else cls(two, same, plane, float(np.median(apart[two])))
+        if two is not None:
+            return cls(two, same, plane, float(np.median(apart[two])))
+        two = _on_one_wall(left < _TWO, plane, near)
+        thickness = float(np.median(apart[two])) if two.mean() > _ON_ONE else np.inf
+        return cls(two, same, plane, thickness, True) if thickness < _THIN * spacing else None
 
     def volume(self, area: Array) -> float:
         """Return what lies between the layers, each point standing for `area` (N,) of their surface."""
@@ -84,6 +98,17 @@ def _two(left: Array, many: float, most: float) -> Mask | None:
         if (left < limit).mean() > share:
             return left < limit
     return None
+
+
+def _on_one_wall(two: Mask, plane: Array, near: Integers) -> Mask:
+    """Return which points of two layers (N,) lie on walls, of which all around is: not on a tooth or a thread.
+
+    plane  (N, 3) of each point's layer; on a wall it goes on
+    near   (N, K) neighbours
+    """
+    alike = two[near] & (np.abs(np.einsum("nd,nkd->nk", plane, plane[near])) > _ALIKE)
+    wall = two & (alike.mean(1) > _MOSTLY)
+    return np.asarray(two & (wall | (alike & wall[near]).any(1)))
 
 
 @numba.njit(cache=True, nogil=True)

@@ -51,12 +51,18 @@ def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
 def torn(xyz: Array, normals: Array, index: Integers, slope: float) -> float:
     """Return the share of links between neighbours on one sheet whose normals face opposite ways.
 
-    Arguments as in `sheet_planes`, normals (N, 3) unit vectors. It is next to nothing where normals are right, but on
-    walls so thin that a sheet's neighbours lie on its other side.
+    Arguments as in `sheet_planes`, normals (N, 3) unit vectors. It is next to nothing where normals are right. Through
+    a wall thinner than the spacing links reach its other side: there each point lies behind the other's plane. On one
+    sheet as many lie before it, so that what lies behind and is not matched by such is a wall.
     """
     link = np.abs(sheet_planes(xyz, index, slope)[1])
-    opposite = np.einsum("nkd,nd->nk", normals[index], normals) < _OPPOSITE
-    return float((link * opposite).sum() / max(float(link.sum()), 1e-300))
+    away = xyz[index] - xyz[:, None]
+    opposite = link * (np.einsum("nkd,nd->nk", normals[index], normals) < _OPPOSITE)
+    here, there = np.einsum("nkd,nd->nk", away, normals), -np.einsum("nkd,nkd->nk", away, normals[index])
+    behind = float(opposite[(here < 0) & (there < 0)].sum())
+    before = float(opposite[(here > 0) & (there > 0)].sum())
+    walls = max(behind - before, 0.0)
+    return (float(opposite.sum()) - walls) / max(float(link.sum()), 1e-300)
 
 
 _OPPOSITE = -0.5  # cosine between normals that face opposite ways
