@@ -33,8 +33,8 @@ def rate_findings(rates: Mapping[str, ClockRate]) -> tuple[Finding, ...]:
     return tuple(
         Finding(
             "clock-unsteady",
-            f"The clock of '{name}' runs {_parts(abs(clock.rate))} {'fast' if clock.rate > 0 else 'slow'} "
-            f"(± {1e6 * clock.rate_std:.2g} ppm) beside the wrench's; its stamps were put right.",
+            f"The clock of '{name}' runs {_parts(abs(clock.more))} {'fast' if clock.more > 0 else 'slow'} "
+            f"(± {1e6 * clock.more_std:.2g} ppm) beside the wrench's; its stamps were put right.",
             "Check the rate or the time column of this stream, or stamp all streams by one clock.",
         )
         for name, clock in rates.items()
