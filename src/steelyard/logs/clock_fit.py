@@ -66,7 +66,7 @@ def rows_of(question: Question, rows: Integers) -> Question:
     return replace(question, time=question.time[rows], felt=question.felt.rows(rows), _cache={})
 
 
-def _seen(question: Question, clocks: Mapping[str, ClockCourse]) -> tuple[Array, Array]:
+def seen(question: Question, clocks: Mapping[str, ClockCourse]) -> tuple[Array, Array]:
     """Return features (N, F) of the motion and the channels (N, C) of the wrench that measure, by these clocks."""
     late = {n: clock.at(question.time) for n, clock in clocks.items()}
     delays: Delays = {**question.known, **late}
@@ -89,7 +89,7 @@ class Linear:
     @classmethod
     def of(cls, question: Question, clocks: Mapping[str, ClockCourse]) -> Linear:
         """Return the fit with stamps that are as late as these clocks say."""
-        X, wrench = _seen(question, clocks)
+        X, wrench = seen(question, clocks)
         scale = np.maximum(np.abs(X).max(0), 1e-12)
         coefficients = np.linalg.lstsq(X / scale, wrench, rcond=1e-9)[0]
         residual = wrench - X / scale @ coefficients
@@ -106,13 +106,14 @@ class Linear:
 
     def left(self, question: Question, clocks: Mapping[str, ClockCourse]) -> Array:
         """Return what its coefficients leave (N, C) of the wrench by other clocks."""
-        X, wrench = _seen(question, clocks)
+        X, wrench = seen(question, clocks)
         return np.asarray(wrench - X / self.scale @ self.coefficients)
 
     def slope(self, question: Question, clocks: Mapping[str, ClockCourse], name: str) -> Array:
         """Return by how much (N, C) the fit says more of the wrench, per second that a stream is later."""
         own = clocks[name]
-        early, late = (self.left(question, {**clocks, name: replace(own, late=own.late + by)}) for by in (-_STEP, _STEP))
+        sides = (replace(own, late=own.late + by) for by in (-_STEP, _STEP))
+        early, late = (self.left(question, {**clocks, name: side}) for side in sides)
         return np.asarray((early - late) / (2 * _STEP))
 
 
@@ -121,9 +122,7 @@ def weights(scaled: Array) -> Array:
     return np.asarray(np.minimum(1.0, _FAR / np.maximum(np.sqrt((scaled**2).mean(1)), 1e-12)))
 
 
-def settled(
-    question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]
-) -> dict[str, Clock]:
+def settled(question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]) -> dict[str, Clock]:
     """Return the clocks after Gauss-Newton steps from `found`, softly held at `start`."""
     clocks = dict(found)
     for _ in range(_STEPS):
@@ -137,9 +136,7 @@ def settled(
     return clocks
 
 
-def by_leaving_out(
-    question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]
-) -> dict[str, float]:
+def by_leaving_out(question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]) -> dict[str, float]:
     """Return the standard deviation of each clock's `more` by leaving out each of some stretches (jackknife)."""
     stretch = np.arange(len(question.time)) * _STRETCHES // len(question.time)
     without = [np.flatnonzero(stretch != k).astype(np.int64) for k in range(_STRETCHES)]
