@@ -55,8 +55,8 @@ def size_told(message: str) -> tuple[float, float]:
 
 def assert_answered(log: Recording, sound: Recording, wider: float = 1.15) -> None:
     found, other = identify(log), identify(sound)
-    assert found.codes() <= {"clock-unsteady", "imu-rotated", "stream-delayed"}
-    assert "clock-unsteady" in found.codes()
+    # Beside rows that were lost something may pass for a tap.
+    assert {"clock-unsteady"} <= found.codes() <= {"clock-unsteady", "outliers"}
     assert abs(found.mass - BODY.mass) < 3 * found.std[0]
     assert (np.abs(found.com - BODY.com) < 4 * found.std[1:4]).all()
     assert (np.abs(found.parameters.people - BODY.people)[4:] < 4 * found.std[4:]).all()
@@ -102,13 +102,18 @@ def test_rows_that_were_lost_uncounted_are_put_right(name: str) -> None:
     assert "without its rows within 0.3 s" in said
     size, std = size_told(said)
     assert abs(size - 0.1) < max(4 * std, 2e-3)
-    assert_answered(log, made(), wider=1.4)
+    # The pause that is put where poses leap widens the bar of the mass.
+    assert_answered(log, made(), wider=1.4 if name == "wrench.csv" else 11.0)
 
 
-def test_two_leaps_are_both_put_right() -> None:
-    log = leaping(leaping(made(), "pose.csv", 0.1, at=5.0), "pose.csv", 0.15, at=11.0)
-    assert len(unsteady(log)) == 2
-    assert_answered(log, made())
+def test_leaps_of_two_clocks_are_both_put_right() -> None:
+    log = leaping(leaping(made(), "pose.csv", 0.2, at=5.0), "wrench.csv", 0.15, at=11.0)
+    first, second = sorted(unsteady(log), key=lambda said: "at 11.0 s" in said)
+    for said, name, size in ((first, "pose.csv", 0.2), (second, "wrench.csv", 0.15)):
+        assert f"'{name}' leaps ahead" in said
+        assert abs(size_told(said)[0] - size) < 0.01
+    found = identify(log)
+    assert (np.abs(found.parameters.people - BODY.people) < 4 * found.std).all()
 
 
 def test_a_late_clock_that_leaps_keeps_its_delay() -> None:

@@ -90,27 +90,29 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
     return replace(aligned, notes=(*notes, *say.gaps(recording.streams), *aligned.notes))
 
 
-def _align_timed(given: Prepared, unsteady: int = 0) -> Aligned:
-    """Find clocks and mounts on rows without taps, then make the log; so often clocks may be put right before."""
+def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] = ()) -> Aligned:
+    """Find clocks and mounts on rows without taps, then make the log.
+
+    unsteady  how often clocks may be put right yet; `jumped`: jumps that were
+    """
     taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
     straight = felt.rows(~touched).turned_back(given.options.turn)
     clocks, delayed = _clocks(given, time[~touched], straight)
-    steadier = _put_right(given, _question(given, time[~touched], straight, clocks.delays_s), clocks, unsteady)
+    steadier = _steadier(given, _question(given, time[~touched], straight, clocks.delays_s), clocks, unsteady, jumped)
     if steadier is not None:
-        recording, found, left = steadier
-        right = _align_timed(prepared(recording, given.options), left)
-        return replace(right, findings=(*found, *right.findings))
+        return steadier
     rigid = _rigid(given, time[~touched], felt.rows(~touched), clocks)
     if rigid is not None:
-        lower = _align_timed(prepared(given.recording, replace(given.options, cutoff_hz=rigid)))
+        lower = _align_timed(prepared(given.recording, replace(given.options, cutoff_hz=rigid)), jumped=jumped)
         return replace(lower, notes=(*lower.notes, say.swings(rigid)))
     kept = ~touched & given.covered(time, clocks.delays_s)
     if kept.sum() < _FEWEST_ROWS:
         raise CannotAnswer(f"only {counted(int(kept.sum()), 'row')} left after alignment; record a longer stretch.")
     log, motion = _log(given, time[kept], felt.rows(kept), clocks)
     findings = (
+        *say.jump_findings(jumped, float(given.clock[0])),
         *say.delay_findings(clocks, delayed, given.felt.stream, given.recording.streams),
         *say.mount_findings(given.imu, clocks.mounting),
         *say.planar_finding(log.gravity),
@@ -207,20 +209,18 @@ def _question(given: Prepared, time: Array, felt: Felt, delays: Mapping[str, flo
     return Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known)
 
 
-def _put_right(
-    given: Prepared, question: Question | None, clocks: Clocks, unsteady: int
-) -> tuple[Recording, tuple[Finding, ...], int] | None:
-    """Return the recording with clocks put right that jump or run fast, what is said, and how often more they may be.
-
-    None where no clock does, or where they may not be put right any more.
-    """
+def _steadier(
+    given: Prepared, question: Question | None, clocks: Clocks, unsteady: int, jumped: tuple[Placed, ...]
+) -> Aligned | None:
+    """Return the log with clocks put right that jump or run fast; None where none does, or may be put right yet."""
     if question is None or not unsteady:
         return None
     if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
         recording, placed = _jumps_put_right(given, jumps)
-        return recording, say.jump_findings(placed, float(given.clock[0])), unsteady - 1
+        return _align_timed(prepared(recording, given.options), unsteady - 1, clock_jumps.together((*jumped, *placed)))
     if rates := clock_rates.clock_rates(question, clocks.delays_s):
-        return clock_rates.put_right(given.recording, rates), say.rate_findings(rates), 0
+        right = _align_timed(prepared(clock_rates.put_right(given.recording, rates), given.options), jumped=jumped)
+        return replace(right, findings=(*say.rate_findings(rates), *right.findings))
     return None
 
 
@@ -238,7 +238,7 @@ def _jumps_put_right(given: Prepared, jumps: Mapping[str, ClockJump]) -> tuple[R
             break
         more = clock_jumps.still_jumping(question, delays, placed, wrench)
         recording = clock_jumps.moved(recording, more)
-        placed = clock_jumps.together(placed, more)
+        placed = clock_jumps.together((*placed, *more))
     return recording, placed
 
 

@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock import SAME_S, jump_gap, stamps_of
+from steelyard.logs.clock import NEAR_S, SAME_S, jump_gap, stamps_of
 from steelyard.logs.clock_fit import (
     HOLDS,
     ROWS,
@@ -246,9 +246,16 @@ def still_jumping(
     return tuple(out)
 
 
-def together(placed: Iterable[Placed], more: Iterable[Placed]) -> tuple[Placed, ...]:
-    """Return the jumps with what was left of them."""
-    return tuple(replace(a, size=a.size + b.size, std=b.std) for a, b in zip(placed, more, strict=True))
+def together(jumps: Iterable[Placed]) -> tuple[Placed, ...]:
+    """Return the jumps, those of one clock at one time as one; what was found last is known as well as it."""
+    out: list[Placed] = []
+    for jump in jumps:
+        same = next((k for k, p in enumerate(out) if p.name == jump.name and abs(p.at - jump.at) < NEAR_S), None)
+        if same is None:
+            out.append(jump)
+        else:
+            out[same] = replace(out[same], size=out[same].size + jump.size, std=jump.std)
+    return tuple(out)
 
 
 def _moved(stream: Stream, placed: Placed) -> Stream:
