@@ -93,7 +93,8 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
 def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] = ()) -> Aligned:
     """Find clocks and mounts on rows without taps, then make the log.
 
-    unsteady  how often clocks may be put right yet; `jumped`: jumps that were
+    unsteady  how often clocks may be put right yet
+    jumped    jumps that were put right
     """
     taps = _taps(given)
     time, felt = _rows(given)
@@ -216,7 +217,7 @@ def _steadier(
     if question is None or not unsteady:
         return None
     if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
-        recording, placed = _jumps_put_right(given, jumps)
+        recording, placed = _jumps_put_right(given, jumps, clocks.delays_s)
         return _align_timed(prepared(recording, given.options), unsteady - 1, clock_jumps.together((*jumped, *placed)))
     if rates := clock_rates.clock_rates(question, clocks.delays_s):
         right = _align_timed(prepared(clock_rates.put_right(given.recording, rates), given.options), jumped=jumped)
@@ -224,19 +225,20 @@ def _steadier(
     return None
 
 
-def _jumps_put_right(given: Prepared, jumps: Mapping[str, ClockJump]) -> tuple[Recording, tuple[Placed, ...]]:
+def _jumps_put_right(
+    given: Prepared, jumps: Mapping[str, ClockJump], delays: Mapping[str, float]
+) -> tuple[Recording, tuple[Placed, ...]]:
     """Return the recording with clocks put right that jump; sizes are found anew, since motion is smooth then."""
-    wrench = given.felt.stream
+    wrench, late = given.felt.stream, {**delays, **{name: jump.late for name, jump in jumps.items()}}
     recording, placed = clock_jumps.put_right(given.recording, jumps, wrench)
     for _ in range(_JUMP_ROUNDS):
         again = prepared(recording, given.options)
         time, felt = _rows(again)
         calm = ~inside(time, _taps(again))
-        delays = {**again.known, **{n: 0.0 for n in again.unknown}, **{n: j.late for n, j in jumps.items()}}
-        question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), delays)
+        question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
         if question is None:
             break
-        more = clock_jumps.still_jumping(question, delays, placed, wrench)
+        more = clock_jumps.still_jumping(question, late, placed, wrench)
         recording = clock_jumps.moved(recording, more)
         placed = clock_jumps.together((*placed, *more))
     return recording, placed
