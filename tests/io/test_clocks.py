@@ -52,3 +52,24 @@ def test_a_coarse_clock_that_was_set_is_named_by_the_distance_of_its_rows() -> N
         BadValue, match=r"jumps by 1\.7e\+09 s from row 3000 to row 3001, where rows are 0\.005 s apart"
     ):
         Clock.of(np.r_[stamps[:3000], 1.7e9 + stamps[3000:]], "s", "log.toml, time")
+
+
+@pytest.mark.parametrize(
+    ("bits", "counts", "unit", "per_stamp"),
+    [(32, 1e6, "us", 1), (32, 1e9, "ns", 1), (16, 1e3, "ms", 1), (32, 1e6, "ns", 1000), (32, 1e6, "s", 1e-6)],
+)
+def test_a_counter_that_begins_anew_is_counted_on(bits: int, counts: float, unit: str, per_stamp: float) -> None:
+    count = np.round(counts * (EVEN[:1500] + 1.0)).astype(np.int64)
+    begun = 2**bits - count[700]
+    stamps = (count + begun) % 2**bits * (int(per_stamp) if per_stamp >= 1 else per_stamp)
+    assert (np.diff(stamps) < 0).sum() > 0
+    seconds = Clock.of(stamps, unit, "log.toml, time").seconds_after(0)
+    assert np.abs(np.diff(seconds) - 0.005).max() < 1.1 / counts
+
+
+@pytest.mark.parametrize("fall", [2**32, 2**31, 1e6])
+def test_a_clock_that_falls_elsewhere_is_refused(fall: float) -> None:
+    stamps = np.round(1e6 * EVEN).astype(np.int64) + 2**33 + 123_456_789
+    stamps[2000:] -= int(fall)
+    with pytest.raises(BadValue, match="time must not go back; it does once"):
+        Clock.of(stamps, "us", "log.toml, time")

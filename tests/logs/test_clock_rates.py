@@ -30,7 +30,7 @@ def unsteady(aligned) -> list[str]:
 
 def test_stamps_put_right_are_as_late_as_the_first() -> None:
     true = np.linspace(3.0, 50.0, 7)
-    clock = ClockRate(late=0.2, rate=-0.01, middle=20.0)
+    clock = ClockRate(late=0.2, more=-0.01, middle=20.0)
     right = clock.right(true + clock.at(true))
     assert np.abs(right - (true + clock.at(true[:1]))).max() < 1e-12
 

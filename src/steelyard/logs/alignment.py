@@ -11,9 +11,10 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
+from steelyard.logs import clock_jumps, clock_rates
 from steelyard.logs.bandwidth import rigid_up_to
 from steelyard.logs.clock import sampling_rate, stamps_of
-from steelyard.logs.clock_rates import ClockRate, clock_rates, put_right
+from steelyard.logs.clock_jumps import ClockJump, Placed
 from steelyard.logs.conditioning import noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
@@ -36,6 +37,8 @@ _FEWEST_ROWS = 12
 # its standard deviations, counts as none: loads of 50 g reach four without any.
 _LONGEST_DELAY_S, _SMALLEST_DELAY_S, _SURE = 0.25, 0.5e-3, 5.0
 _INTERPOLATION = 0.01  # of a sampling step
+# So often clocks that jump or run fast are put right, and what a clock jumped by is found anew.
+_MOST_UNSTEADY, _JUMP_ROUNDS = 4, 2
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,30 +86,34 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
         other = next(s for s in recording.streams if s not in timed)
         raise BadDescription(f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock.")
     steady, notes = with_steady_stamps(recording)
-    aligned = _align_timed(prepared(steady, options or AlignOptions()), rates=True)
+    aligned = _align_timed(prepared(steady, options or AlignOptions()), unsteady=_MOST_UNSTEADY)
     return replace(aligned, notes=(*notes, *say.gaps(recording.streams), *aligned.notes))
 
 
-def _align_timed(given: Prepared, rates: bool = False) -> Aligned:
-    """Find clocks and mounts on rows without taps, then make the log; `rates`: look for clocks that run fast, too."""
+def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] = ()) -> Aligned:
+    """Find clocks and mounts on rows without taps, then make the log.
+
+    unsteady  how often clocks may be put right yet
+    jumped    jumps that were put right
+    """
     taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
     straight = felt.rows(~touched).turned_back(given.options.turn)
     clocks, delayed = _clocks(given, time[~touched], straight)
-    fast = _fast(given, time[~touched], straight, clocks) if rates else {}
-    if fast:
-        right = _align_timed(prepared(put_right(given.recording, fast), given.options))
-        return replace(right, findings=(*say.rate_findings(fast), *right.findings))
+    steadier = _steadier(given, _question(given, time[~touched], straight, clocks.delays_s), clocks, unsteady, jumped)
+    if steadier is not None:
+        return steadier
     rigid = _rigid(given, time[~touched], felt.rows(~touched), clocks)
     if rigid is not None:
-        lower = _align_timed(prepared(given.recording, replace(given.options, cutoff_hz=rigid)))
+        lower = _align_timed(prepared(given.recording, replace(given.options, cutoff_hz=rigid)), jumped=jumped)
         return replace(lower, notes=(*lower.notes, say.swings(rigid)))
     kept = ~touched & given.covered(time, clocks.delays_s)
     if kept.sum() < _FEWEST_ROWS:
         raise CannotAnswer(f"only {counted(int(kept.sum()), 'row')} left after alignment; record a longer stretch.")
     log, motion = _log(given, time[kept], felt.rows(kept), clocks)
     findings = (
+        *say.jump_findings(jumped, float(given.clock[0])),
         *say.delay_findings(clocks, delayed, given.felt.stream, given.recording.streams),
         *say.mount_findings(given.imu, clocks.mounting),
         *say.planar_finding(log.gravity),
@@ -195,13 +202,46 @@ def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str
         clocks = replace(again, delays_std_s={**clocks.delays_std_s, **{n: found[n] for n in late}})
 
 
-def _fast(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> dict[str, ClockRate]:
-    """Return the clocks that run fast or slow beside the wrench's, told by all rows that every stream covers."""
-    ok = given.covered(time, clocks.delays_s)
+def _question(given: Prepared, time: Array, felt: Felt, delays: Mapping[str, float]) -> Question | None:
+    """Return what is asked of clocks that are not steady, by all rows that every stream covers; None of too few."""
+    ok = given.covered(time, delays)
     if ok.sum() < _FEWEST_ROWS:
-        return {}
-    question = Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known)
-    return clock_rates(question, clocks.delays_s)
+        return None
+    return Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known)
+
+
+def _steadier(
+    given: Prepared, question: Question | None, clocks: Clocks, unsteady: int, jumped: tuple[Placed, ...]
+) -> Aligned | None:
+    """Return the log with clocks put right that jump or run fast; None where none does, or may be put right yet."""
+    if question is None or not unsteady:
+        return None
+    if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
+        recording, placed = _jumps_put_right(given, jumps, clocks.delays_s)
+        return _align_timed(prepared(recording, given.options), unsteady - 1, clock_jumps.together((*jumped, *placed)))
+    if rates := clock_rates.clock_rates(question, clocks.delays_s):
+        right = _align_timed(prepared(clock_rates.put_right(given.recording, rates), given.options), jumped=jumped)
+        return replace(right, findings=(*say.rate_findings(rates), *right.findings))
+    return None
+
+
+def _jumps_put_right(
+    given: Prepared, jumps: Mapping[str, ClockJump], delays: Mapping[str, float]
+) -> tuple[Recording, tuple[Placed, ...]]:
+    """Return the recording with clocks put right that jump; sizes are found anew, since motion is smooth then."""
+    wrench, late = given.felt.stream, {**delays, **{name: jump.late for name, jump in jumps.items()}}
+    recording, placed = clock_jumps.put_right(given.recording, jumps, wrench)
+    for _ in range(_JUMP_ROUNDS):
+        again = prepared(recording, given.options)
+        time, felt = _rows(again)
+        calm = ~inside(time, _taps(again))
+        question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
+        if question is None:
+            break
+        more = clock_jumps.still_jumping(question, late, placed, wrench)
+        recording = clock_jumps.moved(recording, more)
+        placed = clock_jumps.together((*placed, *more))
+    return recording, placed
 
 
 def _rigid(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> float | None:

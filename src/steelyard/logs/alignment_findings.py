@@ -8,6 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
+from steelyard.logs.clock_jumps import UNSURE_S, Placed
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
 from steelyard.logs.holes import holes
@@ -33,11 +34,27 @@ def rate_findings(rates: Mapping[str, ClockRate]) -> tuple[Finding, ...]:
     return tuple(
         Finding(
             "clock-unsteady",
-            f"The clock of '{name}' runs {_parts(abs(clock.rate))} {'fast' if clock.rate > 0 else 'slow'} "
-            f"(± {1e6 * clock.rate_std:.2g} ppm) beside the wrench's; its stamps were put right.",
+            f"The clock of '{name}' runs {_parts(abs(clock.more))} {'fast' if clock.more > 0 else 'slow'} "
+            f"(± {1e6 * clock.more_std:.2g} ppm) beside the wrench's; its stamps were put right.",
             "Check the rate or the time column of this stream, or stamp all streams by one clock.",
         )
         for name, clock in rates.items()
+    )
+
+
+def jump_findings(jumps: Sequence[Placed], start: float) -> tuple[Finding, ...]:
+    """Return `clock-unsteady` for each clock that jumps; `start` [s] is where the log's own time begins."""
+    remedy = "Look for what set this clock, or for rows that were lost and not counted, or cut the log there."
+    return tuple(Finding("clock-unsteady", _jumped(jump, start), remedy) for jump in jumps)
+
+
+def _jumped(jump: Placed, start: float) -> str:
+    way = "leaps ahead" if jump.size > 0 else "falls behind"
+    others = "the wrench" if jump.parted == (jump.name,) else " and ".join(f"'{name}'" for name in jump.parted)
+    unsure = f", without its rows within {UNSURE_S:g} s" if jump.cut else ""
+    return (
+        f"The clock of '{jump.name}' {way} by {1e3 * abs(jump.size):.1f} ± {1e3 * jump.std:.2g} ms at "
+        f"{jump.at - start:.1f} s, beside {others}; its stamps from there on were put right{unsure}."
     )
 
 

@@ -8,6 +8,9 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, BadValue
 from steelyard.logs.recording import Stream
 
+# A gap of the stamps is a jump's where it is as long to within so much and so near to where delays change [s].
+SAME_S, NEAR_S = 0.05, 1.0
+
 
 def stamps_of(stream: Stream) -> Array:
     """Return the stamps (N,) [s] of a stream; raises BadDescription where it has none."""
@@ -26,3 +29,14 @@ def sampling_rate(time: Array) -> float:
     if len(time) < 2:
         raise BadValue("a clock needs at least two samples.")
     return 1.0 / median_step(time)
+
+
+def jump_gap(time: Array, size: float, near: float, same: float = SAME_S) -> int | None:
+    """Return the row after which stamps (N,) leave a gap, as of a clock that leaps `size` [s] ahead `near` a time [s].
+
+    The size is good to `same` [s]; None where there is no such gap.
+    """
+    step, usual = np.diff(time), median_step(time)
+    fits = (np.abs(step - usual - size) < same) & (np.abs(time[:-1] - near) < NEAR_S)
+    fits &= step > max(size / 2, 0.0) + usual
+    return int(np.argmin(np.where(fits, np.abs(time[:-1] - near), np.inf))) if size > 0 and fits.any() else None

@@ -57,6 +57,11 @@ class Question:
     max_delay_s: float = 0.25
     _cache: dict[tuple[float, ...], tuple[Motion, Array, Array | None]] = field(default_factory=dict, repr=False)
 
+    @property
+    def others(self) -> tuple[str, ...]:
+        """The streams whose delay is sought, but for the wrench's own: their clocks may part from it."""
+        return tuple(n for n in self.unknown if n != self.felt.stream)
+
     def seen(self, delays: Mapping[str, float]) -> tuple[Motion, Array, Array | None]:
         """Return motion, wrench (N, 6) in S and raw specific force (N, 3) at the rows, for these delays.
 

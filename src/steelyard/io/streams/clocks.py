@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,11 @@ _MOST_STEPS, _MOST_HOLES = 20e6, 10.0  # in steps of the rows' median, and besid
 # Excel counts days since 1900: these are 2000 to 2100. No log has 50 000 rows a second in just these seconds.
 _DAYS, _FASTEST = (36526.0, 73051.0), 2e-5
 _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them to a nanosecond
+
+
+# Counters of drivers begin anew at the end of their range: bits, and counts a second. A fall is theirs where stamps
+# before and after it are within so many steps of both ends.
+_BITS, _COUNTS, _WITHIN_STEPS = (16, 32), (TIME["ms"], TIME["us"], TIME["ns"]), 10
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,11 +55,11 @@ class Clock:
         dated = column.dtype.kind == "M"
         column, per_second = (column.astype(np.int64), TIME["ns"]) if dated else (column, TIME[unit])
         if not missing.any():
-            return cls(column, per_second, where)
+            return cls(_counted_on(column, per_second), per_second, where)
         known = np.where(missing, 0, np.arange(len(column)))
         latest = np.maximum.accumulate(known)
         latest[: np.argmin(missing)] = np.argmin(missing)
-        return cls(column[latest], per_second, where, missing)
+        return cls(_counted_on(column[latest], per_second), per_second, where, missing)
 
     def __post_init__(self) -> None:
         if self.stamps.dtype.kind != "i":
@@ -109,6 +115,27 @@ class Clock:
     def first_second(self) -> int:
         """The last whole second before the first stamp."""
         return int(self.stamps[0] // self.per_second)
+
+
+def _counted_on(stamps: np.ndarray[Any, np.dtype[Any]], per_second: int) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return stamps (N,), counted on where the counter behind them began anew at the end of its range."""
+    steps = np.diff(stamps)
+    falls = steps < 0
+    if not falls.any() or not (steps > 0).any():
+        return stamps
+    near = _WITHIN_STEPS * _usual_step(steps[~falls])
+    for bits, counts in product(_BITS, _COUNTS):
+        period = 2**bits * per_second / counts
+        last, first = stamps[:-1][falls], stamps[1:][falls]
+        if (
+            near < period / 4
+            and (last > period - near).all()
+            and (last <= period).all()
+            and (np.abs(first) < near).all()
+        ):
+            whole = int(period) if stamps.dtype.kind == "i" and period.is_integer() else period
+            return np.asarray(stamps + whole * np.concatenate([[0], np.cumsum(falls)]))
+    return stamps
 
 
 def _usual_step(steps: np.ndarray[Any, np.dtype[Any]]) -> float:

@@ -16,7 +16,7 @@ import numpy as np
 from numba import njit
 
 from steelyard.check import Array
-from steelyard.logs.clock import median_step
+from steelyard.logs.clock import jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors
@@ -32,8 +32,6 @@ BIN_S, LEAST_S = 0.1, 2.5
 # other's; both together leave less than a shift that grows steadily; and robots turn alike but for this share.
 JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
 _WIDTH = round(BIN_S / STEP_S)
-# A gap of the stamps is the jump's where it is as long to within SAME_S and so near to where shifts change [s].
-SAME_S, NEAR_S = 0.05, 1.0
 # [s] to either side of a jump that leaves no gap, which are left out; and jumps of one recording.
 UNSURE_S, MOST = 0.3, 3
 NONE = ClockError()
@@ -182,12 +180,8 @@ def _steady(cost: Array) -> float:
 def _place(own: Track, other: Track, near: float, before: float, after: float) -> tuple[float, float]:
     """Return the last time before a jump and the first after it on the reference's clock."""
     for track, size, offsets in ((other, after - before, (before, after)), (own, before - after, (0.0, 0.0))):
-        step = np.diff(track.time)
-        at = track.time[:-1] - offsets[0]
-        fits = (np.abs(step - median_step(track.time) - size) < SAME_S) & (np.abs(at - near) < NEAR_S)
-        fits &= step > max(size / 2, 0.0) + median_step(track.time)
-        if size > 0 and fits.any():
-            k = int(np.argmin(np.where(fits, np.abs(at - near), np.inf)))
+        k = jump_gap(track.time, size, near + offsets[0])
+        if k is not None:
             return float(track.time[k] - offsets[0]), float(track.time[k + 1] - offsets[1])
     return near - UNSURE_S, near + UNSURE_S
 

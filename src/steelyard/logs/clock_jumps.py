@@ -1,0 +1,290 @@
+"""Clocks that jump within a log: one delay fits up to some time, and another from there on.
+
+A look at how late the rows of each stretch seem costs little, and says whether it is worth a search. That tries every
+delay on either side of every time, each side with a linear fit of its own, from moments. What it finds is fitted with
+one body for both sides, and must leave plainly less than one delay, or one that grows steadily, does. The jump is put
+where it leaves a gap in the stamps, else where both delays together fit best.
+Source: own.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from steelyard.check import Array
+from steelyard.logs.clock import NEAR_S, SAME_S, jump_gap, stamps_of
+from steelyard.logs.clock_fit import (
+    HOLDS,
+    ROWS,
+    SURE,
+    ClockCourse,
+    Linear,
+    by_leaving_out,
+    rows_of,
+    seen,
+    settled,
+    share_left,
+    weights,
+)
+from steelyard.logs.clock_rates import ClockRate
+from steelyard.logs.delays import Question
+from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.runs import picked
+
+# A jump is at least so long [s], and leaves less by this factor than one delay does, or one that grows steadily.
+LEAST_S, BETTER = 2e-3, 1.1
+# The search is made where rows seem late by two amounts that explain so many times what is left of a stretch's, or
+# where that is so many times what noise makes of it; of so many stretches, and so many on either side of a jump.
+_APART, _LOUD, _STRETCHES, _ENDS = 10.0, 8.0, 60, 4
+# Delays that it tries reach so far [s], and over so much of the log, in steps [s]; by rows, in bins, of which each side
+# has a share.
+_FAR_S, _FAR, _LAG_S, _FEW_ROWS, _BINS, _SIDE = 1.2, 0.1, 0.02, 1500, 40, 0.15
+# [s] to either side of a jump that leaves no gap, in which rows are left out.
+UNSURE_S = 0.3
+# A jump is first good to so much of itself: what smooths the motion goes across it.
+_SAME = 0.15
+# Standard deviations beyond which a row counts as so far off.
+_FAR_OFF = 10.0
+
+
+@dataclass(frozen=True)
+class ClockJump(ClockCourse):
+    """Stamps that are late by `late` [s] up to `middle` [s], and by `more` [s] besides from there on."""
+
+    WIDTH = 0.1
+
+    def course(self, time: Array) -> Array:
+        """Return zero before and one after the jump, (N,)."""
+        return np.asarray(time >= self.middle, dtype=np.float64)
+
+
+def clock_jumps(question: Question, delays: Mapping[str, float]) -> dict[str, ClockJump]:
+    """Return the clocks of streams that surely jump beside the wrench's, all at one time, by stream.
+
+    delays  [s] of every stream, as one delay for the whole log; the question says which were sought
+    """
+    every = rows_of(question, picked(len(question.time), ROWS))
+    start = {n: ClockJump(delays[n], 0.0, np.inf) for n in question.others}
+    if not start or not _worth_a_search(every, start):
+        return {}
+    # One stream's clock, or the wrench's, beside which all jump.
+    moves = dict.fromkeys([*((name,) for name in start), tuple(start)])
+    found = [clocks for clocks in (_fitted(every, start, moved) for moved in moves) if clocks]
+    if not found:
+        return {}
+    best = min(found, key=lambda clocks: share_left(every, start, clocks))
+    return _sure(every, start, best)
+
+
+def _worth_a_search(question: Question, start: Mapping[str, ClockJump]) -> bool:
+    """Tell whether rows seem late by two amounts, or by more than noise makes of it."""
+    fit = Linear.of(question, start)
+    r = fit.residual / fit.spread
+    counts = weights(r)
+    for name in start:
+        slope = fit.unexplained(fit.slope(question, start, name)) / fit.spread
+        told = np.einsum("n,nc,nc->n", counts, slope, slope)
+        share = np.cumsum(told) / max(float(told.sum()), 1e-300)
+        stretch = np.minimum((share * _STRETCHES).astype(np.int64), _STRETCHES - 1)
+        weight = np.asarray(np.bincount(stretch, told, _STRETCHES) + 1e-300)
+        score = np.einsum("n,nc,nc->n", counts, slope, r)
+        size, apart, loud = _two_levels(np.bincount(stretch, score, _STRETCHES) / weight, weight)
+        if size > LEAST_S and (apart > _APART or loud > _LOUD):
+            return True
+    return False
+
+
+def _two_levels(values: Array, weight: Array) -> tuple[float, float, float]:
+    """Return how far apart two levels of values (K,) are, how much they explain over what is left, and that."""
+    sums, up_to = np.cumsum(values * weight), np.cumsum(weight)
+    before, after = up_to[:-1], up_to[-1] - up_to[:-1]
+    one, two = sums[:-1] / before, (sums[-1] - sums[:-1]) / after
+    gain = (one - two) ** 2 * before * after / up_to[-1]
+    k = int(gain[_ENDS - 1 : -_ENDS + 1].argmax()) + _ENDS - 1
+    level = np.where(np.arange(len(values)) <= k, one[k], two[k])
+    loud = float(((values - level) ** 2 * weight).sum()) / (len(values) - 2)
+    return abs(float(two[k] - one[k])), float(gain[k]) / max(loud, 1e-300), loud
+
+
+def _fitted(question: Question, start: Mapping[str, ClockJump], moved: tuple[str, ...]) -> dict[str, ClockJump]:
+    """Return the clocks with a jump of these streams, where delays of either side fit best; empty where too short."""
+    split = _searched(question, start, moved)
+    if split is None:
+        return {}
+    at, before, after = split
+    clocks = {
+        n: replace(c, late=c.late + before, more=after - before, middle=at) if n in moved else replace(c, middle=at)
+        for n, c in start.items()
+    }
+    for _ in range(2):
+        clocks = settled(question, clocks, clocks)
+        clocks = _better_placed(question, clocks)
+    return settled(question, clocks, clocks)
+
+
+def _searched(
+    question: Question, start: Mapping[str, ClockJump], moved: tuple[str, ...]
+) -> tuple[float, float, float] | None:
+    """Return the time of a jump and how much later [s] streams are before and after it than they start."""
+    time = question.time
+    far = min(_FAR_S, _FAR * float(time[-1] - time[0]))
+    inner = np.flatnonzero((time > time[0] + far) & (time < time[-1] - far)).astype(np.int64)
+    if len(inner) < 4 * _BINS:
+        return None
+    few = rows_of(question, inner[picked(len(inner), _FEW_ROWS)])
+    spread, steps = Linear.of(few, start).spread, round(far / _LAG_S)
+    lags = _LAG_S * np.arange(-steps, steps + 1)
+    edges = np.arange(_BINS) * len(few.time) // _BINS
+    moments: list[Array] = []
+    for lag in lags:
+        X, wrench = seen(few, {n: replace(c, late=c.late + (lag if n in moved else 0.0)) for n, c in start.items()})
+        if not moments:
+            scale = np.abs(X).max(0) + 1e-12
+        z = np.concatenate([X / scale, wrench / spread], 1)
+        moments.append(np.add.reduceat(z[:, :, None] * z[:, None, :], edges, axis=0))
+    sums = np.cumsum(moments, axis=1)
+    columns = sums.shape[-1] - len(spread)
+    one, two = _left(sums[:, :-1], columns), _left(sums[:, -1:] - sums[:, :-1], columns)
+    ends = round(_SIDE * _BINS)
+    k = int((one.min(0) + two.min(0))[ends - 1 : -ends + 1].argmin()) + ends - 1
+    at = float(few.time[edges[k + 1]])
+    return at, float(lags[one[:, k].argmin()]), float(lags[two[:, k].argmin()])
+
+
+def _left(moments: Array, columns: int) -> Array:
+    """Return the squares (..) that linear fits by the first columns leave of the others, from moments (.., M, M)."""
+    normal, right = moments[..., :columns, :columns], moments[..., :columns, columns:]
+    size = np.trace(normal, axis1=-2, axis2=-1)[..., None, None] / columns
+    answer = np.linalg.solve(normal + 1e-9 * size * np.eye(columns), right)
+    whole = np.trace(moments[..., columns:, columns:], axis1=-2, axis2=-1)
+    return np.asarray(whole - (right * answer).sum((-2, -1)))
+
+
+def _better_placed(question: Question, clocks: Mapping[str, ClockJump]) -> dict[str, ClockJump]:
+    """Return the clocks with the jump at the time at which both delays together fit best."""
+    fit = Linear.of(question, clocks)
+    early, late = (
+        (np.minimum(np.abs(left) / fit.spread, _FAR_OFF) ** 2).sum(1)
+        for left in (fit.left(question, _at(clocks, middle)) for middle in (np.inf, -np.inf))
+    )
+    total = np.concatenate([[0.0], np.cumsum(early - late)])
+    ends = round(_SIDE * len(total))
+    k = int(total[ends:-ends].argmin()) + ends
+    return _at(clocks, float(question.time[k]))
+
+
+def _at(clocks: Mapping[str, ClockJump], middle: float) -> dict[str, ClockJump]:
+    """Return clocks that jump at another time [s]."""
+    return {n: replace(clock, middle=middle) for n, clock in clocks.items()}
+
+
+def _sure(question: Question, start: Mapping[str, ClockJump], found: Mapping[str, ClockJump]) -> dict[str, ClockJump]:
+    """Return the clocks that surely jump, of those found."""
+    sure = {n: f for n, f in found.items() if abs(f.more) > max(LEAST_S, SURE * f.more_std)}
+    if not sure or not share_left(question, start, found) < 1 / BETTER:
+        return {}
+    time = question.time
+    span, middle = float(time[-1] - time[0]), 0.5 * float(time[-1] + time[0])
+    growing = {n: ClockRate(f.late + f.more / 2, 1.5 * f.more / span, middle) for n, f in found.items()}
+    if not share_left(question, settled(question, growing, growing), found) < 1 / BETTER:
+        return {}
+    loose = by_leaving_out(question, found, found)
+    return {n: f for n, f in sure.items() if abs(f.more) > HOLDS * loose[n]}
+
+
+@dataclass(frozen=True)
+class Placed:
+    """Stamps of `name` that were put right by `size` [s] from `row` on.
+
+    at      [s] on the wrench's clock, where it was not put right
+    std     standard deviation [s] of the size
+    parted  the streams beside whose clock, or whose own clock, this one jumps
+    cut     rows to either side were left out, since no gap shows where the jump is
+    """
+
+    name: str
+    row: int
+    size: float
+    std: float
+    at: float
+    parted: tuple[str, ...]
+    cut: bool
+
+
+def put_right(
+    recording: Recording, jumps: Mapping[str, ClockJump], wrench: str
+) -> tuple[Recording, tuple[Placed, ...]]:
+    """Return the recording with stamps put right from the jumps on, and where that is; `wrench` is its stream."""
+    placed = _placed({s.name: s for s in recording.streams}, jumps, wrench)
+    streams = {s.name: _without_unsure(s, placed[s.name]) for s in recording.streams if s.name in placed}
+    recording = replace(recording, streams=tuple(streams.get(s.name, (s,))[0] for s in recording.streams))
+    found = tuple(row for _, row in streams.values())
+    return moved(recording, found), found
+
+
+def moved(recording: Recording, placed: Iterable[Placed]) -> Recording:
+    """Return the recording with stamps earlier by the sizes from the rows on."""
+    by = {p.name: p for p in placed}
+    streams = tuple(_moved(s, by[s.name]) if s.name in by else s for s in recording.streams)
+    return replace(recording, streams=streams)
+
+
+def still_jumping(
+    question: Question, delays: Mapping[str, float], placed: Iterable[Placed], wrench: str
+) -> tuple[Placed, ...]:
+    """Return what is left of jumps that were put right."""
+    every = rows_of(question, picked(len(question.time), ROWS))
+    out = []
+    for jump in placed:
+        start = {n: ClockJump(delays[n], 0.0, jump.at) for n in question.others}
+        found = settled(every, start, start)
+        left = found[jump.parted[0]]
+        out.append(replace(jump, size=-left.more if jump.name == wrench else left.more, std=left.more_std))
+    return tuple(out)
+
+
+def together(jumps: Iterable[Placed]) -> tuple[Placed, ...]:
+    """Return the jumps, those of one clock at one time as one; what was found last is known as well as it."""
+    out: list[Placed] = []
+    for jump in jumps:
+        same = next((k for k, p in enumerate(out) if p.name == jump.name and abs(p.at - jump.at) < NEAR_S), None)
+        if same is None:
+            out.append(jump)
+        else:
+            out[same] = replace(out[same], size=out[same].size + jump.size, std=jump.std)
+    return tuple(out)
+
+
+def _moved(stream: Stream, placed: Placed) -> Stream:
+    time = stamps_of(stream)
+    return replace(stream, time=time - placed.size * (np.arange(len(time)) >= placed.row))
+
+
+def _placed(streams: Mapping[str, Stream], jumps: Mapping[str, ClockJump], wrench: str) -> dict[str, Placed]:
+    """Return which stamps jump, by stream: those that a gap shows, of a stream or of the wrench, else the stream's."""
+    out: dict[str, Placed] = {}
+    late = streams[wrench].delay or 0.0
+    for name, jump in jumps.items():
+        own = Placed(name, 0, jump.more, jump.more_std, jump.middle, (name,), cut=True)
+        for gapped, size, off in ((name, jump.more, jump.late), (wrench, -jump.more, late)):
+            stamps = stamps_of(streams[gapped])
+            k = jump_gap(stamps, size, jump.middle + off, max(SAME_S, _SAME * abs(size)))
+            if k is not None:
+                parted = (*out[gapped].parted, name) if gapped in out else (name,)
+                at = float(stamps[k]) - off
+                own = replace(own, name=gapped, row=k + 1, size=size, at=at, parted=parted, cut=False)
+                break
+        out[own.name] = own
+    return out
+
+
+def _without_unsure(stream: Stream, placed: Placed) -> tuple[Stream, Placed]:
+    """Return the stream without rows that may be of either side of a jump, and the row it is at then."""
+    if not placed.cut:
+        return stream, placed
+    late = stamps_of(stream) - placed.at
+    before = late <= -UNSURE_S - max(placed.size, 0.0)
+    return stream.rows(before | (late > UNSURE_S)), replace(placed, row=int(before.sum()))
