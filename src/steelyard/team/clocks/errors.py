@@ -11,8 +11,9 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
 
-# A difference is worth a word from so many standard deviations and so much [s].
-BEYOND, LEAST_S = 6.0, 1e-4
+# A difference is worth a word from so many standard deviations and so much [s], or [s/s].
+BEYOND, LEAST_S, LEAST_RATE = 6.0, 1e-4, 1e-6
+WHICH = "Which of the two clocks is right no log tells."
 
 
 @dataclass(frozen=True)
@@ -30,8 +31,8 @@ class ClockError:
 
     def __add__(self, more: ClockError) -> ClockError:
         """Return the error of stamps that have `more` beside what was put right before."""
-        last = more if more.late_std else self
-        return replace(last, late=self.late + more.late, rate=self.rate + more.rate)
+        last = more if more.late_std or more.rate_std else self
+        return replace(last, late=self.late + more.late, rate=self.rate + more.rate - self.rate * more.rate)
 
     def right(self, time: Array) -> Array:
         """Return stamps (T,) [s] put right."""
@@ -66,6 +67,15 @@ class ClockErrors:
         pairs = zip(log.recordings, self.recordings, strict=True)
         return log.with_recordings(*(punctual(recording, errors) for recording, errors in pairs))
 
+    def of_reference(self, log: TeamLog) -> ClockErrors:
+        """Return what all stamps are off by where the reference itself runs fast or slow; nothing where it does not.
+
+        Accelerations are told by one clock: of three robots and more it is the middle one's, of two the reference's.
+        """
+        pairs = zip(log.recordings, self.recordings, strict=True)
+        found = ClockErrors(tuple(_of_reference(log.reference, recording, errors) for recording, errors in pairs))
+        return found if found else NOTHING
+
     def first(self, log: TeamLog) -> Errors:
         """Return what clocks are off by in the first recording in motion, for which an answer tells its offsets."""
         moving = _moving(log)
@@ -77,13 +87,27 @@ class ClockErrors:
             return
         for name in log.names:
             moving = [(log.recordings[k].name, self.recordings[k].get(name, ClockError())) for k in _moving(log)]
-            words = [*_set_anew(moving), *_runs(moving)]
+            runs = [*_runs(moving)]
+            words = [*_set_anew(moving), *runs]
             if words:
-                said = f"The stamps of '{name}' {' and '.join(words)}, beside the reference's; they were put right."
-                yield Finding.of("clock-unsteady", said)
+                whose = "the others'" if name == log.reference else "the reference's"
+                said = f"The stamps of '{name}' {' and '.join(words)}, beside {whose}; they were put right."
+                yield Finding.of("clock-unsteady", said + (f" {WHICH}" if runs and len(log.names) == 2 else ""))
 
 
 NOTHING = ClockErrors()
+
+
+def _of_reference(reference: str, recording: TeamRecording, errors: Errors) -> Errors:
+    rates = sorted(errors[name].rate if name in errors else 0.0 for name in recording.tracks)
+    usual = float(np.clip(0.0, rates[(len(rates) - 1) // 2], rates[len(rates) // 2]))
+    if not usual:
+        return {}
+    std = min(error.rate_std for error in errors.values())
+    middle = float(np.mean([error.middle for error in errors.values()]))
+    return {
+        name: ClockError(0.0, -usual / (1 - usual), middle, rate_std=std if name == reference else 0.0) for name in recording.tracks
+    }
 
 
 def punctual(recording: TeamRecording, errors: Errors) -> TeamRecording:

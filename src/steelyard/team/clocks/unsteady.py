@@ -18,7 +18,7 @@ from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.clocks.errors import ClockError, ClockErrors
+from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.scores import Scores
 
 # Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
@@ -55,9 +55,14 @@ class Steady(Protocol):
 F = TypeVar("F", bound=Steady)
 
 
-def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog, F, ClockErrors]:
-    """Return log and fit with clocks put right in every recording, and what they were off by."""
-    errors, called = ClockErrors(), _Called()
+def steadied(
+    log: TeamLog, team: F, of: Callable[[TeamLog], F], errors: ClockErrors = NOTHING
+) -> tuple[TeamLog, F, ClockErrors]:
+    """Return log and fit with clocks put right in every recording, and what they were off by.
+
+    errors  what stamps were put right by before, which is told, too
+    """
+    called = _Called()
     for _ in range(ROUNDS):
         called = called.joined(team.clocks_left)
         wrong = called.of(team.clocks_left)
@@ -69,6 +74,10 @@ def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
         except (BadValue, CannotAnswer, *BREAKDOWNS):
             break
         log, errors = moved, errors + wrong
+    of_reference = errors.of_reference(log) if errors else NOTHING
+    if of_reference:
+        log, errors = of_reference.corrected(log), errors + of_reference
+        team = of(log)
     return log, team, errors
 
 
