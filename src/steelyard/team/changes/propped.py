@@ -36,8 +36,8 @@ class Propped:
 
     def without(self, body: BodyRows, highest_hz: float) -> BodyRows:
         """Return the recording without these rows, in runs that are long enough for the band up to `highest_hz`."""
-        kept = (piece for run, rows in zip(body.runs, self.rows, strict=True) for piece in pieces(run, ~rows, highest_hz))
-        return replace(body, runs=tuple(kept))
+        each = zip(body.runs, self.rows, strict=True)
+        return replace(body, runs=tuple(piece for run, rows in each for piece in pieces(run, ~rows, highest_hz)))
 
     def missing(self, body: BodyRows, phi: Array, D: Array) -> float:
         """Return how much less [N] robots bear in these rows than in the others, beside what a payload phi needs."""

@@ -10,6 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.team.clocks.steps import Step
 
 # A difference is worth a word from so many standard deviations and so much [s], or [s/s].
 BEYOND, LEAST_S, LEAST_RATE = 6.0, 1e-4, 1e-6
@@ -32,7 +33,12 @@ class ClockError:
     def __add__(self, more: ClockError) -> ClockError:
         """Return the error of stamps that have `more` beside what was put right before."""
         last = more if more.late_std or more.rate_std else self
-        return replace(last, late=self.late + more.late, rate=self.rate + more.rate - self.rate * more.rate)
+        late = self.at(last.middle) + more.at(last.middle)
+        return replace(last, late=late, rate=self.rate + more.rate - self.rate * more.rate)
+
+    def at(self, time: float) -> float:
+        """Return how late stamps are [s] at a time [s]."""
+        return self.late + self.rate * (time - self.middle)
 
     def right(self, time: Array) -> Array:
         """Return stamps (T,) [s] put right."""
@@ -45,9 +51,13 @@ Errors = Mapping[str, ClockError]
 
 @dataclass(frozen=True)
 class ClockErrors:
-    """What clocks are off by in every recording; nothing where all are punctual."""
+    """What clocks are off by in every recording; nothing where all are punctual.
+
+    step  the clearest jump of a clock within a recording, which nothing in `recordings` holds
+    """
 
     recordings: tuple[Errors, ...] = ()
+    step: Step | None = None
 
     def __bool__(self) -> bool:
         return any(self.recordings)
@@ -105,9 +115,8 @@ def _of_reference(reference: str, recording: TeamRecording, errors: Errors) -> E
         return {}
     std = min(error.rate_std for error in errors.values())
     middle = float(np.mean([error.middle for error in errors.values()]))
-    return {
-        name: ClockError(0.0, -usual / (1 - usual), middle, rate_std=std if name == reference else 0.0) for name in recording.tracks
-    }
+    turned = ClockError(0.0, -usual / (1 - usual), middle)
+    return {name: replace(turned, rate_std=std) if name == reference else turned for name in recording.tracks}
 
 
 def punctual(recording: TeamRecording, errors: Errors) -> TeamRecording:

@@ -10,17 +10,19 @@ Source: own.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 
 from steelyard.check import Array
+from steelyard.errors import BadValue
 from steelyard.logs.clock import median_step
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors
+from steelyard.team.clocks.steps import Step
 from steelyard.team.turning_speed import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps, and jumps by so much about the
@@ -32,8 +34,9 @@ BIN_S, LEAST_S = 0.1, 2.5
 # By how much [s] a clock that is called must have jumped; either part's own shift leaves less by this factor than the
 # other's; both together leave less than a shift that grows steadily; and robots turn alike but for this share.
 JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
-# Clocks that drift apart by so much [s] over a recording, up to this rate, are put right before the fit: where one shift
-# leaves more than this share of how the speed varies, and so many times what one leaves that grows, in so many bins.
+# Clocks that drift apart by so much [s] over a recording, up to this rate, are put right before the fit: where one
+# shift leaves more than this share of how the speed varies, and so many times what one leaves that grows, in so many
+# bins.
 DRIFTS_S, FASTEST, ROUGH, DRIFTING, FEW_BINS = 0.04, 0.015, 0.002, 1.3, 200
 _WIDTH = round(BIN_S / STEP_S)
 # A gap of the stamps is the jump's where it is as long to within SAME_S and so near to where shifts change [s].
@@ -93,12 +96,44 @@ def _parts(
     return [(recording, {name: drift for name, drift in found if drift is not None})]
 
 
+def cut_at_step(
+    log: TeamLog, errors: ClockErrors, step: Step, late: Mapping[str, float]
+) -> tuple[TeamLog, ClockErrors]:
+    """Return the log with a recording cut where the clock of one robot steps and its stamps put right, and all errors.
+
+    errors  what was put right before     late  how late each clock is [s] beside them
+    """
+    recording = log.recordings[step.recording]
+    # A step of the reference is one of all others.
+    moved = log.others if step.name == log.reference else (step.name,)
+    size = -step.size if step.name == log.reference else step.size
+    shown = next(name for name in moved if name in recording.tracks)
+    own, other = (recording.tracks.get(name, recording.tracks[shown]) for name in (log.reference, shown))
+    shift = late.get(shown, 0.0) - late.get(log.reference, 0.0)
+    last, first = _place(own, other, step.at + late.get(log.reference, 0.0), shift, shift + size)
+    offsets = {name: late.get(name, 0.0) - late.get(log.reference, 0.0) for name in recording.tracks}
+    jumps = [
+        Jump(name, last, first, offset, offset + (size if name in moved else 0.0)) for name, offset in offsets.items()
+    ]
+    before, after = _cut(recording, jumps)
+    if min(len(before.tracks), len(after.tracks)) < len(recording.tracks):
+        raise BadValue(f"'{recording.name}' cannot be cut at {step.at:.1f} s.")
+    cut = [r for k, one in enumerate(log.recordings) for r in ((before, after) if k == step.recording else (one,))]
+    known = list(errors.recordings) if errors else [{} for _ in log.recordings]
+    more = {name: ClockError(size) for name in moved if name in after.tracks}
+    later = ClockErrors((known[step.recording],)) + ClockErrors((more,))
+    known.insert(step.recording + 1, later.recordings[0])
+    here = [more if k == step.recording + 1 else {} for k in range(len(cut))]
+    return ClockErrors(tuple(here)).corrected(log.with_recordings(*cut)), ClockErrors(tuple(known))
+
+
 def _alike(jump: Jump, others: Iterable[Jump | None]) -> Iterator[Jump]:
     """Yield those that jump when this one does, and by as much."""
     for other in others:
-        if other is not None and abs(other.last - jump.last) < NEAR_S:
-            if abs((other.after - other.before) - (jump.after - jump.before)) < SAME_S:
-                yield other
+        if other is None or abs(other.last - jump.last) > NEAR_S:
+            continue
+        if abs((other.after - other.before) - (jump.after - jump.before)) < SAME_S:
+            yield other
 
 
 @dataclass(frozen=True, eq=False)
