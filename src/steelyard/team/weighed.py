@@ -130,7 +130,8 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
     if seen.yields is not None:
         # Of all sensors only the sum of their biases is known: it may be that of any one.
-        each = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
+        borne = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
+        each = np.asarray(borne, np.float64)
         spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), each.transpose(2, 0, 1))
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))

@@ -70,9 +70,7 @@ def cut_at_jumps(log: TeamLog, drifts: bool = False) -> tuple[TeamLog, ClockErro
     return errors.corrected(cut), errors
 
 
-def _parts(
-    log: TeamLog, recording: TeamRecording, most: int, drifts: bool
-) -> list[tuple[TeamRecording, Errors]]:
+def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> list[tuple[TeamRecording, Errors]]:
     """Return a recording, or its parts, each with what clocks are late by that run fast or jumped before it."""
     if recording.kind == "still":
         return [(recording, {})]
