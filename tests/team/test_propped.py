@@ -15,12 +15,14 @@ from steelyard.team.joint import JointTeam
 
 
 def stood(log: TeamLog, seconds: float, share: float, tared: bool = False) -> TeamLog:
-    """The log with a stand that bears all but a share of what robots push at first; tared: sensors, at the end of it."""
+    """The log with a stand that bears all but a share of what robots push at first; tared: sensors, at its end."""
     (recording,) = log.recordings
     tracks = {}
     for name, track in recording.tracks.items():
         lifted = np.clip((track.time - track.time[0] - seconds) / 0.3, 0.0, 1.0)[:, None]
-        felt = {c: track.channels[c] * (share + (1 - share) * lifted) for c in {"force", "torque"} & set(track.channels)}
+        felt = {
+            c: track.channels[c] * (share + (1 - share) * lifted) for c in {"force", "torque"} & set(track.channels)
+        }
         if tared:
             felt = {c: values - values[np.argmax(lifted > 0) - 1] for c, values in felt.items()}
         tracks[name] = replace(track, channels={**track.channels, **felt})
@@ -40,7 +42,8 @@ def test_a_payload_that_stands_at_first_is_weighed_by_the_rest(seed: int, robots
     for share, tared in ((0.1, False), (0.0, True), (0.3, False)):
         found = JointTeam().identify(stood(trial.log, 9.0, share, tared))
         (said,) = (f for f in found.findings)
-        assert said.code == "contact" and "as where it stands on something" in said.message
+        assert said.code == "contact"
+        assert "as where it stands on something" in said.message
         assert float(said.message.split("For ")[1].split(" s of")[0]) == pytest.approx(9.5, abs=1.2)
         error = np.append(found.mass, found.com) - np.append(trial.truth.body.mass, trial.truth.body.com)
         assert float(np.abs(error / found.std[:4]).max()) < 4.5
@@ -59,7 +62,9 @@ def test_sensors_that_were_tared_under_load_are_not_on_a_stand(seed: int) -> Non
     (recording,) = trial.log.recordings
     tared = {}
     for name, track in recording.tracks.items():
-        felt = {c: track.channels[c] - track.channels[c][:20].mean(0) for c in {"force", "torque"} & set(track.channels)}
+        felt = {
+            c: track.channels[c] - track.channels[c][:20].mean(0) for c in {"force", "torque"} & set(track.channels)
+        }
         tared[name] = replace(track, channels={**track.channels, **felt})
     found = JointTeam().identify(trial.log.with_recordings(replace(recording, tracks=tared)))
     assert "contact" not in found.codes()

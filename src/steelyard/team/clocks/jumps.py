@@ -180,7 +180,9 @@ class _Pair:
         """Return how the clock surely runs fast or slow beside the reference's, so much that no fit would follow."""
         inner, left = self.x[self.far : -self.far], self.cost.sum(1)
         total, usual = float(((inner - inner.mean()) ** 2).sum()), float(left.min())
-        if usual < ROUGH * total:
+        third = self.cost.shape[1] // 3
+        apart = int(self.cost[:, :third].sum(1).argmin()) - int(self.cost[:, -third:].sum(1).argmin())
+        if usual < ROUGH * total or abs(apart) * STEP_S < DRIFTS_S / 2:
             return None
         width = -(-self.cost.shape[1] // FEW_BINS)
         bins = self.cost.shape[1] // width
