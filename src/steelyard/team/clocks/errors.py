@@ -14,6 +14,8 @@ from steelyard.team.clocks.steps import Step
 
 # A difference is worth a word from so many standard deviations and so much [s], or [s/s].
 BEYOND, LEAST_S, LEAST_RATE = 6.0, 1e-4, 1e-6
+# Beside a clock that runs fast, rates count from this share of its own.
+SHARE = 5e-3
 WHICH = "Which of the two clocks is right no log tells."
 
 
@@ -32,7 +34,8 @@ class ClockError:
 
     def __add__(self, more: ClockError) -> ClockError:
         """Return the error of stamps that have `more` beside what was put right before."""
-        last = more if more.late_std or more.rate_std else self
+        known = more.late_std or more.rate_std or not (self.late or self.rate)
+        last = more if known else self
         late = self.at(last.middle) + more.at(last.middle)
         return replace(last, late=late, rate=self.rate + more.rate - self.rate * more.rate)
 
@@ -95,9 +98,11 @@ class ClockErrors:
         """Yield clock-unsteady for every robot whose clock is set anew between recordings, or runs fast or slow."""
         if not self:
             return
+        # What corrections one after the other leave of a fast clock is no rate of the others.
+        least = max(LEAST_RATE, SHARE * max(abs(e.rate) for each in self.recordings for e in each.values()))
         for name in log.names:
             moving = [(log.recordings[k].name, self.recordings[k].get(name, ClockError())) for k in _moving(log)]
-            runs = [*_runs(moving)]
+            runs = [*_runs(moving, least)]
             words = [*_set_anew(moving), *runs]
             if words:
                 whose = "the others'" if name == log.reference else "the reference's"
@@ -142,10 +147,10 @@ def _set_anew(moving: Sequence[tuple[str, ClockError]]) -> Iterator[str]:
             yield f"are {1e3 * abs(more):.1f}{_give(1e3 * std)} ms {way} in '{name}' than in '{first}'"
 
 
-def _runs(moving: Sequence[tuple[str, ClockError]]) -> Iterator[str]:
-    """Yield in which recordings a clock runs fast or slow."""
+def _runs(moving: Sequence[tuple[str, ClockError]], least: float) -> Iterator[str]:
+    """Yield in which recordings a clock runs fast or slow, by at least so much [s/s]."""
     for name, error in moving:
-        if abs(error.rate) > BEYOND * error.rate_std:
+        if abs(error.rate) > max(least, BEYOND * error.rate_std):
             way = "fast" if error.rate > 0 else "slow"
             yield f"run {1e6 * abs(error.rate):.0f}{_give(1e6 * error.rate_std)} ppm {way} in '{name}'"
 
