@@ -133,3 +133,51 @@ def test_errors_add_up_and_are_taken_out() -> None:
     assert (NOTHING + one) is one
     assert (one + NOTHING) is one
     assert (one + one).first(log)["robot1"].late == pytest.approx(0.02)
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+@pytest.mark.parametrize(("name", "rate"), [("robot1", 0.005), ("robot2", -0.01), ("robot0", 0.01)])
+def test_a_clock_that_runs_half_a_percent_fast_is_put_right_and_the_reference_told(
+    sensing: str, name: str, rate: float
+) -> None:
+    made = trial(sensing, motion_samples=4000, kinds=("still", "motion"))
+    found = JointTeam().identify(restamped(made.log, "motion", lambda t: t + rate * (t - t[0]), name))
+    (said,) = (f.message for f in found.findings if f.code == "clock-unsteady")
+    assert found.codes() <= {"clock-unsteady", "clock-offset"}
+    assert f"The stamps of '{name}' run " in said
+    ppm = float(said.split(" run ")[1].split()[0])
+    assert ppm == pytest.approx(1e6 * abs(rate / (1 + rate)), rel=2e-3)
+    assert ("the others'" if name == "robot0" else "the reference's") in said
+    assert bars_off(found, made) < 2
+    assert np.abs((found.parameters.people - made.truth.body.people) / found.std).max() < 4.5
+
+
+def test_of_two_robots_no_one_knows_whose_clock_is_right() -> None:
+    made = trial("poses", robots=2, kinds=("still", "motion"))
+    found = JointTeam().identify(restamped(made.log, "motion", lambda t: 1.005 * t, "robot1"))
+    (said,) = (f.message for f in found.findings if f.code == "clock-unsteady")
+    assert said.endswith("Which of the two clocks is right no log tells.")
+
+
+@pytest.mark.parametrize("name", ["robot0", "robot1"])
+@pytest.mark.parametrize("by", [0.008, -0.02, 0.035])
+def test_a_small_leap_is_told_from_a_clock_that_runs_fast(name: str, by: float) -> None:
+    made = trial("poses", motion_samples=4000, kinds=("still", "motion"))
+    log = restamped(made.log, "motion", lambda t: t + by * (t > t[1700]), name)
+    found = JointTeam().identify(log)
+    said = [f.message for f in found.findings if f.code == "clock-unsteady"]
+    assert found.codes() <= {"clock-unsteady", "clock-offset"}
+    assert len(said) == (2 if name == "robot0" else 1)
+    for text in said:
+        sizes = float(text.split(" are ")[1].split()[0])
+        assert sizes == pytest.approx(1e3 * abs(by), abs=0.5)
+        assert " ppm " not in text
+    assert bars_off(found, made) < 2
+
+
+def test_errors_add_up_like_stamps() -> None:
+    first, second = ClockError(0.3, 0.01, 5.0), ClockError(-0.1, -0.004, 20.0, 1e-3, 1e-5)
+    time = np.linspace(0.0, 40.0, 5)
+    both = first + second
+    assert np.allclose(both.right(time), second.right(first.right(time)), atol=2e-3)
+    assert both.at(20.0) == pytest.approx(0.35)

@@ -122,3 +122,21 @@ def test_recordings_without_wrenches_do_not_bend_the_others() -> None:
     found = JointTeam().identify(log.with_recordings(type(first)(first.kind, bare, first.name), *log.recordings[1:]))
     assert "grasp-slipped" not in found.codes()
     assert off(found, made)[1] < 2.5
+
+
+def test_bars_of_turns_hold_a_tare_under_load() -> None:
+    """A sensor that was tared under load says that a grasp yields from there, along its axes and about them."""
+    for seed in (700, 701):
+        made = trial((1e5, 1e3), seed)
+        recordings = []
+        for recording in made.log.recordings:
+            track = recording.tracks["robot1"]
+            zero = {c: track.channels[c] - made.log.recordings[0].tracks["robot1"].channels[c][:20].mean(0)
+                    for c in ("force", "torque")}  # fmt: skip
+            tracks = {**recording.tracks, "robot1": replace(track, channels={**track.channels, **zero})}
+            recordings.append(replace(recording, tracks=tracks))
+        found = JointTeam().identify(made.log.with_recordings(*recordings))
+        grasp, true = found.grasps["robot1"], made.truth.grasps[1]
+        turn = (true.rotation @ grasp.pose.rotation.inverse()).log()
+        assert "grasp-yields" in found.codes()
+        assert float(np.abs(turn / grasp.std[:3]).max()) < 4.5

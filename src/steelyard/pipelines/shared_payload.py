@@ -28,6 +28,7 @@ from steelyard.logs.team_track import Track
 from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clipped import without_clipped
 from steelyard.team.estimate import TeamEstimate
+from steelyard.team.frozen import without_frozen
 from steelyard.team.joint import JointTeam
 from steelyard.team.misread.angle_units import require_one_angle_unit
 from steelyard.team.misread.length_units import require_one_length_unit
@@ -63,10 +64,11 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_length_unit(log)
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
-    whole, clipped = without_clipped(log)
+    live, frozen = without_frozen(log)
+    whole, clipped = without_clipped(live)
     found = ESTIMATORS[method].identify(whole)
     lost = (*_repeated_rows(log), *_missing_rows(log), *_missing_wrenches(log, method))
-    seen = (*stuck_forces(log), *clipped, *found.findings, *lost)
+    seen = (*stuck_forces(log), *frozen, *clipped, *found.findings, *lost)
     found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
 

@@ -43,7 +43,7 @@ def without_clipped(log: TeamLog) -> tuple[TeamLog, tuple[Finding, ...]]:
     if not any(lost):
         return log, tuple(found)
     recordings = [
-        replace(r, tracks={n: _without(t, gone[n]) if n in gone else t for n, t in r.tracks.items()})
+        replace(r, tracks={n: without_wrench(t, gone[n]) if n in gone else t for n, t in r.tracks.items()})
         for r, gone in zip(log.recordings, lost, strict=True)
     ]
     return log.with_recordings(*recordings), tuple(found)
@@ -87,7 +87,7 @@ def _by_track(gone: Mask, measured: Sequence[Mask], begins: Integers) -> dict[in
     return out
 
 
-def _without(track: Track, rows: Mask) -> Track:
+def without_wrench(track: Track, rows: Mask) -> Track:
     """Return the track without its wrench in rows (T,)."""
     valid = {q: mask & ~rows if q in WRENCH else mask for q, mask in track.valid.items()}
     return replace(track, valid=valid)

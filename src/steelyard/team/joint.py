@@ -72,7 +72,7 @@ class JointTeam:
         require_wrenches(log)
         self._require_wrists(log)
         if self.slipped is None:
-            log, jumped = cut_at_jumps(log) if self.clocks else (log, NOTHING)
+            log, jumped = cut_at_jumps(log, drifts=True) if self.clocks else (log, NOTHING)
             return whose_slip(log, lambda slipped: replace(self, slipped=slipped, jumped=jumped).identify(log))
         seen = self._from_twists(log) if needs_twists(log) else self._from_poses(log)
         return seen if isinstance(seen, TeamEstimate) else weighed(seen, self.wrists, self.gains, self.highest_hz)
@@ -141,8 +141,7 @@ class JointTeam:
         begun = self.jumped + begun
         if team.rough:
             return log, team, begun
-        log, team, errors = steadied(log, team, lambda moved: of(moved, True))
-        return log, team, begun + errors
+        return steadied(log, team, lambda moved: of(moved, True), begun)
 
     def _jointed(
         self, log: TeamLog, split: Split, standing: Sequence[Finding], begun: ClockErrors

@@ -15,6 +15,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.changes.odd_recording import without_odd
+from steelyard.team.changes.propped import is_propped, maybe_propped
 from steelyard.team.changes.touched import Touched, together, without_touched
 from steelyard.team.clocks.errors import ClockErrors, Errors
 from steelyard.team.consistent import consistent
@@ -114,7 +115,8 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         C = unit_bias(D, six_axis, size)
         return _Fitted(groups, D, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
 
-    first, touched = _untouched(seen.rows, fitted, size, highest_hz)
+    unpropped, propped = _unpropped(seen.rows, fitted, summing(placed), highest_hz)
+    first, touched = _untouched(unpropped, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
@@ -128,8 +130,9 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
     if seen.yields is not None:
         # Of all sensors only the sum of their biases is known: it may be that of any one.
-        bias = float(np.linalg.norm(payload.biases[:, 3:], axis=1).max(initial=0.0))
-        spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), bias)
+        borne = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
+        each = np.asarray(borne, np.float64)
+        spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), each.transpose(2, 0, 1))
     team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
     team = clocked(team, seen.begun.first(log))
     # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
@@ -139,6 +142,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
         *seen.findings,
+        *propped,
         *(one.finding() for one in touched),
         *odd,
         *(gains(payload.gain, payload.gainless) if known else ()),
@@ -161,6 +165,33 @@ class _Fitted:
     read: tuple[Finding, ...]
     taken: Mapping[str, Array]
     payload: PayloadFit
+
+
+def _unpropped(
+    rows: list[tuple[BodyRows, Array]],
+    fitted: Callable[[list[tuple[BodyRows, Array]]], _Fitted],
+    D: Array,
+    highest_hz: float,
+) -> tuple[list[tuple[BodyRows, Array]], tuple[Finding, ...]]:
+    """Return the rows without those in which something else bears the payload, and what is said of them."""
+    asked = maybe_propped([body for body, _ in rows], D)
+    if not asked:
+        return rows, ()
+    kept = list(rows)
+    for one in asked:
+        kept[one.number] = (one.without(rows[one.number][0], highest_hz), rows[one.number][1])
+    try:
+        fit = fitted(kept)
+    except CannotAnswer:
+        return rows, ()
+    out, found = list(rows), list[Finding]()
+    for one in asked:
+        body = rows[one.number][0]
+        missing = one.missing(body, fit.payload.parameters, fit.D)
+        if is_propped(missing, fit.payload.parameters):
+            out[one.number] = kept[one.number]
+            found.append(one.finding(body, missing))
+    return out, tuple(found)
 
 
 def _untouched(

@@ -73,7 +73,7 @@ def without_touched(
         if share > MOST:
             touched = [np.ones_like(each) for each in touched]
         kept = tuple(
-            piece for run, hit in zip(body.runs, touched, strict=True) for piece in _pieces(run, ~hit, highest_hz)
+            piece for run, hit in zip(body.runs, touched, strict=True) for piece in pieces(run, ~hit, highest_hz)
         )
         out[k] = (replace(body, runs=kept), left)
         seconds = sum(float(hit.sum()) / run.rate for hit, run in zip(touched, body.runs, strict=True))
@@ -106,8 +106,8 @@ def _around(rows: Mask, rate: float) -> Mask:
     return np.asarray(binary_dilation(rows, iterations=max(1, round(MARGIN_S * rate)))) if rows.any() else rows
 
 
-def _pieces(run: Run, kept: Mask, highest_hz: float) -> list[Run]:
-    """Return the stretches of a run that are kept and long enough."""
+def pieces(run: Run, kept: Mask, highest_hz: float) -> list[Run]:
+    """Return the stretches of a run that are kept (T,) and long enough for the band up to `highest_hz`."""
     least = LEAST_CYCLES * run.rate / highest_hz
     return [
         Run(

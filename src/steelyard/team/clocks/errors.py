@@ -10,9 +10,13 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.team.clocks.steps import Step
 
-# A difference is worth a word from so many standard deviations and so much [s].
-BEYOND, LEAST_S = 6.0, 1e-4
+# A difference is worth a word from so many standard deviations and so much [s], or [s/s].
+BEYOND, LEAST_S, LEAST_RATE = 6.0, 1e-4, 1e-6
+# Beside a clock that runs fast, rates count from this share of its own.
+SHARE = 5e-3
+WHICH = "Which of the two clocks is right no log tells."
 
 
 @dataclass(frozen=True)
@@ -30,8 +34,14 @@ class ClockError:
 
     def __add__(self, more: ClockError) -> ClockError:
         """Return the error of stamps that have `more` beside what was put right before."""
-        last = more if more.late_std else self
-        return replace(last, late=self.late + more.late, rate=self.rate + more.rate)
+        known = more.late_std or more.rate_std or not (self.late or self.rate)
+        last = more if known else self
+        late = self.at(last.middle) + more.at(last.middle)
+        return replace(last, late=late, rate=self.rate + more.rate - self.rate * more.rate)
+
+    def at(self, time: float) -> float:
+        """Return how late stamps are [s] at a time [s]."""
+        return self.late + self.rate * (time - self.middle)
 
     def right(self, time: Array) -> Array:
         """Return stamps (T,) [s] put right."""
@@ -44,9 +54,13 @@ Errors = Mapping[str, ClockError]
 
 @dataclass(frozen=True)
 class ClockErrors:
-    """What clocks are off by in every recording; nothing where all are punctual."""
+    """What clocks are off by in every recording; nothing where all are punctual.
+
+    step  the clearest jump of a clock within a recording, which nothing in `recordings` holds
+    """
 
     recordings: tuple[Errors, ...] = ()
+    step: Step | None = None
 
     def __bool__(self) -> bool:
         return any(self.recordings)
@@ -66,6 +80,15 @@ class ClockErrors:
         pairs = zip(log.recordings, self.recordings, strict=True)
         return log.with_recordings(*(punctual(recording, errors) for recording, errors in pairs))
 
+    def of_reference(self, log: TeamLog) -> ClockErrors:
+        """Return what all stamps are off by where the reference itself runs fast or slow; nothing where it does not.
+
+        Accelerations are told by one clock: of three robots and more it is the middle one's, of two the reference's.
+        """
+        pairs = zip(log.recordings, self.recordings, strict=True)
+        found = ClockErrors(tuple(_of_reference(log.reference, recording, errors) for recording, errors in pairs))
+        return found if found else NOTHING
+
     def first(self, log: TeamLog) -> Errors:
         """Return what clocks are off by in the first recording in motion, for which an answer tells its offsets."""
         moving = _moving(log)
@@ -75,15 +98,30 @@ class ClockErrors:
         """Yield clock-unsteady for every robot whose clock is set anew between recordings, or runs fast or slow."""
         if not self:
             return
+        # What corrections one after the other leave of a fast clock is no rate of the others.
+        least = max(LEAST_RATE, SHARE * max(abs(e.rate) for each in self.recordings for e in each.values()))
         for name in log.names:
             moving = [(log.recordings[k].name, self.recordings[k].get(name, ClockError())) for k in _moving(log)]
-            words = [*_set_anew(moving), *_runs(moving)]
+            runs = [*_runs(moving, least)]
+            words = [*_set_anew(moving), *runs]
             if words:
-                said = f"The stamps of '{name}' {' and '.join(words)}, beside the reference's; they were put right."
-                yield Finding.of("clock-unsteady", said)
+                whose = "the others'" if name == log.reference else "the reference's"
+                said = f"The stamps of '{name}' {' and '.join(words)}, beside {whose}; they were put right."
+                yield Finding.of("clock-unsteady", said + (f" {WHICH}" if runs and len(log.names) == 2 else ""))
 
 
 NOTHING = ClockErrors()
+
+
+def _of_reference(reference: str, recording: TeamRecording, errors: Errors) -> Errors:
+    rates = sorted(errors[name].rate if name in errors else 0.0 for name in recording.tracks)
+    usual = float(np.clip(0.0, rates[(len(rates) - 1) // 2], rates[len(rates) // 2]))
+    if not usual:
+        return {}
+    std = min(error.rate_std for error in errors.values())
+    middle = float(np.mean([error.middle for error in errors.values()]))
+    turned = ClockError(0.0, -usual / (1 - usual), middle)
+    return {name: replace(turned, rate_std=std) if name == reference else turned for name in recording.tracks}
 
 
 def punctual(recording: TeamRecording, errors: Errors) -> TeamRecording:
@@ -109,10 +147,10 @@ def _set_anew(moving: Sequence[tuple[str, ClockError]]) -> Iterator[str]:
             yield f"are {1e3 * abs(more):.1f}{_give(1e3 * std)} ms {way} in '{name}' than in '{first}'"
 
 
-def _runs(moving: Sequence[tuple[str, ClockError]]) -> Iterator[str]:
-    """Yield in which recordings a clock runs fast or slow."""
+def _runs(moving: Sequence[tuple[str, ClockError]], least: float) -> Iterator[str]:
+    """Yield in which recordings a clock runs fast or slow, by at least so much [s/s]."""
     for name, error in moving:
-        if abs(error.rate) > BEYOND * error.rate_std:
+        if abs(error.rate) > max(least, BEYOND * error.rate_std):
             way = "fast" if error.rate > 0 else "slow"
             yield f"run {1e6 * abs(error.rate):.0f}{_give(1e6 * error.rate_std)} ppm {way} in '{name}'"
 

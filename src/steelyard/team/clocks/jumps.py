@@ -10,16 +10,19 @@ Source: own.
 
 from __future__ import annotations
 
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numba import njit
 
 from steelyard.check import Array
+from steelyard.errors import BadValue
 from steelyard.logs.clock import jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors
+from steelyard.team.clocks.steps import Step
 from steelyard.team.turning_speed import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps, and jumps by so much about the
@@ -31,7 +34,13 @@ BIN_S, LEAST_S = 0.1, 2.5
 # By how much [s] a clock that is called must have jumped; either part's own shift leaves less by this factor than the
 # other's; both together leave less than a shift that grows steadily; and robots turn alike but for this share.
 JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
+# Clocks that drift apart by so much [s] over a recording, up to this rate, are put right before the fit: where one
+# shift leaves more than this share of how the speed varies, and so many times what one leaves that grows, in so many
+# bins.
+DRIFTS_S, FASTEST, ROUGH, DRIFTING, FEW_BINS = 0.04, 0.015, 0.002, 1.3, 200
 _WIDTH = round(BIN_S / STEP_S)
+# [s] Jumps of two robots are one, of the reference's clock, where they are so alike and so near to one another.
+SAME_S, NEAR_S = 0.05, 1.0
 # [s] to either side of a jump that leaves no gap, which are left out; and jumps of one recording.
 UNSURE_S, MOST = 0.3, 3
 NONE = ClockError()
@@ -48,50 +57,142 @@ class Jump:
     after: float
 
 
-def cut_at_jumps(log: TeamLog) -> tuple[TeamLog, ClockErrors]:
-    """Return the log with recordings cut where clocks jump and stamps put right, and what they were off by."""
-    made = [part for r in log.recordings for part in _parts(log, r, MOST)]
-    if len(made) == len(log.recordings):
-        return log, NOTHING
+def cut_at_jumps(log: TeamLog, drifts: bool = False) -> tuple[TeamLog, ClockErrors]:
+    """Return the log with recordings cut where clocks jump and stamps put right, and what they were off by.
+
+    drifts  whether stamps of clocks that run so fast or slow that a fit would not find its way are put right, too
+    """
+    made = [part for r in log.recordings for part in _parts(log, r, MOST, drifts)]
     errors = ClockErrors(tuple(late for _, late in made))
-    return errors.corrected(log.with_recordings(*(part for part, _ in made))), errors
+    if not errors:
+        return log, NOTHING
+    cut = log.with_recordings(*(part for part, _ in made))
+    return errors.corrected(cut), errors
 
 
-def _parts(log: TeamLog, recording: TeamRecording, most: int) -> list[tuple[TeamRecording, Errors]]:
-    """Return a recording, or its parts, each with what clocks that jumped before it are late by."""
-    if recording.kind == "still" or not most:
+def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> list[tuple[TeamRecording, Errors]]:
+    """Return a recording, or its parts, each with what clocks are late by that run fast or jumped before it."""
+    if recording.kind == "still":
         return [(recording, {})]
-    for name in log.others:
-        jump = find_jump(recording, log.reference, name)
-        if jump is not None:
-            first, second = _cut(recording, jump)
-            if name in first.tracks and name in second.tracks and min(len(first.tracks), len(second.tracks)) > 1:
-                more = ClockError(jump.after - jump.before)
-                later = [(r, {**late, name: more + late.get(name, NONE)}) for r, late in _parts(log, second, most - 1)]
-                return [*_parts(log, first, most - 1), *later]
-    return [(recording, {})]
+    pairs = {n: pair for n in log.others if (pair := _Pair.of(recording, log.reference, n)) is not None}
+    for name in pairs if most else ():
+        jump = pairs[name].jump()
+        if jump is None:
+            continue
+        # A leap of the reference is one of all others.
+        jumps = (jump, *_alike(jump, [pair.jump() for n, pair in pairs.items() if n != name]))
+        first, second = _cut(recording, jumps)
+        both = all(jump.name in part.tracks for jump in jumps for part in (first, second))
+        if both and min(len(first.tracks), len(second.tracks)) > 1:
+            more = {jump.name: ClockError(jump.after - jump.before) for jump in jumps}
+            later = [
+                (r, {n: more.get(n, NONE) + late.get(n, NONE) for n in {*more, *late}})
+                for r, late in _parts(log, second, most - 1, drifts)
+            ]
+            return [*_parts(log, first, most - 1, drifts), *later]
+    found = ((name, pair.drift()) for name, pair in pairs.items() if drifts)
+    return [(recording, {name: drift for name, drift in found if drift is not None})]
 
 
-def find_jump(recording: TeamRecording, reference: str, name: str) -> Jump | None:
-    """Return where the clock of one robot surely jumps beside the reference's, None where it does not."""
-    if not {name, reference} <= recording.tracks.keys():
-        return None
-    own, other = recording.tracks[reference], recording.tracks[name]
-    begin, end = recording.span
-    far, most = round(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S), round(LARGEST_S / STEP_S)
-    time = np.arange(begin, end - OVER_S, STEP_S)
-    if len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
-        return None
-    x, y = (_speed(track, time) for track in (own, other))
-    if x is None or y is None:
-        return None
-    usual = int(_costs(x, y, far).sum(1).argmin()) - far
-    splits = [_split(x, y, common, most) for common in {0, usual}]
-    best = min((split for split in splits if split is not None), key=lambda split: split.left, default=None)
-    if best is None or not best.sure:
-        return None
-    last, first = _place(own, other, begin + best.at, best.before, best.after)
-    return Jump(name, last, first, best.before, best.after)
+def cut_at_step(
+    log: TeamLog, errors: ClockErrors, step: Step, late: Mapping[str, float]
+) -> tuple[TeamLog, ClockErrors]:
+    """Return the log with a recording cut where the clock of one robot steps and its stamps put right, and all errors.
+
+    errors  what was put right before     late  how late each clock is [s] beside them
+    """
+    recording = log.recordings[step.recording]
+    # A step of the reference is one of all others.
+    moved = log.others if step.name == log.reference else (step.name,)
+    size = -step.size if step.name == log.reference else step.size
+    shown = next(name for name in moved if name in recording.tracks)
+    own, other = (recording.tracks.get(name, recording.tracks[shown]) for name in (log.reference, shown))
+    shift = late.get(shown, 0.0) - late.get(log.reference, 0.0)
+    last, first = _place(own, other, step.at + late.get(log.reference, 0.0), shift, shift + size)
+    offsets = {name: late.get(name, 0.0) - late.get(log.reference, 0.0) for name in recording.tracks}
+    jumps = [
+        Jump(name, last, first, offset, offset + (size if name in moved else 0.0)) for name, offset in offsets.items()
+    ]
+    before, after = _cut(recording, jumps)
+    if min(len(before.tracks), len(after.tracks)) < len(recording.tracks):
+        raise BadValue(f"'{recording.name}' cannot be cut at {step.at:.1f} s.")
+    cut = [r for k, one in enumerate(log.recordings) for r in ((before, after) if k == step.recording else (one,))]
+    known = list(errors.recordings) if errors else [{} for _ in log.recordings]
+    more = {name: ClockError(size) for name in moved if name in after.tracks}
+    later = ClockErrors((known[step.recording],)) + ClockErrors((more,))
+    known.insert(step.recording + 1, later.recordings[0])
+    here = [more if k == step.recording + 1 else {} for k in range(len(cut))]
+    return ClockErrors(tuple(here)).corrected(log.with_recordings(*cut)), ClockErrors(tuple(known))
+
+
+def _alike(jump: Jump, others: Iterable[Jump | None]) -> Iterator[Jump]:
+    """Yield those that jump when this one does, and by as much."""
+    for other in others:
+        if other is None or abs(other.last - jump.last) > NEAR_S:
+            continue
+        if abs((other.after - other.before) - (jump.after - jump.before)) < SAME_S:
+            yield other
+
+
+@dataclass(frozen=True, eq=False)
+class _Pair:
+    """How fast two robots turn, x and y (T,) from `begin` [s] on, and what shifts within `far` leave of it.
+
+    cost  (2 far + 1, K) squares that every shift of y leaves of every bin
+    """
+
+    recording: TeamRecording
+    reference: str
+    name: str
+    begin: float
+    x: Array
+    y: Array
+    far: int
+    cost: Array
+
+    @classmethod
+    def of(cls, recording: TeamRecording, reference: str, name: str) -> _Pair | None:
+        """Return the pair of a robot and the reference; None where too little is known of either."""
+        if not {name, reference} <= recording.tracks.keys():
+            return None
+        begin, end = recording.span
+        far = round(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S)
+        time = np.arange(begin, end - OVER_S, STEP_S)
+        if len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
+            return None
+        x, y = (_speed(recording.tracks[n], time) for n in (reference, name))
+        if x is None or y is None:
+            return None
+        return cls(recording, reference, name, begin, x, y, far, _costs(x, y, far))
+
+    def jump(self) -> Jump | None:
+        """Return where the clock surely jumps beside the reference's, None where it does not."""
+        usual = int(self.cost.sum(1).argmin()) - self.far
+        splits = [_split(self.x, self.y, common, round(LARGEST_S / STEP_S)) for common in {0, usual}]
+        best = min((split for split in splits if split is not None), key=lambda split: split.left, default=None)
+        if best is None or not best.sure:
+            return None
+        own, other = (self.recording.tracks[n] for n in (self.reference, self.name))
+        last, first = _place(own, other, self.begin + best.at, best.before, best.after)
+        return Jump(self.name, last, first, best.before, best.after)
+
+    def drift(self) -> ClockError | None:
+        """Return how the clock surely runs fast or slow beside the reference's, so much that no fit would follow."""
+        inner, left = self.x[self.far : -self.far], self.cost.sum(1)
+        total, usual = float(((inner - inner.mean()) ** 2).sum()), float(left.min())
+        third = self.cost.shape[1] // 3
+        apart = int(self.cost[:, :third].sum(1).argmin()) - int(self.cost[:, -third:].sum(1).argmin())
+        if usual < ROUGH * total or abs(apart) * STEP_S < DRIFTS_S / 2:
+            return None
+        width = -(-self.cost.shape[1] // FEW_BINS)
+        bins = self.cost.shape[1] // width
+        cost = self.cost[:, : bins * width].reshape(len(left), bins, width).sum(2)
+        seconds = BIN_S * width * (bins - 1)
+        least, start, grows = min(_lines(cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far)))
+        if abs(grows) * STEP_S < DRIFTS_S or least > LEFT * total or usual < DRIFTING * least:
+            return None
+        middle = self.begin + STEP_S * self.far + 0.5 * BIN_S * width * bins
+        return ClockError(STEP_S * (start - self.far), STEP_S * grows / seconds, middle)
 
 
 @dataclass(frozen=True)
@@ -166,15 +267,23 @@ def _costs(x: Array, y: Array, most: int) -> Array:
 
 def _steady(cost: Array) -> float:
     """Return the least that a shift leaves which grows or falls steadily, by up to all that is looked for."""
+    return min((left for left, _, _ in _lines(cost, len(cost) - 1)), default=np.inf)
+
+
+def _lines(cost: Array, most: int) -> Iterator[tuple[float, int, int]]:
+    """Yield what shifts leave that grow by so much [steps] over the bins, for all up to `most`: least, start, growth.
+
+    cost  (S, K) what every shift leaves of every bin
+    """
     shifts, bins = cost.shape
     along, where = np.linspace(-0.5, 0.5, bins), np.arange(bins)
-    least = np.inf
-    for grows in np.arange(1 - shifts, shifts, 2):
+    for grows in np.arange(-(most // 2) * 2, most + 1, 2):
         rows = np.round(grows * along).astype(np.int64)
         starts = np.arange(-rows.min(), shifts - rows.max())
         if len(starts):
-            least = min(least, float(cost[starts[:, None] + rows, where].sum(1).min()))
-    return least
+            left = cost[starts[:, None] + rows, where].sum(1)
+            best = int(left.argmin())
+            yield float(left[best]), int(starts[best]), int(grows)
 
 
 def _place(own: Track, other: Track, near: float, before: float, after: float) -> tuple[float, float]:
@@ -186,17 +295,19 @@ def _place(own: Track, other: Track, near: float, before: float, after: float) -
     return near - UNSURE_S, near + UNSURE_S
 
 
-def _cut(recording: TeamRecording, jump: Jump) -> tuple[TeamRecording, TeamRecording]:
-    """Return what was recorded before and after a jump."""
+def _cut(recording: TeamRecording, jumps: Sequence[Jump]) -> tuple[TeamRecording, TeamRecording]:
+    """Return what was recorded before and after jumps at about one time."""
     begin = min(float(track.time[0]) for track in recording.tracks.values())
+    before, after = {jump.name: jump.before for jump in jumps}, {jump.name: jump.after for jump in jumps}
+    last, first = min(jump.last for jump in jumps), max(jump.first for jump in jumps)
     parts = []
-    for later, edge, own in ((False, jump.last, jump.before), (True, jump.first, jump.after)):
+    for later, edge, own in ((False, last, before), (True, first, after)):
         tracks = {}
         for name, track in recording.tracks.items():
-            time = track.time - (own if name == jump.name else 0.0)
+            time = track.time - own.get(name, 0.0)
             rows = time >= edge - 1e-9 if later else time <= edge + 1e-9
             if rows.sum() > 1:
                 tracks[name] = track.rows(rows)
         parts.append(tracks)
-    named = f"{recording.name} from {jump.first - begin:.1f} s on"
+    named = f"{recording.name} from {first - begin:.1f} s on"
     return replace(recording, tracks=parts[0]), replace(recording, tracks=parts[1], name=named)

@@ -8,7 +8,7 @@ Source: own.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from typing import Protocol, TypeVar
 
@@ -16,13 +16,18 @@ import numpy as np
 
 from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.logs.log import Mask
+from steelyard.logs.log import Integers, Mask
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.clocks.errors import ClockError, ClockErrors
+from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
+from steelyard.team.clocks.jumps import LEAST_S as PART_S
+from steelyard.team.clocks.jumps import MOST, cut_at_step
+from steelyard.team.clocks.steps import Best, Step, clearest
 from steelyard.team.scores import Scores
 
 # Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
 STRETCHES, ROWS = 20, 100
+# Stretches by which the time of a step is told last so long [s].
+STEP_S = 0.1
 # A clock is unsteady from so many standard deviations, and where it is late by so much [s] or fast by so much [s/s].
 # One that is called so is put right until less than SETTLED standard deviations are left, at most so many times.
 BEYOND, LEAST_S, LEAST_RATE = 8.0, 1e-4, 1e-6
@@ -51,13 +56,32 @@ class Steady(Protocol):
     def clocks_left(self) -> ClockErrors:
         """What clocks seem to be off by beside one offset per robot, noise and all."""
 
+    @property
+    def late(self) -> Mapping[str, float]:
+        """How late each clock is [s], in all recordings alike."""
+
 
 F = TypeVar("F", bound=Steady)
 
 
-def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog, F, ClockErrors]:
-    """Return log and fit with clocks put right in every recording, and what they were off by."""
-    errors, called = ClockErrors(), _Called()
+def steadied(
+    log: TeamLog, team: F, of: Callable[[TeamLog], F], errors: ClockErrors = NOTHING
+) -> tuple[TeamLog, F, ClockErrors]:
+    """Return log and fit with clocks put right in every recording, and what they were off by.
+
+    errors  what stamps were put right by before, which is told, too
+    """
+    called = _Called()
+    for _ in range(MOST):
+        step = team.clocks_left.step
+        if step is None:
+            break
+        try:
+            cut, before = cut_at_step(log, errors, step, team.late)
+            team = of(cut)
+        except (BadValue, CannotAnswer, *BREAKDOWNS):
+            break
+        log, errors = cut, before
     for _ in range(ROUNDS):
         called = called.joined(team.clocks_left)
         wrong = called.of(team.clocks_left)
@@ -69,6 +93,10 @@ def steadied(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
         except (BadValue, CannotAnswer, *BREAKDOWNS):
             break
         log, errors = moved, errors + wrong
+    of_reference = errors.of_reference(log) if errors else NOTHING
+    if of_reference:
+        log, errors = of_reference.corrected(log), errors + of_reference
+        team = of(log)
     return log, team, errors
 
 
@@ -103,37 +131,86 @@ def clock_errors(log: TeamLog, parts: tuple[Left, ...], J: Array, W: Array) -> C
 
     J  (N, 6, 6) residuals per motion of the payload      W  (N, 6) their weights
     """
-    reference = log.names.index(log.reference)
-    return ClockErrors(tuple(
-        {} if recording.kind == "still" else _told(part, J, W, log.names, reference)
+    told: list[_Told | None] = [
+        None if recording.kind == "still" else _Told.of(part, J, W, log.names.index(log.reference))
         for recording, part in zip(log.recordings, parts, strict=True)
-    ))  # fmt: skip
+    ]
+    steps = [step for k, one in enumerate(told) if one is not None and (step := one.step(k, log.names)) is not None]
+    return ClockErrors(tuple({} if one is None else one.errors(log.names) for one in told), steps[0] if steps else None)
 
 
-def _told(part: Left, J: Array, W: Array, names: tuple[str, ...], reference: int) -> dict[str, ClockError]:
-    """Return errors from the rows that most often see the same robots; none where there are too few."""
-    patterns, which, count = np.unique(part.seen, axis=0, return_inverse=True, return_counts=True)
-    most = int(np.argmax(count * (patterns.sum(1) > 1)))
-    robots, rows = np.flatnonzero(patterns[most]), np.flatnonzero(which.ravel() == most)
-    if len(robots) < 2 or len(rows) < ROWS:
-        return {}
-    middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
-    slope, some = part.slope[rows][:, robots], len(robots)
-    columns = np.concatenate([slope, slope * ((part.time[rows] - middle) / half)[:, None, None]], axis=1)
-    whose = np.tile(np.arange(some), 2)
-    scores = Scores.of(part.apart[rows][:, robots], columns, whose, J[robots], W[robots], STRETCHES)
-    # What all clocks have in common moves the motion along itself.
-    common = np.kron(np.eye(2), np.ones((some, some))) * np.trace(scores.information.sum(0)) / (2 * some)
-    if not common.any():
-        return {}
-    size, covariances = scores.solved(common)
-    base = int(np.argmax(robots == reference))
-    against = np.kron(np.diag([1.0, 1 / half]), np.eye(some) - np.eye(some)[base])
-    late, rate = (against @ size).reshape(2, some)
-    noise = [np.einsum("ij,jk,ik->i", against, V, against) for V in covariances]
-    late_std, rate_std = np.sqrt(np.maximum(*noise)).reshape(2, some)
-    return {
-        names[i]: ClockError(float(late[k]), float(rate[k]), middle, float(late_std[k]), float(rate_std[k]))
-        for k, i in enumerate(robots)
-        if k != base
-    }
+@dataclass(frozen=True, eq=False)
+class _Told:
+    """What the rows of one recording that most often see the same robots tell of their clocks.
+
+    robots  (n,) numbers of those     base  which of them clocks are told against
+    time    (T,) [s] of those rows    apart, slope  (T, n, 6) as in `Left`
+    J, W    of those robots
+    scores  of offsets, and of rates per half of the recording [s], of all robots in turn
+    common  (2 n, 2 n) information on what all clocks have in common: it moves the motion along itself
+    """
+
+    robots: Integers
+    base: int
+    time: Array
+    apart: Array
+    slope: Array
+    J: Array
+    W: Array
+    middle: float
+    half: float
+    scores: Scores
+    common: Array
+
+    @classmethod
+    def of(cls, part: Left, J: Array, W: Array, reference: int) -> _Told | None:
+        """Return what is told, None where rows or robots are too few."""
+        patterns, which, count = np.unique(part.seen, axis=0, return_inverse=True, return_counts=True)
+        most = int(np.argmax(count * (patterns.sum(1) > 1)))
+        robots, rows = np.flatnonzero(patterns[most]), np.flatnonzero(which.ravel() == most)
+        if len(robots) < 2 or len(rows) < ROWS:
+            return None
+        middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
+        time, some = part.time[rows], len(robots)
+        apart, slope = part.apart[rows][:, robots], part.slope[rows][:, robots]
+        columns = np.concatenate([slope, slope * ((time - middle) / half)[:, None, None]], axis=1)
+        scores = Scores.of(apart, columns, np.tile(np.arange(some), 2), J[robots], W[robots], STRETCHES)
+        common = np.kron(np.eye(2), np.ones((some, some))) * np.trace(scores.information.sum(0)) / (2 * some)
+        if not common.any():
+            return None
+        base = int(np.argmax(robots == reference))
+        return cls(robots, base, time, apart, slope, J[robots], W[robots], middle, half, scores, common)
+
+    def errors(self, names: tuple[str, ...]) -> dict[str, ClockError]:
+        """Return offsets and rates by robots' `names` (N,)."""
+        some = len(self.robots)
+        size, covariances = self.scores.solved(self.common)
+        against = np.kron(np.diag([1.0, 1 / self.half]), np.eye(some) - np.eye(some)[self.base])
+        late, rate = (against @ size).reshape(2, some)
+        noise = [np.einsum("ij,jk,ik->i", against, V, against) for V in covariances]
+        late_std, rate_std = np.sqrt(np.maximum(*noise)).reshape(2, some)
+        return {
+            names[i]: ClockError(float(late[k]), float(rate[k]), self.middle, float(late_std[k]), float(rate_std[k]))
+            for k, i in enumerate(self.robots)
+            if k != self.base
+        }
+
+    def step(self, recording: int, names: tuple[str, ...]) -> Step | None:
+        """Return the step of a clock in this `recording` of robots `names` (N,), None where there surely is none."""
+        some = len(self.robots)
+        held = self.common[:some, :some]
+        found = self._clearest(self.scores, STRETCHES, held)
+        if not found.sure:
+            return None
+        count = int(min(len(self.time), max(STRETCHES, 2 * self.half / STEP_S)))
+        fine = Scores.of(self.apart, self.slope, np.arange(some), self.J, self.W, count)
+        best = self._clearest(fine, count, held)
+        first = float(np.array_split(self.time, count)[best.first][0])
+        if min(first - self.time[0], self.time[-1] - first) < PART_S:
+            return None
+        return Step(recording, names[self.robots[best.robot]], first, best.size)
+
+    def _clearest(self, scores: Scores, stretches: int, held: Array) -> Best:
+        at = np.array([rows.mean() for rows in np.array_split((self.time - self.middle) / self.half, stretches)])
+        some = len(self.robots)
+        return clearest(scores.pull[:, :some], scores.information[:, :some, :some], at, held)

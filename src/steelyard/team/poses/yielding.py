@@ -66,13 +66,15 @@ class Yields:
         """Return the spread of the grasps (N,) with what is open of how far the mean load moves them."""
         return _moved(spread, grasps, reference, np.where(self.size > 0, self.std, 0.0) * np.abs(self.mean))
 
-    def biased(self, spread: Spread, grasps: Pose, reference: int, force: float) -> Spread:
-        """Return the spread of the grasps (N,) with what a bias of any robot's forces, `force` [N] long, moves it.
+    def biased(self, spread: Spread, grasps: Pose, reference: int, biases: Array) -> Spread:
+        """Return the spread of the grasps (N,) in R with what biases of sensors move them by.
+
+        biases  (R, N, 6) moment and force [N m, N] of every recording's bias as felt at each grasp, in any axes of it
 
         Without a load a sensor reads its bias: one that was tared under load says that a grasp yields from there.
         """
-        along = np.repeat([0.0, force / np.sqrt(3)], 3)
-        return _moved(spread, grasps, reference, self.size * along)
+        sizes = np.linalg.norm(biases.reshape(*biases.shape[:2], 2, 3), axis=-1).max(0, initial=0.0)
+        return _moved(spread, grasps, reference, self.size * np.repeat(sizes / np.sqrt(3), 3, axis=1))
 
     def findings(self, log: TeamLog) -> Iterator[Finding]:
         """Yield grasp-yields for every robot whose grasp does."""
