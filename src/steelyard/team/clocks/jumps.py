@@ -18,7 +18,7 @@ from numba import njit
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.logs.clock import jump_gap
+from steelyard.logs.clock import NEAR_S, SAME_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors
@@ -39,8 +39,6 @@ JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
 # bins.
 DRIFTS_S, FASTEST, ROUGH, DRIFTING, FEW_BINS = 0.04, 0.015, 0.002, 1.3, 200
 _WIDTH = round(BIN_S / STEP_S)
-# [s] Jumps of two robots are one, of the reference's clock, where they are so alike and so near to one another.
-SAME_S, NEAR_S = 0.05, 1.0
 # [s] to either side of a jump that leaves no gap, which are left out; and jumps of one recording.
 UNSURE_S, MOST = 0.3, 3
 NONE = ClockError()
