@@ -8,6 +8,7 @@ Source: own; the wrench is linear in ten parameters (Atkeson, An, Hollerbach 198
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import ClassVar, TypeVar
@@ -36,7 +37,7 @@ _FAR = 2.0  # standard deviations from which on a row counts less
 
 
 @dataclass(frozen=True)
-class ClockCourse:
+class ClockCourse(ABC):
     """Stamps that are late by `late` [s], and by `more` times a course that has to do with `middle` [s] besides.
 
     Times are those of the wrench's clock; more_std is the standard deviation of `more`.
@@ -49,9 +50,9 @@ class ClockCourse:
     # How far `more` may be from what is started from, beforehand.
     WIDTH: ClassVar[float]
 
+    @abstractmethod
     def course(self, time: Array) -> Array:
         """Return the course (N,) at times (N,) [s] of the wrench's clock."""
-        raise NotImplementedError
 
     def at(self, time: Array) -> Array:
         """Return how late (N,) [s] stamps are at times (N,) [s] of the wrench's clock."""
