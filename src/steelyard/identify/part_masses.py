@@ -24,7 +24,7 @@ from steelyard.identify.conclude import conclude, widened
 from steelyard.identify.cost.linear import reweighted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
-from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings
+from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
 from steelyard.identify.masses.misdrawn import misdrawn
 from steelyard.identify.masses.models import (
@@ -200,10 +200,12 @@ class PartMasses:
         if not self.materials and suspicious(seen, body.vector, self.parts):
             found = uneven(seen, self.parts)
             if found is not None:
-                others = (f for f in findings if f.code != "part-not-homogeneous")
+                # Masses have changed: which are zero is asked anew.
+                others = (f for f in findings if f.code not in ("part-not-homogeneous", "part-zero-mass"))
                 text = " ".join(filter(None, (misplaced(seen, self.parts), found.message)))
                 uneven_part = Finding.of("part-not-homogeneous", text)
-                return self._with_freed(problem, data, found).with_findings(*others, uneven_part)
+                freed = self._with_freed(problem, data, found)
+                return freed.with_findings(*zero_masses(freed, self.parts), *others, uneven_part)
         contradicted = any(f.code == "part-not-homogeneous" for f in findings)
         if self.shape_error.doubtful and not contradicted:
             words = elsewhere(data, self.parts.whole(masses.mean), self.parts, self.shape_error)

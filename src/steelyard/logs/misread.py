@@ -6,7 +6,7 @@ Only matrices are left of what a file said; the numbers as they were read can be
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numba
 import numpy as np
@@ -25,13 +25,15 @@ LEAP, LEAST_LEAP = 5.0, np.radians(1.0)
 class Misread:
     """A mistake: the code and words of what is wrong, what to do, and what turns matrices (N, 3, 3) into those meant.
 
-    `right` returns None where these matrices cannot come from this mistake.
+    `right` returns None where these matrices cannot come from this mistake. `whole`: positions beside them are of the
+    other way round, too.
     """
 
     code: str
     words: str
     remedy: str | None
     right: Callable[[Array], Array | None]
+    whole: bool = False
 
     def finding(self, message: str) -> Finding:
         """Return the finding with the remedy of this mistake."""
@@ -112,8 +114,16 @@ def _angles(rotation: Array) -> Array:
     return Rotation.nearest(rotation).rpy()
 
 
+TURNED_ROUND = Misread("gravity-frame", "rotation turns W into S, not S into W", None, lambda R: np.swapaxes(R, 1, 2))
+# The same of a pose: its position is that of the origin of W in S.
+INVERTED = replace(
+    TURNED_ROUND,
+    words="poses are of W in S, not of S in W: rotations and positions",
+    remedy="Give the inverse of each pose, that of the sensor in the world.",
+    whole=True,
+)
 MISREAD = (
-    Misread("gravity-frame", "rotation turns W into S, not S into W", None, lambda R: np.swapaxes(R, 1, 2)),
+    TURNED_ROUND,
     *(
         Misread(
             "quaternion-order",

@@ -45,7 +45,7 @@ def part_findings(
 
     body  what the shape makes of the masses, judged against the log
     """
-    out = _zero(estimate, parts)
+    out = zero_masses(estimate, parts)
     rank = seen_rank(parts, data.information, estimate.mass)
     if rank < len(parts):
         message = (
@@ -84,8 +84,8 @@ def elsewhere(data: Effective, body: InertialParameters, parts: Parts, error: Sh
     return misplaced(data.blurred(error.with_grasp(body)), parts, FAR * DRAWN)
 
 
-def _zero(estimate: Estimate, parts: Parts) -> list[Finding]:
-    """Return the finding on parts with next to no mass."""
+def zero_masses(estimate: Estimate, parts: Parts) -> list[Finding]:
+    """Return the finding on parts with next to no mass in this estimate."""
     share = parts.volume / parts.volume.sum()
     mass = np.array([part.mass for part in estimate.parts])
     zero = (share > ZERO_SHARE) & (mass < ZERO_DENSITY * share * estimate.mass)

@@ -72,7 +72,8 @@ class Clock:
             before, after = self.stamps[i], self.stamps[i + 1]
             raise BadValue(
                 f"{self.where}: time must not go back; it does {times} from {before} in row {i + 1} "
-                f"to {after} in row {i + 2}. Sort the rows, or cut the log there."
+                f"to {after} in row {i + 2}. If the rows are out of order, sort them; if the clock was set back, "
+                "add that to the times from there on, or leave out the rows that overlap."
             )
         if len(steps) and not steps.any():
             raise BadValue(

@@ -12,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.findings import about
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import signal
@@ -38,7 +39,7 @@ def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
     if not (wider.std[known] > np.hypot(1, WORTH_SAYING) * estimate.std[known]).any():
         return wider
     return wider.noted(
-        f"the wrench is {1e3 * late:.2g} ms late: a filter that makes it so takes of quick motion, too; error bars "
+        f"the wrench is {about(1e3 * late)} ms late: a filter that makes it so takes of quick motion, too; error bars "
         "hold what that may change"
     )
 

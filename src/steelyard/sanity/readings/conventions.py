@@ -56,6 +56,8 @@ def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding,
     if best is not None:
         found.append(rival_finding(best, reading))
         recording, reading, view = as_read(recording, best), best, best.view or view
+        if best.misread is not None and best.misread.whole:
+            view = glance(recording) or view
     found.extend(masses := examine_both_masses(view, recording.gravity, reading.rotation))
     # What a controller leaves of a weight may have either sign.
     left_over = any(finding.code == "weight-compensated" for finding in masses)

@@ -17,9 +17,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, frozen
 from steelyard.findings import Finding, percent
-from steelyard.logs.misread import MISREAD, Misread
+from steelyard.logs.misread import INVERTED, MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
 from steelyard.sanity.readings.static_fit import StaticFit, fit
@@ -98,9 +98,17 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
         and _beats_tilt(r, free)
         and (r.view is None or r.fit.torque_share < TORQUES_TOO)
     ]
-    # One mistake is likelier than two: a rival that also needs the wrench flipped must be much better than others.
-    best = min(able, key=lambda r: r.fit.cost + (0.0 if r.fit.sign > 0 else -2 * np.log(MUCH_BETTER)), default=None)
+    best = min(able, key=_unlikely, default=None)
     return best if best is not None and not _outdone(best, view, given.gravity) else None
+
+
+def _unlikely(reading: Reading) -> tuple[float, float]:
+    """Return what a reading costs, and what it leaves where two cost the same.
+
+    One mistake is likelier than two: one that also needs the wrench flipped must be much better than others.
+    """
+    flipped = 0.0 if reading.fit.sign > 0 else -2 * np.log(MUCH_BETTER)
+    return reading.fit.cost + flipped, reading.fit.force_share + reading.fit.torque_share
 
 
 def _best_by_torque(recording: Recording, view: Glance, given: Reading) -> Reading | None:
@@ -133,10 +141,10 @@ def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Read
     R = view.rotation
     if R is None:
         return
-    for misread in MISREAD:
+    for misread in (*MISREAD, INVERTED):
         meant = glance(put) if (put := _put_right(recording, misread)) is not None else None
         if meant is not None and meant.rotation is not None:
-            yield reading_of(view, misread.words, gravity, meant.rotation, misread)
+            yield reading_of(meant if misread.whole else view, misread.words, gravity, meant.rotation, misread)
     size = float(np.linalg.norm(gravity))
     for axis in range(3):
         if abs(gravity[axis]) < 0.8 * size:
@@ -224,10 +232,14 @@ def as_read(recording: Recording, best: Reading) -> Recording:
 
 
 def _put_right(recording: Recording, misread: Misread) -> Recording | None:
-    """Return the recording with the mistake undone in all rotations; None where it cannot be in any."""
+    """Return the recording with the mistake undone in all rotations, of whole poses; None where it cannot be in any."""
     streams, able = [], False
     for stream in recording.streams:
-        if (read := stream.channels.get("rotation")) is not None and (meant := misread.right(read)) is not None:
-            stream, able = replace(stream, channels={**stream.channels, "rotation": meant}), True
+        read, place = stream.channels.get("rotation"), stream.channels.get("position")
+        if read is not None and (meant := misread.right(read)) is not None and not (misread.whole and place is None):
+            put = {"rotation": meant}
+            if misread.whole and place is not None:
+                put["position"] = frozen(-np.einsum("nij,nj->ni", meant, place))
+            stream, able = replace(stream, channels={**stream.channels, **put}), True
         streams.append(stream)
     return replace(recording, streams=tuple(streams)) if able else None
