@@ -83,11 +83,9 @@ class PartCuts:
         error = self.shape_error.placed(*self.places[place])
         return PartMasses(self.cuts[cut], self.bias, materials=self.materials, shape_error=error, tool=self.tool)
 
-    def _weights(self, problem: Problem) -> Array:
+    def _weights(self, data: Effective, errors: list[Array]) -> Array:
         """Return the weight (K, S) of every cut in every place by prior and evidence; small ones are zero."""
-        if len(self.cuts) * len(self.places) == 1:
-            return np.ones((1, 1))
-        evidence = self._evidence(problem)
+        evidence = self._evidence(data, errors)
         if self.prior is not None:
             evidence = evidence + np.asarray(self.prior)[:, None, None]
         weight = np.exp(evidence - evidence.max((0, 1)))
@@ -95,9 +93,8 @@ class PartCuts:
         weight[weight < LEAST_WEIGHT] = 0.0
         return np.asarray(weight / weight.sum())
 
-    def _evidence(self, problem: Problem) -> Array:
+    def _evidence(self, data: Effective, errors: list[Array]) -> Array:
         """Return the log evidence (K, S, F) of every cut in every place per family of density models."""
-        data, errors = self._seen(problem)
         cost = np.array([data.cost_of(error) for error in errors])
         found = [[self._of(k, 0).log_evidence(data.blurred(error)) for error in errors] for k in range(len(self.cuts))]
         return np.asarray(np.array(found) - (cost - cost[0])[:, None])
@@ -113,7 +110,10 @@ class PartCuts:
 
     def _answered(self, problem: Problem, answer: Callable[[PartMasses], Estimate]) -> tuple[Estimate, Array]:
         """Return the mean of the answers and the weights (K, S); cuts whose parts explain nothing count no more."""
-        weight, estimates, refused = self._weights(problem), dict[tuple[int, int], Estimate](), None
+        if len(self.cuts) * len(self.places) == 1:
+            return answer(self._of(0, 0)), np.ones((1, 1))
+        data, errors = self._seen(problem)
+        weight, estimates, refused = self._weights(data, errors), dict[tuple[int, int], Estimate](), None
         tried = weight.any(1)
         for k, s in np.argwhere(weight).tolist():
             try:
@@ -129,18 +129,15 @@ class PartCuts:
         weight = weight / weight.sum()
         found = self._averaged(weight, estimates).noted(*left_out)
         if len(self.places) > 1 and not weight[:, 0].any() and "part-not-homogeneous" not in found.codes():
-            found = found.with_findings(*self._off(problem))
+            found = found.with_findings(*self._off(data.blurred(errors[0])))
         return found, weight
 
-    def _off(self, problem: Problem) -> list[Finding]:
+    def _off(self, seen: Effective) -> list[Finding]:
         """Return the finding on a place that the log contradicts by millimetres, though the answer holds that."""
-        data, errors = self._seen(problem)
-        words = misplaced(data.blurred(errors[0]), self.cuts[self._finest], ELSEWHERE)
-        return (
-            [Finding.of("part-not-homogeneous", f"{words} The answer allows for that.").instead(OTHER_FRAME)]
-            if words
-            else []
-        )
+        words = misplaced(seen, self.cuts[self._finest], ELSEWHERE)
+        if not words:
+            return []
+        return [Finding.of("part-not-homogeneous", f"{words} The answer allows for that.").instead(OTHER_FRAME)]
 
     def _averaged(self, weight: Array, estimates: dict[tuple[int, int], Estimate]) -> Estimate:
         """Return the mean of the estimates with the spread between them; the rest is the best one's."""
