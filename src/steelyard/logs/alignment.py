@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
@@ -99,12 +99,13 @@ def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] 
     taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
-    straight = felt.rows(~touched).turned_back(given.options.turn)
-    clocks, delayed = _clocks(given, time[~touched], straight)
-    steadier = _steadier(given, _question(given, time[~touched], straight, clocks.delays_s), clocks, unsteady, jumped)
+    alone = ~touched & _held_alone(given, time)
+    straight = felt.rows(alone).turned_back(given.options.turn)
+    clocks, delayed = _clocks(given, time[alone], straight)
+    steadier = _steadier(given, _question(given, time[alone], straight, clocks.delays_s), clocks, unsteady, jumped)
     if steadier is not None:
         return steadier
-    rigid = _rigid(given, time[~touched], felt.rows(~touched), clocks)
+    rigid = _rigid(given, time[alone], felt.rows(alone), clocks)
     if rigid is not None:
         lower = _align_timed(prepared(given.recording, replace(given.options, cutoff_hz=rigid)), jumped=jumped)
         return replace(lower, notes=(*lower.notes, say.swings(rigid)))
@@ -143,6 +144,11 @@ def _taps(given: Prepared) -> Array:
             late = given.known.get(stream.name, 0.0)
             found.append(bursts(stamps_of(stream) - late, stream.channels["specific_force"], margin))
     return merged(*found)
+
+
+def _held_alone(given: Prepared, time: Array) -> Mask:
+    """Return which of `time` (N,) no hand is known to have touched."""
+    return ~inside(time, np.array(given.options.touched).reshape(-1, 2))
 
 
 def _rows(given: Prepared) -> tuple[Array, Felt]:
@@ -234,7 +240,7 @@ def _jumps_put_right(
     for _ in range(_JUMP_ROUNDS):
         again = prepared(recording, given.options)
         time, felt = _rows(again)
-        calm = ~inside(time, _taps(again))
+        calm = ~inside(time, _taps(again)) & _held_alone(again, time)
         question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
         if question is None:
             break

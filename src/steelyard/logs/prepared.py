@@ -27,12 +27,14 @@ class AlignOptions:
     estimate_delays  look for delays that were not given; False counts them as none
     place            (3,) [m] in S, the point whose position, velocity or acceleration the poses give
     turn             (3,) [rad] rotation vector by which a wrench in S seems turned: delays are found without it
+    touched          (start, end) [s] on the wrench clock, in order: a hand spoils the wrench, which tells no clock then
     """
 
     cutoff_hz: float = 40.0
     estimate_delays: bool = True
     place: tuple[float, float, float] = (0.0, 0.0, 0.0)
     turn: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    touched: tuple[tuple[float, float], ...] = ()
 
 
 @dataclass(frozen=True, eq=False)

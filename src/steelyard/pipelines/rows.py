@@ -19,12 +19,15 @@ from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog
 from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Recording
+from steelyard.logs.runs import runs
 from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
+from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
 from steelyard.sanity.fitted.sensor_matrix import turn_of
+from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.small_slip import small_slip
 
 # How the note begins that says which direction of gravity was used.
@@ -33,6 +36,9 @@ GRAVITY_FOUND = "gravity was estimated"
 ROUNDS, SETTLED = 3, 1e-3
 # Where the acceleration comes from if an accelerometer gives it.
 MEASURED = "specific_force"
+# A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where without
+# its time one body leaves less than so much of that. Where one was found, clocks without its time may leave this much.
+POOR, CLEARER, WORSE = 0.03, 0.3, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -44,6 +50,7 @@ class FitRows:
     level       note on the direction of gravity, where that was asked for
     unmeasured  note on rows that were left out since their acceleration is not known
     touched     findings about time in which a hand or another load spoiled the wrench
+    left_out    that time, (start, end) [s] on the wrench clock, where its rows were left out
     place       the point whose positions the recording has, where it is not the origin of S
     maybe       the same where that is not beyond doubt: the rows are those of the origin
     units       findings that forces and torques do not belong together, where such a point would be no point
@@ -54,6 +61,7 @@ class FitRows:
     level: tuple[str, ...]
     unmeasured: tuple[str, ...]
     touched: tuple[Finding, ...]
+    left_out: tuple[tuple[float, float], ...] = ()
     place: Misplaced | None = None
     maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
@@ -111,6 +119,29 @@ def _placed(
 
 
 def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
+    """Return the rows to fit, aligned as said; where a hand touched the object, the rest alone tells the clocks.
+
+    A strong hand draws delays so far off that the wrong time, or none, seems free of it: it is looked for with clocks
+    as stamped, too, and the time counts in which one body explains most, and best.
+    """
+    rows = _as_aligned(recording, before, options, how)
+    sought = how.estimate_delays and any(rows.aligned.delays_std_s.values())
+    left = force_left(rows.log)
+    if rows.unmeasured or not sought or not (rows.left_out or left > POOR * np.ptp(rows.log.wrench[:, 3:])):
+        return rows
+    stamped = _as_aligned(recording, before, options, replace(how, estimate_delays=False))
+    hands = {r.left_out: None for r in (rows, stamped) if r.touched and r.left_out}
+    again = [_as_aligned(recording, before, options, replace(how, touched=hand)) for hand in hands]
+    again = [r for r in again if r.left_out and force_left(r.log) < (WORSE if rows.left_out else CLEARER) * left]
+    return min(again, key=_cost, default=rows)
+
+
+def _cost(rows: FitRows) -> float:
+    """Return the log of what one body leaves, and a fine on the time left out."""
+    return float(np.log(max(force_left(rows.log), 1e-12))) - FINE * len(rows.log) / max(len(rows.aligned.log), 1)
+
+
+def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
     """Return the rows to fit, aligned as said."""
     codes = {f.code for f in before}
     aligned, level = levelled_as(options.gravity, _aligned(recording, how), recording)
@@ -123,6 +154,7 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
         keep, touched = one_body(since_start(log, recording), recording, options.bias == "free", options.drift)
     if codes & {"motion-mismatch", "weight-compensated"}:
         touched = ()  # moving rows carry another mass, and only look touched
+    left_out = _times_of(log, keep)
     log = without_dead(with_declared(log.rows(keep), recording.noise))
     if whole and not touched:
         since = since_start(log, recording)
@@ -130,7 +162,14 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
         if slip is not None:
             keep, finding = slip.longer_side(since)
             log, touched = log.rows(keep), (finding,)
-    return FitRows(log, aligned, level, unmeasured, touched)
+    return FitRows(log, aligned, level, unmeasured, touched, left_out)
+
+
+def _times_of(log: MotionLog, keep: slice | Mask) -> tuple[tuple[float, float], ...]:
+    """Return first and last time [s] of every stretch of rows that is not kept."""
+    if log.time is None or isinstance(keep, slice):
+        return ()
+    return tuple((float(log.time[a]), float(log.time[b - 1])) for a, b in runs(~keep).tolist())
 
 
 def since_start(log: MotionLog, recording: Recording) -> MotionLog:

@@ -10,9 +10,14 @@ from steelyard.check import Mask
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
+from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import misplaced
 from steelyard.sanity.fitted.sensor_matrix import in_world, sensor_matrix, wrench_stream
 from steelyard.sanity.holding.contact import untouched
+
+# A hand passes for a sensor that is turned or unlike: put right, one body leaves then more of the forces than this many
+# times what it leaves of the time without the hand.
+WORSE = 2.0
 
 
 def one_body(
@@ -29,7 +34,9 @@ def one_body(
     if right is log:
         return kept, touched
     more, still_touched = untouched(right, with_bias)
-    return (more, still_touched) if more.sum() >= kept.sum() else (kept, touched)
+    if more.sum() < kept.sum() or force_left(right.rows(more)) > WORSE * force_left(log.rows(kept)):
+        return kept, touched
+    return more, still_touched
 
 
 def _put_right(log: MotionLog, recording: Recording, drift: bool) -> MotionLog:

@@ -129,6 +129,12 @@ class Rows:
         return np.asarray(run[:, None, None] * np.eye(6))
 
 
+def force_left(log: MotionLog) -> float:
+    """Return how much of the forces (rms, N) one body with a bias leaves in a log."""
+    rows, _ = Rows.of(log)
+    return float((rows.values - rows.columns @ rows.solve().solution)[:, 3:].std())
+
+
 def _gram(rows: Array) -> Array:
     flat = rows.reshape(-1, rows.shape[2])
     return np.asarray(flat.T @ flat)
