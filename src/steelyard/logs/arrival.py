@@ -9,24 +9,26 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.logs.runs import runs
 
-# Steps are told by stretches of so many rows, anew in every so many; where the median step is so much shorter than
-# these say, most rows waited.
-_STRETCH, _ANEW, _MOSTLY = 100, 1000, 0.9
+# Steps are told by stretches of so many rows, anew in so long [s] and so many; where the median step is so much shorter
+# than these say, most rows waited.
+_STRETCH, _ANEW_S, _ANEW, _MOSTLY = 100, 5.0, 300, 0.9
 # A step is taken for shorter by so much, in rounds: one that is too long would draw a whole log together.
 _SHORTER = (0.02, 0.005, 0.001)
 # Rows are late together where they are by more than so many steps. They waited where one is late by so many; that must
 # be most of all that rows are late by, else stamps jitter.
 _BESIDE, _LATE, _MOST = 0.5, 1.5, 0.5
-# The first row that waited is one step behind the row before, and at most so much more, or such a share of what it
-# waited, in most such places: as many rows come together as are missing before.
-_MISSING, _LOST = 0.5, 0.2
+# What waited comes together: so much of what rows catch up by is made up in steps of so little of one. Rows of a rate
+# that is not steady, whose stamps are right, catch up in longer ones as well.
+_QUICK, _QUICKLY = 0.3, 0.8
 
 
-def when_sampled(time: Array) -> Array | None:
-    """Return stamps (N,) [s] without what rows waited for; None where rows do not look as if they had.
+def when_sampled(time: Array) -> tuple[Array, Array] | None:
+    """Return stamps (N,) [s] without what rows waited for: of these rows alone, and with others as prompt as the best.
+
+    None where rows do not look as if they had waited.
 
     time  (N,) [s], rising, of some hundred rows or more
     """
@@ -34,7 +36,8 @@ def when_sampled(time: Array) -> Array | None:
     for shorter in _SHORTER:
         bound = _bound(time, (1 - shorter) * step)
         step = _step(bound, np.maximum(np.round(np.diff(bound) / step), 1.0))
-    return bound if _waited(time, bound, step) else None
+    waited = _waited(time, bound, step)
+    return (np.where(waited, bound, time), bound) if waited.any() else None
 
 
 def _step(time: Array, counts: Array, median: bool = False) -> Array:
@@ -45,7 +48,7 @@ def _step(time: Array, counts: Array, median: bool = False) -> Array:
     index = np.concatenate([[0.0], np.cumsum(counts)])
     ahead = min(_STRETCH, len(time) // 4)
     long = (time[ahead:] - time[:-ahead]) / (index[ahead:] - index[:-ahead])
-    pieces = max(len(long) // _ANEW, 1)
+    pieces = max(min(int((time[-1] - time[0]) / _ANEW_S), len(long) // _ANEW), 1)
     found = np.array([np.median(part) for part in np.array_split(long, pieces)])
     if median:
         short = np.array([np.median(part) for part in np.array_split(np.diff(time), pieces)])
@@ -61,17 +64,19 @@ def _bound(time: Array, step: Array) -> Array:
     return np.asarray(np.minimum.accumulate((time - since)[::-1])[::-1] + since)
 
 
-def _waited(time: Array, bound: Array, step: Array) -> bool:
-    """Tell whether rows waited: in most places as many come together as are missing before."""
+def _waited(time: Array, bound: Array, step: Array) -> Mask:
+    """Return which rows (N,) waited; none unless most that are late come together, close behind one another."""
     late = np.append((time - bound) / np.append(step, step[-1]), 0.0)
     together = runs(late > _BESIDE)
-    together = together[together[:, 0] > 0]
+    none = np.zeros(len(time), np.bool_)
     if not len(together):
-        return False
+        return none
     waited = np.maximum.reduceat(late, together.ravel())[::2] > _LATE
     total = np.add.reduceat(late, together.ravel())[::2]
     if not total[waited].sum() > _MOST * total.sum():
-        return False
-    first = together[waited, 0]
-    missing = (bound[first] - bound[first - 1]) / step[first - 1] - 1
-    return bool(np.mean(missing < np.maximum(_MISSING, _LOST * late[first])) > _MOST)
+        return none
+    rows = none.copy()
+    rows[late[:-1] > _BESIDE] = np.repeat(waited, np.ptp(together, axis=1))
+    steps = np.append(np.diff(time) / step, 1.0)[rows]
+    caught = np.maximum(1 - steps, 0.0)
+    return rows if caught[steps < _QUICK].sum() > _QUICKLY * caught.sum() else none

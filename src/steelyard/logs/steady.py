@@ -48,7 +48,7 @@ def _words(given: Stream, prompt: Stream, even: Stream) -> list[str]:
     if given.time is not None and prompt.time is not None and prompt is not given:
         late = float(np.max(given.time - prompt.time))
         out.append(
-            f"rows of '{given.name}' waited and came together, up to {1e3 * late:.2g} ms late, as from a buffer: they "
+            f"rows of '{given.name}' waited and came together, up to {1e3 * late:.3g} ms late, as from a buffer: they "
             "were taken as sampled a step apart"
         )
     if prompt.time is not None and even.time is not None and even is not prompt:
@@ -70,10 +70,13 @@ def _prompt(stream: Stream) -> Stream:
     """Return the stream without what rows waited for, where its stamps look so and its numbers are no rougher."""
     time = _uneven(stream)
     sampled = None if time is None else when_sampled(time)
-    if time is None or sampled is None or not (np.diff(sampled) > 0).all():
+    if time is None or sampled is None:
         return stream
-    given, prompt = (_roughnesses(stamps, stream, beside_noise=True) for stamps in (time, sampled))
-    return replace(stream, time=sampled) if _share(prompt, given) < _ROUGHER else stream
+    given = _roughnesses(time, stream, beside_noise=True)
+    shares = [_share(_roughnesses(stamps, stream, beside_noise=True), given) for stamps in sampled]
+    best = int(np.argmin(shares))
+    rises = bool((np.diff(sampled[best]) > 0).all())
+    return replace(stream, time=sampled[best]) if rises and shares[best] < _ROUGHER else stream
 
 
 def _steadied(stream: Stream) -> Stream:
