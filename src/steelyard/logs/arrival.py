@@ -37,7 +37,11 @@ def when_sampled(time: Array) -> tuple[Array, Array] | None:
         bound = _bound(time, (1 - shorter) * step)
         step = _step(bound, np.maximum(np.round(np.diff(bound) / step), 1.0))
     waited = _waited(time, bound, step)
-    return (np.where(waited, bound, time), bound) if waited.any() else None
+    if not waited.any():
+        return None
+    # Others are late as well, by what they jitter.
+    usual = float(np.median((time - bound)[~waited]))
+    return np.where(waited, np.minimum(bound + usual, time), time), bound
 
 
 def _step(time: Array, counts: Array, median: bool = False) -> Array:
