@@ -82,6 +82,19 @@ def test_a_leap_of_the_wrench_is_told_of_the_wrench() -> None:
     assert "at 7.0 s, beside 'pose.csv'; its stamps" in said
 
 
+@pytest.mark.parametrize("name", ["wrench.csv", "pose.csv"])
+def test_a_leap_that_was_put_right_is_no_hole(name: str) -> None:
+    sound = recording(Swing(0, 24.0), seed=1, position=True, imu=False)
+    aligned = align(leaping(sound, name, 1.0))
+    (said,) = [f.message for f in aligned.findings if f.code == "clock-unsteady"]
+    assert said.startswith(f"The clock of '{name}' leaps ahead by ")
+    assert not [note for note in aligned.notes if "no rows" in note]
+
+
+def test_rows_left_out_beside_a_jump_are_no_hole() -> None:
+    assert not [note for note in align(losing(made(), "pose.csv", 0.1)).notes if "no rows" in note]
+
+
 def test_a_leap_of_the_wrench_beside_two_streams_is_one() -> None:
     (said,) = unsteady(leaping(made(imu=True), "wrench.csv", 0.1))
     assert said.startswith("The clock of 'wrench.csv' leaps ahead by ")

@@ -87,7 +87,7 @@ def align(recording: Recording, options: AlignOptions | None = None) -> Aligned:
         raise BadDescription(f"'{other.name}' has no time, but '{timed[0].name}' has: all streams need a clock.")
     steady, notes = with_steady_stamps(recording)
     aligned = _align_timed(prepared(steady, options or AlignOptions()), unsteady=_MOST_UNSTEADY)
-    return replace(aligned, notes=(*notes, *say.gaps(recording.streams), *aligned.notes))
+    return replace(aligned, notes=(*notes, *aligned.notes))
 
 
 def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] = ()) -> Aligned:
@@ -129,7 +129,7 @@ def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] 
         {} if given.imu is None or clocks.mounting is None else {given.imu.name: clocks.mounting},
         given.source,
         taps,
-        say.notes(clocks, given.source),
+        (*say.gaps(given.recording.streams, jumped), *say.notes(clocks, given.source)),
     )
 
 

@@ -76,11 +76,13 @@ def _delayed(name: str, delay: float, std: float, own: bool, moved: float) -> Fi
     return Finding("stream-delayed", text, remedy)
 
 
-def gaps(streams: Sequence[Stream]) -> tuple[str, ...]:
-    """Return a note on each timed stream that has no rows for a while."""
+def gaps(streams: Sequence[Stream], jumps: Sequence[Placed] = ()) -> tuple[str, ...]:
+    """Return a note on each timed stream that has no rows for a while, but those left out beside jumps."""
     out = []
     for stream in streams:
         long = holes(stream)
+        for at in (j.at - max(j.size, 0.0) for j in jumps if j.cut and j.name == stream.name):
+            long = long[(at < long[:, 0]) | (at > long[:, 1])]
         if stream.time is not None and len(long):
             many = f" in {len(long)} gaps, the first" if len(long) > 1 else ""
             first = float(long[0, 0] - stream.time[0])

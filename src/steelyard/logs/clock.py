@@ -37,6 +37,8 @@ def jump_gap(time: Array, size: float, near: float, same: float = SAME_S) -> int
     The size is good to `same` [s]; None where there is no such gap.
     """
     step, usual = np.diff(time), median_step(time)
-    fits = (np.abs(step - usual - size) < same) & (np.abs(time[:-1] - near) < NEAR_S)
+    # Within the gap there are no rows to tell more closely where it is.
+    off = np.maximum(np.maximum(time[:-1] - near, near - time[1:]), 0.0)
+    fits = (np.abs(step - usual - size) < same) & (off < NEAR_S)
     fits &= step > max(size / 2, 0.0) + usual
-    return int(np.argmin(np.where(fits, np.abs(time[:-1] - near), np.inf))) if size > 0 and fits.any() else None
+    return int(np.argmin(np.where(fits, off, np.inf))) if size > 0 and fits.any() else None

@@ -1,7 +1,8 @@
-"""Stamps that jitter: a stream of a steady rate is taken as sampled evenly where its numbers say so.
+"""Stamps that are late or jitter: a stream of a steady rate is taken as sampled evenly where its numbers say so.
 
 A logger stamps a sample when it arrives. What it comes early or late by looks like a motion that the wrench knows
-nothing of. But a clock may also be right and the rate not steady: the smoother numbers tell which.
+nothing of. But a clock may also be right and the rate not steady: the smoother numbers tell which. What rows waited for
+in a buffer is taken away first, then jitter.
 """
 
 from __future__ import annotations
@@ -11,6 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.logs.arrival import when_sampled
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 
@@ -22,41 +24,81 @@ _STEADY_S = 5.0
 _GAP = 3.5
 # Even stamps are taken where numbers differ by this much less (rms) from what their neighbours say.
 _SMOOTHER = 0.7
+# Rows that seem to have waited are put where they were sampled unless numbers differ by this much more so, beside what
+# their noise makes of it: the stamps say so already.
+_ROUGHER = 1.05
 # What is taken away passes for jitter where means of so many rows spread by no more than so much of white noise.
 _MEAN_OF, _WHITE = 20, 2.0
 
 
 def with_steady_stamps(recording: Recording) -> tuple[Recording, tuple[str, ...]]:
     """Return the recording with stamps evened where its numbers are smoother so, and a note on each such stream."""
-    streams = tuple(_steadied(stream) for stream in recording.streams)
-    pairs = [(a, b) for a, b in zip(recording.streams, streams, strict=True) if a is not b]
-    return (replace(recording, streams=streams) if pairs else recording), tuple(_words(a, b) for a, b in pairs)
+    streams, notes = [], []
+    for stream in recording.streams:
+        prompt = _prompt(stream)
+        even = _steadied(prompt)
+        streams.append(even)
+        notes += _words(stream, prompt, even)
+    changed = any(a is not b for a, b in zip(recording.streams, streams, strict=True))
+    return (replace(recording, streams=tuple(streams)) if changed else recording), tuple(notes)
 
 
-def _words(given: Stream, even: Stream) -> str:
-    off = 0.0 if given.time is None or even.time is None else float(np.std(given.time - even.time))
-    return (
-        f"the stamps of '{given.name}' jitter by {1e3 * off:.2g} ms: its numbers are smoother at a steady rate, "
-        "which was taken"
-    )
+def _words(given: Stream, prompt: Stream, even: Stream) -> list[str]:
+    out = []
+    if given.time is not None and prompt.time is not None and prompt is not given:
+        late = float(np.max(given.time - prompt.time))
+        out.append(
+            f"rows of '{given.name}' waited and came together, up to {1e3 * late:.3g} ms late, as from a buffer: they "
+            "were taken as sampled a step apart"
+        )
+    if prompt.time is not None and even.time is not None and even is not prompt:
+        off = float(np.std(prompt.time - even.time))
+        out.append(
+            f"the stamps of '{given.name}' jitter by {1e3 * off:.2g} ms: its numbers are smoother at a steady rate, "
+            "which was taken"
+        )
+    return out
+
+
+def _uneven(stream: Stream) -> Array | None:
+    """Return the stamps (N,) [s] of a stream that may be evened, None of one that is too short or does not rise."""
+    rising = stream.time is not None and len(stream) >= _FEWEST and bool((np.diff(stream.time) > 0).all())
+    return stream.time if rising else None
+
+
+def _prompt(stream: Stream) -> Stream:
+    """Return the stream without what rows waited for, where its stamps look so and its numbers are no rougher."""
+    time = _uneven(stream)
+    sampled = None if time is None else when_sampled(time)
+    if time is None or sampled is None:
+        return stream
+    given = _roughnesses(time, stream, beside_noise=True)
+    shares = [_share(_roughnesses(stamps, stream, beside_noise=True), given) for stamps in sampled]
+    best = int(np.argmin(shares))
+    rises = bool((np.diff(sampled[best]) > 0).all())
+    return replace(stream, time=sampled[best]) if rises and shares[best] < _ROUGHER else stream
 
 
 def _steadied(stream: Stream) -> Stream:
     """Return the stream at a steady rate where its numbers are plainly smoother so."""
-    if stream.time is None or len(stream) < _FEWEST or not (np.diff(stream.time) > 0).all():
+    time = _uneven(stream)
+    if time is None:
         return stream
-    channels = [values.reshape(len(stream), -1) for values in stream.channels.values()]
-    given = np.array([_roughness(stream.time, values) for values in channels])
-    best, time = _SMOOTHER, stream.time
-    for index in _counts(stream.time):
-        even = _even(stream.time, index)
-        if not (np.diff(even) > 0).all() or not _jitters(stream.time - even):
+    given = _roughnesses(time, stream)
+    best, steadiest = _SMOOTHER, time
+    for index in _counts(time):
+        even = _even(time, index)
+        if not (np.diff(even) > 0).all() or not _jitters(time - even):
             continue
-        rough = np.array([_roughness(even, values) for values in channels])
-        share = float(np.mean(rough[given > 0] / given[given > 0])) if given.any() else 1.0
+        share = _share(_roughnesses(even, stream), given)
         if share < best:
-            best, time = share, even
-    return stream if time is stream.time else replace(stream, time=time)
+            best, steadiest = share, even
+    return stream if steadiest is time else replace(stream, time=steadiest)
+
+
+def _share(rough: Array, given: Array) -> float:
+    """Return the mean share (of channels that differ at all) of one roughness (Q,) in another; one where none does."""
+    return float(np.mean(rough[given > 0] / given[given > 0])) if given.any() else 1.0
 
 
 def _jitters(off: Array) -> bool:
@@ -90,13 +132,22 @@ def _even(time: Array, index: Integers) -> Array:
     return even
 
 
-def _roughness(time: Array, values: Array) -> float:
-    """Return how far (rms) values (N, D) lie from the cubic through the two neighbours on either side."""
+def _roughnesses(time: Array, stream: Stream, beside_noise: bool = False) -> Array:
+    """Return how far (rms) the numbers of each channel (Q,) lie from the cubic through two neighbours on either side.
+
+    beside_noise  as a share of what that cubic makes of white noise, by which even stamps would always win
+    """
     near = np.array([0, 1, 3, 4])
     t = np.stack([time[k : len(time) - 4 + k] for k in range(5)])
-    expected = np.zeros_like(values[4:])
+    weights = np.ones((5, t.shape[1]))
     for j in near:
         others = near[near != j]
-        weight = np.prod((t[2] - t[others]) / (t[j] - t[others]), axis=0)
-        expected += weight[:, None] * values[j : len(values) - 4 + j]
-    return float(np.sqrt(np.mean((values[2:-2] - expected) ** 2)))
+        weights[j] = -np.prod((t[2] - t[others]) / (t[j] - t[others]), axis=0)
+    if beside_noise:
+        weights /= np.sqrt((weights**2).sum(0))
+    out = []
+    for channel in stream.channels.values():
+        values = channel.reshape(len(stream), -1)
+        off = sum(w[:, None] * values[k : len(values) - 4 + k] for k, w in enumerate(weights))
+        out.append(np.sqrt(np.mean(np.square(off))))
+    return np.array(out)
