@@ -31,6 +31,7 @@ from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_ru
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
+from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
@@ -113,10 +114,12 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
-        return _Fitted(groups, D, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
+        given = _summing_given(summing(placed), log.names, taken)
+        return _Fitted(groups, D, given, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
 
     unpropped, propped = _unpropped(seen.rows, fitted, summing(placed), highest_hz)
-    first, touched = _untouched(unpropped, fitted, size, highest_hz)
+    rows, begun, late = with_timely_forces(unpropped, fitted(unpropped), fitted, highest_hz)
+    first, touched = _untouched(rows, begun, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
@@ -128,6 +131,8 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     wrong = () if told else tuple(unexplained(payload, D, log.names))
     if wrong:
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
+    if late is not None:
+        payload = replace(payload, covariance=payload.covariance + late.unsure(payload, D))
     if seen.yields is not None:
         # Of all sensors only the sum of their biases is known: it may be that of any one.
         borne = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
@@ -141,6 +146,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *seen.begun.findings(log),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
+        *(() if late is None else late.findings(log.names)),
         *seen.findings,
         *propped,
         *(one.finding() for one in touched),
@@ -157,10 +163,14 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
 @dataclass(frozen=True, eq=False)
 class _Fitted:
-    """The payload of some rows, with the matrices that it was fitted with, and how forces were read."""
+    """The payload of some rows, with the matrices that it was fitted with, and how forces were read.
+
+    D, given  (6, 6 N) sum the pushes at B as they were read, and as rows have them
+    """
 
     groups: tuple[Group, ...]
     D: Array
+    given: Array
     C: Array
     read: tuple[Finding, ...]
     taken: Mapping[str, Array]
@@ -196,16 +206,17 @@ def _unpropped(
 
 def _untouched(
     rows: list[tuple[BodyRows, Array]],
+    fit: _Fitted,
     fitted: Callable[[list[tuple[BodyRows, Array]]], _Fitted],
     size: float,
     highest_hz: float,
 ) -> tuple[_Fitted, tuple[Touched, ...]]:
-    """Return the fit without rows in which something touched the payload, and what was found of that.
+    """Return the fit of rows without those in which something touched the payload, and what was found of that.
 
     Touches that bend the first fit are seen better by the next. Where forces are misread nothing is asked, and nothing
     is left out that the parameters hang on.
     """
-    fit, touched = fitted(rows), list[Touched]()
+    touched = list[Touched]()
     for _ in range(TOUCHES):
         if fit.read:
             break
@@ -241,6 +252,12 @@ def _with_forces_read(
         whole = sign_finding(names[odd])
         found = [*(one for one in found if one != whole), torque_sign_finding(names[odd], whole in found)]
     return groups, D, found, maps_of(names, given, D, reading)
+
+
+def _summing_given(D: Array, names: Sequence[str], taken: Mapping[str, Array]) -> Array:
+    """Return D (6, 6 N) for pushes as given, some of which were taken for others (`maps_of`)."""
+    maps = [taken.get(name, np.eye(6)) for name in names]
+    return np.concatenate([block @ M for block, M in zip(np.split(D, len(names), axis=1), maps, strict=True)], axis=1)
 
 
 def _without_wrists(team: TeamEstimate, wrists: Mapping[str, float], size: float) -> TeamEstimate:

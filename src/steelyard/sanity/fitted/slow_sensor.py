@@ -1,9 +1,4 @@
-"""A slow sensor: the filter that makes its wrench late makes it too small as well, where it is quick.
-
-A delay is put right, but not what a filter takes away. A filter of first order that is late by `late` [s] leaves
-1 / sqrt(1 + (2 pi f late)^2) of a frequency f, a mean over the last samples about as much, a slow bus all of it. No log
-tells them apart by much: the noise of accelerations, which grows with f, lowers what seems to follow, too.
-"""
+"""A slow sensor: the filter that makes its wrench late makes it too small as well, where it is quick."""
 
 from __future__ import annotations
 
@@ -16,11 +11,10 @@ from steelyard.findings import about
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import signal
+from steelyard.logs.filtered import SHARE, taken
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 
-# A filter is behind none to all of a delay, all shares alike likely: the mean square of what it takes away.
-SHARE = 1 / 3
 # It is said where it is so large beside the bars that are.
 WORTH_SAYING = 1.0
 _FEWEST_ROWS = 50
@@ -32,8 +26,8 @@ def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
     if late <= 0 or log.time is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
         return estimate
     rows, pick = Rows.of(log)
-    taken = taken_away(log.time, log.predicted(rows.solve().solution[:10]), late)
-    moved = np.sqrt(SHARE) * replace(rows, values=taken[pick]).solve().solution[:10]
+    lost = taken_away(log.time, log.predicted(rows.solve().solution[:10]), late)
+    moved = np.sqrt(SHARE) * replace(rows, values=lost[pick]).solve().solution[:10]
     wider = replace(estimate, covariance=estimate.covariance + np.outer(moved, moved))
     known = estimate.identified
     if not (wider.std[known] > np.hypot(1, WORTH_SAYING) * estimate.std[known]).any():
@@ -51,6 +45,6 @@ def taken_away(time: Array, wrench: Array, late: float) -> Array:
     values = signal(time, wrench).at(even)
     # There and back, so that the ends meet.
     loop = np.concatenate([values, values[::-1]])
-    frequency = np.fft.rfftfreq(len(loop), step)[:, None]
-    lost = np.sqrt(1 + (2 * np.pi * frequency * late) ** 2) - 1
+    frequency = np.asarray(np.fft.rfftfreq(len(loop), step)[:, None], np.float64)
+    lost = taken(frequency, late)
     return signal(even, np.fft.irfft(lost * np.fft.rfft(loop, axis=0), len(loop), axis=0)[: len(even)]).at(time)

@@ -25,8 +25,9 @@ from steelyard.team.turns import turns_between
 
 # The path is smoothed at so many times the highest frequency that is used, which leaves that band as it is.
 PATH_FILTER = 2.0
-# Cycles of the highest frequency that a run must last, and that are left out at its ends.
-LEAST_CYCLES, END_CYCLES = 12.0, 1.0
+# Cycles of the highest frequency that a run must last, so that rows between bursts of lost ones count, and that are
+# left out at its ends.
+LEAST_CYCLES, END_CYCLES = 4.0, 1.0
 
 
 # Share of the grasps' own axes in those of the balance frame.
@@ -147,10 +148,10 @@ def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz
     second = np.zeros_like(place)
     inner = 16 * (place[1:-3] + place[3:-1]) - 30 * place[2:-2] - place[:-4] - place[4:]
     second[2:-2] = inner * (rate**2 / 12)
-    return features(omega, _slope(omega, rate), turn.inverse().apply(second - gravity))
+    return features(omega, slope(omega, rate), turn.inverse().apply(second - gravity))
 
 
-def _slope(values: Array, rate: float) -> Array:
+def slope(values: Array, rate: float) -> Array:
     """Return the derivative (T, D) by fourth-order central differences, zero at the ends."""
     out = np.zeros_like(values)
     out[2:-2] = (8 * (values[3:-1] - values[1:-3]) - (values[4:] - values[:-4])) * (rate / 12)
@@ -180,7 +181,7 @@ def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, high
         smooth = twist[rows]
         if PATH_FILTER * highest_hz < 0.45 * part.rate:
             smooth = lowpass(smooth, PATH_FILTER * highest_hz, part.rate)
-        rise = _slope(smooth, part.rate)
+        rise = slope(smooth, part.rate)
         lifted = classical_acceleration(rise, smooth) + supported[rows]
         motion = features(smooth[:, :3], rise[:, :3], lifted)
         inside = _inside(rows, part.rate, highest_hz)

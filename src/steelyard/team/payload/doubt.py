@@ -24,6 +24,14 @@ def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
     return _moved(fit, turned_by_step(X_BG))
 
 
+def moved_by_pushes(fit: PayloadFit, D: Array) -> Array:
+    """Return d phi (10, N) for changes of what every robot pushes that `fit` has in place of the pushes.
+
+    D  (6, 6 N) sums the pushes at B
+    """
+    return _moved(fit, np.moveaxis(D.reshape(6, -1, 6), 1, 0)[:, None])
+
+
 def lost_turns(fit: PayloadFit, X_BG: Pose, lost: Array) -> Array:
     """Return the covariance (10, 10) that steps which the motion does not show add beyond their slope.
 

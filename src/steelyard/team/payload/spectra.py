@@ -32,6 +32,7 @@ class Spectra:
     room                 scatter (K, Q, Z + Q) of what stands still in the room (Q = 9 or 3) with these and itself
     judged, judged_rows  the same of the rows by which noise is judged: at rest not the means, which are mostly bias
     samples              rows of the recording that are in it
+    hz                   (K,) rms frequency of each band
     """
 
     name: str
@@ -42,6 +43,7 @@ class Spectra:
     judged: Array
     judged_rows: Array
     samples: int
+    hz: Array
 
 
 def fade(rows: int, rate: float) -> Array:
@@ -82,7 +84,7 @@ def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
     width, beside = 12 + first.pushed.shape[1] + 1, first.room.shape[1]
     scatter, rows = np.zeros((len(edges), width, width)), np.zeros(len(edges))
     room = np.zeros((len(edges), beside, width + beside))
-    judged, judged_rows = scatter.copy(), rows.copy()
+    judged, judged_rows, squares = scatter.copy(), rows.copy(), rows.copy()
     for run in recording.runs:
         hz = frequencies(run, highest_hz)
         flat = np.ones((len(run.motion), width + beside))
@@ -94,13 +96,15 @@ def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
             scatter[band] += z[chosen, :width].T @ z[chosen, :width]
             room[band] += z[chosen, width:].T @ z[chosen]
             rows[band] += chosen.stop - chosen.start
+            squares[band] += hz[chosen] @ hz[chosen]
         begin = int(recording.still)
         for band, chosen in enumerate(bands(hz[begin:], edges)):
             part = z[begin:, :width][chosen]
             judged[band] += part.T @ part
             judged_rows[band] += len(part)
     samples = sum(len(run.motion) for run in recording.runs)
-    return Spectra(recording.name, recording.still, scatter, room, rows, judged, judged_rows, samples)
+    middle = np.sqrt(squares / np.maximum(rows, 1.0))
+    return Spectra(recording.name, recording.still, scatter, room, rows, judged, judged_rows, samples, middle)
 
 
 def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Array:
