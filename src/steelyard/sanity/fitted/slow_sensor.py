@@ -18,23 +18,22 @@ from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import signal
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.seen_motion import moves
 
 # A filter is behind none to all of a delay, all shares alike likely: the mean square of what it takes away.
 SHARE = 1 / 3
 # It is said where it is so large beside the bars that are.
 WORTH_SAYING = 1.0
-_FEWEST_ROWS = 50
 
 
 def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
     """Return the estimate with bars that hold what a filter may take away which makes the wrench `late` [s]."""
-    moving = ~log.still
-    if late <= 0 or log.time is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
+    if late <= 0 or log.time is None or not moves(log):
         return estimate
     rows, pick = Rows.of(log)
-    taken = taken_away(log.time, log.predicted(rows.solve().solution[:10]), late)
-    moved = np.sqrt(SHARE) * replace(rows, values=taken[pick]).solve().solution[:10]
-    wider = replace(estimate, covariance=estimate.covariance + np.outer(moved, moved))
+    taken = taken_away(log.time, log.predicted(rows.solve().phi), late)
+    moved = np.sqrt(SHARE) * replace(rows, values=taken[pick]).solve().phi
+    wider = estimate.allowing(moved)
     known = estimate.identified
     if not (wider.std[known] > np.hypot(1, WORTH_SAYING) * estimate.std[known]).any():
         return wider
