@@ -20,6 +20,7 @@ from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.mounts import mount_of, mount_remedy, vector
+from steelyard.sanity.readings.glance import stream_of
 from steelyard.spatial import Rotation, cross_matrix
 
 # A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many
@@ -137,7 +138,7 @@ def examine_sensor(
     known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
     drift     whether the bias was taken to grow with time
     """
-    stream, found = wrench_stream(recording), _looked_at(log, known, drift)
+    stream, found = stream_of(recording, "force"), _looked_at(log, known, drift)
     if stream is None or found is None:
         return estimate, ()
     turned = found.turned and not in_world(stream)
@@ -155,7 +156,7 @@ def turn_of(
     log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[float, float, float] | None:
     """Return the rotation vector [rad] by which the wrench is turned beyond doubt, None where it is not."""
-    stream, found = wrench_stream(recording), _looked_at(log, known, drift)
+    stream, found = stream_of(recording, "force"), _looked_at(log, known, drift)
     if stream is None or in_world(stream) or found is None or not found.turned:
         return None
     x, y, z = (float(v) for v in found.turn)
@@ -170,11 +171,6 @@ def _looked_at(log: MotionLog, known: tuple[Finding, ...], drift: bool) -> Senso
     if codes(known) & ELSEWHERE:
         return None
     return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes(known) else None)
-
-
-def wrench_stream(recording: Recording) -> Stream | None:
-    """Return the stream of the wrench, None where the recording has none."""
-    return next((s for s in recording.streams if "force" in s.channels), None)
 
 
 def in_world(stream: Stream) -> bool:

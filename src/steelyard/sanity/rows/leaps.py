@@ -15,6 +15,7 @@ from steelyard.check import Array, Mask
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
+from steelyard.sanity.readings.glance import channel, stream_of
 from steelyard.sanity.rows.still_rows import angles, as_table, spans, split
 
 # Between two rows, a turn beyond the first [rad] is a leap where it is faster than the second [rad/s], which no arm is,
@@ -43,7 +44,7 @@ def examine_sparse(recording: Recording) -> Recording:
     if first is None or any(s.time is None or not np.array_equal(s.time, first) for s in recording.streams):
         return recording
     step = median_step(first) if len(first) > 1 else 0.0
-    R = next((s.channels["rotation"] for s in recording.streams if "rotation" in s.channels), None)
+    R = next((v for _, _, v in channel(recording, "rotation")), None)
     if step < SPARSE_S or R is None or not (angles(np.swapaxes(R[:-1], 1, 2) @ R[1:]) > TURN).any():
         return recording
     streams = tuple(replace(s, time=None, poses=True, delay=None) for s in recording.streams)
@@ -56,7 +57,7 @@ def examine_leaps(recording: Recording) -> Recording:
 
     A note says so. Logs without leaps, tables and logs without rotations come back as they are.
     """
-    turning = next((s for s in recording.streams if "rotation" in s.channels), None)
+    turning = stream_of(recording, "rotation")
     if turning is None or any(s.time is None for s in recording.streams) or len(turning) < 2 * FEWEST_ROWS:
         return recording
     leap, pause = _partings(turning)
