@@ -14,7 +14,7 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.identify.cost.linear import reweighted, solve_scaled
+from steelyard.identify.cost.linear import solve_scaled
 from steelyard.identify.cost.noise_cost import weight
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
@@ -68,7 +68,7 @@ def _total(problem: Problem) -> Array:
     With K = sum_p x_p T_p + [0, 1, 0] both sum r^T W r and its expectation under noise alone are quadratic in (x, 1);
     the ratio of the two is least at the answer. Bias columns are exact and are projected out first.
     """
-    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
+    linear = problem.reweighted(2)
     K = problem.residual_map(linear)
     unit = np.zeros((1, *problem.T.shape[1:]))
     unit[0, :, 12:18] = np.eye(6)

@@ -15,7 +15,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.cost import newton
-from steelyard.identify.cost.linear import reweighted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, fit_log, fit_moments
 from steelyard.identify.problem import Problem
@@ -67,7 +66,7 @@ class NoiseAware:
         rows = newton.Rows(problem.T, problem.scatter, problem.acceleration, problem.wrench)
         bias = problem.bias_prior
         priors = newton.Priors(self.prior, float(np.log(self.size)), self.size_spread**-2, bias.mean, bias.precision)
-        linear = reweighted(*rows, 3)
+        linear = problem.reweighted(3)
         best = None
         for start in self._starts(linear):
             found = newton.minimise(start, rows, priors, self.iterations)

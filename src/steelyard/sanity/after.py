@@ -7,6 +7,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.people import NAMES
 from steelyard.logs.alignment import Aligned
 from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import noise_std
@@ -126,14 +127,13 @@ def _prior(estimate: Estimate) -> tuple[Finding, ...]:
     if spread is None or estimate.parts or not estimate.identified.all():
         return ()
     alone = spread / 2
-    names = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
     led = np.isfinite(alone) & (estimate.std < PRIOR_SHARE * alone)
     led[:4] = False
     if not led.any():
         return ()
     worst = int(np.argmax(np.where(led, alone / np.maximum(estimate.std, 1e-300), 0)))
     message = (
-        f"The prior decides {', '.join(n for n, own in zip(names, led, strict=True) if own)}: for {names[worst]} the "
+        f"The prior decides {', '.join(n for n, own in zip(NAMES, led, strict=True) if own)}: for {NAMES[worst]} the "
         f"data alone have {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the std shown."
     )
     return (Finding.of("prior-dominated", message),)
