@@ -13,6 +13,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.two_masses import ELSEWHERE
@@ -24,9 +25,8 @@ SURE, SLOWLY = 8.0, 0.5
 TOLD = 1e-3
 _FEWEST_ROWS = 100
 # Compliances that are not alike along all axes: symmetric matrices (5, 3, 3) without a trace.
-_UNEVEN = np.zeros((5, 3, 3))
-_UNEVEN[[0, 0, 1, 1], [0, 1, 1, 2], [0, 1, 1, 2]] = [1.0, -1.0, 1.0, -1.0]
-_UNEVEN[[2, 2, 3, 3, 4, 4], [0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = 1.0
+_XX, _XY, _XZ, _YY, _YZ, _ZZ = forms.inertia_matrix(np.eye(10)[4:])
+_UNEVEN = np.stack([_XX - _YY, _YY - _ZZ, _XY, _XZ, _YZ])
 
 
 @dataclass(frozen=True, eq=False)

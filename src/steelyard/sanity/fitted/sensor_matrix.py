@@ -15,6 +15,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.people import parameter_jacobian
+from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.axis_words import axis_words
@@ -71,16 +72,8 @@ class SensorMatrix:
 
 
 # Symmetric matrices (5, 3, 3) without a trace, which add up to any.
-_STRETCHES = np.array(
-    [
-        [[1, 0, 0], [0, 0, 0], [0, 0, -1]],
-        [[0, 0, 0], [0, 1, 0], [0, 0, -1]],
-        [[0, 1, 0], [1, 0, 0], [0, 0, 0]],
-        [[0, 0, 1], [0, 0, 0], [1, 0, 0]],
-        [[0, 0, 0], [0, 0, 1], [0, 1, 0]],
-    ],
-    np.float64,
-)
+_XX, _XY, _XZ, _YY, _YZ, _ZZ = forms.inertia_matrix(np.eye(10)[4:])
+_STRETCHES = np.stack([_XX - _ZZ, _YY - _ZZ, _XY, _XZ, _YZ])
 
 
 def sensor_matrix(log: MotionLog, drift: bool = False, turn: Rotation | None = None) -> SensorMatrix | None:

@@ -66,6 +66,11 @@ class Glance:
         """Torque and force (N, 3), each in its own axes."""
         return self.wrench[:, :3], self.wrench[:, 3:]
 
+    @property
+    def still(self) -> Glance:
+        """The same as if nothing told the acceleration."""
+        return replace(self, acceleration=None)
+
     def smooth(self, values: Array) -> Array:
         """Return values (N, k) through the common low-pass; the rows of a table as they are."""
         return values if self.rate is None else lowpass(values, CUTOFF_HZ, self.rate, order=2)
