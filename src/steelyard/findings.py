@@ -157,6 +157,11 @@ _CANNOT_SHOW = {
 }
 
 
+def codes(findings: Iterable[Finding]) -> set[str]:
+    """Return the codes of all findings."""
+    return {finding.code for finding in findings}
+
+
 def by_cause(findings: Iterable[Finding]) -> tuple[Finding, ...]:
     """Return findings with causes before what follows from them, else as they came.
 

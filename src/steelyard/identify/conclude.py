@@ -17,7 +17,7 @@ from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.dense import eigen, product, product_transposed
 from steelyard.identify.cost.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.people import parameter_jacobian, people_jacobian
+from steelyard.identify.people import ENTRIES, parameter_jacobian, people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
@@ -43,18 +43,13 @@ OPEN, UNSEEN = 0.1, 1e-12
 
 def _sandwich(H: Array, V: Array, solution: Solution) -> Array:
     """Return the covariance (p, p) of the linear parameters, the prior counted as data of its own strength."""
-    J, prior = solution.chain(len(H)), solution.prior
-    A, score = J.T @ H @ J, J.T @ V @ J
-    A[:10, :10] += prior
-    score[:10, :10] += prior
-    bread = J @ inverse_scaled(A)
-    return np.asarray(bread @ score @ bread.T)
+    bread = solution.chain @ inverse_scaled(solution.with_prior(H))
+    return np.asarray(bread @ solution.with_prior(V) @ bread.T)
 
 
 def _taken(H: Array, problem: Problem, solution: Solution) -> float:
     """Return how many degrees of freedom the fit took of the residuals, of the information H (p, p)."""
-    J = solution.chain(len(H))
-    prior = problem.plus_bias_prior(np.zeros_like(H))
+    J, prior = solution.chain, problem.plus_bias_prior(np.zeros_like(H))
     prior[:10, :10] += solution.prior
     return fitted(J.T @ H @ J, prior)
 
@@ -78,10 +73,9 @@ class Fit:
 
 def _fit_of(problem: Problem, solution: Solution) -> Fit:
     """Return how well a solution fits the rows of its problem."""
-    data, noise = problem.scatter, (problem.acceleration, problem.wrench)
+    H, extra, plain = problem.information(solution.linear)
     K = problem.residual_map(solution.linear)
-    H, extra, plain = noise_cost.information(K, problem.T, data, *noise)
-    cost, square = noise_cost.value(K, data, *noise)
+    cost, square = noise_cost.value(K, problem.scatter, problem.acceleration, problem.wrench)
     H, rows = nonnegative(H, plain), problem.samples
     left = max(int(problem.heard.sum()) * rows - _taken(H, problem, solution), 1.0)
     chi2 = max(cost / left, 0.0)
@@ -271,12 +265,7 @@ def _require_answer(sight: Sight, problem: Problem) -> None:
 
 def _lost(lost: Mask, problem: Problem) -> CannotAnswer:
     """Return the error that names which of mass, com x y z (4,) are lost, and what to add."""
-    names = (
-        "the mass",
-        "the centre of mass along x",
-        "the centre of mass along y",
-        "the centre of mass along z",
-    )
+    names = ("the mass", *(f"the centre of mass along {axis}" for axis in "xyz"))
     poses = len(np.unique(problem.block_number[problem.block_number >= 0]))
     seen = counted(int(problem.samples), "row") + (f" in {poses} still poses or time blocks" if poses else "")
     return CannotAnswer(
@@ -286,24 +275,14 @@ def _lost(lost: Mask, problem: Problem) -> CannotAnswer:
     )
 
 
-def _findings(estimate: Estimate) -> list[Finding]:
+def _findings(estimate: Estimate) -> tuple[Finding, ...]:
     """Return what the evidence alone has to say."""
-    out = []
-    spread = estimate.evidence.spread
-    lost = ~estimate.identified[4:]
-    if lost.any() and spread is not None:
-        names = [n for n, gone in zip(("xx", "xy", "xz", "yy", "yz", "zz"), lost, strict=True) if gone]
-        half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
-        share = 50 * float(np.min(spread[4:][lost])) / max(half_trace, 1e-12)
-        least = (
-            f"one standard deviation is at least {share:.0f} % of half its trace"
-            if share < 1e3
-            else "no measured acceleration shows it"
-        )
-        out.append(
-            Finding.of(
-                "inertia-not-identified",
-                f"The data do not fix the inertia entries {', '.join(names)}: {least}.",
-            )
-        )
-    return out
+    spread, lost = estimate.evidence.spread, ~estimate.identified[4:]
+    if spread is None or not lost.any():
+        return ()
+    half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
+    share = 50 * float(np.min(spread[4:][lost])) / max(half_trace, 1e-12)
+    least = f"one standard deviation is at least {share:.0f} % of half its trace"
+    least = least if share < 1e3 else "no measured acceleration shows it"
+    text = f"The data do not fix the inertia entries {', '.join(ENTRIES[lost])}: {least}."
+    return (Finding.of("inertia-not-identified", text),)

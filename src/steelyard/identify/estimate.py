@@ -11,7 +11,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.evidence import Evidence, PartMass
-from steelyard.findings import Finding, by_cause
+from steelyard.findings import Finding, by_cause, codes
 from steelyard.identify.people import people_jacobian
 from steelyard.inertia import InertialParameters
 from steelyard.tables.words import in_a_line, in_words
@@ -115,10 +115,14 @@ class Estimate:
         """Return the estimate with causes before what follows from them among its findings."""
         return replace(self, findings=by_cause(self.findings))
 
+    def allowing(self, *moved: Array) -> Self:
+        """Return the estimate with bars that also hold errors which move the parameters by each of `moved` (10,)."""
+        return replace(self, covariance=self.covariance + sum(np.outer(by, by) for by in moved))
+
     def noted(self, *notes: str) -> Self:
         """Return the estimate with more notes."""
         return replace(self, notes=(*self.notes, *notes))
 
     def codes(self) -> set[str]:
         """Return the codes of all findings."""
-        return {f.code for f in self.findings}
+        return codes(self.findings)

@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
-from typing import Literal
+from typing import ClassVar, Literal
 
 import numpy as np
 
@@ -52,9 +53,6 @@ class Bias:
         return self.kind == "free"
 
 
-Solver = Callable[[Problem], Solution]
-
-
 @contextmanager
 def within_numbers() -> Iterator[None]:
     """Turn a breakdown of the linear algebra into CannotAnswer: only rows that hold no body at all lead there."""
@@ -73,30 +71,46 @@ def problem_of(moments: Moments, bias: Bias) -> Problem:
     return replace(Problem.of(moments, bias.free), bias_prior=bias.prior)
 
 
-@within_numbers()
-def fit_moments(moments: Moments, bias: Bias, solver: Solver, method: str) -> Estimate:
-    """Return the estimate from a statistic that carries its noise."""
-    problem = problem_of(moments, bias)
-    return conclude(problem, solver(problem), method)
+class Estimator(ABC):
+    """A way to solve the problem of a log; its dataclass holds the options.
 
-
-@within_numbers()
-def fit_log(log: MotionLog, bias: Bias, solver: Solver, method: str, verify_rest: bool = False) -> Estimate:
-    """Return the estimate of a log; noise that it does not declare is estimated, time order widens the error bars.
-
-    `verify_rest` fuses the acceleration of resting rows with zero where the wrench agrees. Raises CannotAnswer where
-    the data do not fix mass and centre of mass.
+    method       what results call it
+    verify_rest  whether the acceleration of resting rows is fused with zero where the wrench agrees
+    bias         "free", "none" or a Bias; a sensor is taken to be tared where the options have none
     """
 
-    def rested(steady: MotionLog) -> MotionLog:
-        steady = without_noise_of_rest(steady)
-        first = solver(_problem(steady, replace(bias, drift=False), by_block=False))
-        return at_rest(steady, first.linear[:10], first.bias)
+    method: ClassVar[str]
+    verify_rest: ClassVar[bool] = False
+    bias: Bias | str = "none"
 
-    log, problem = prepared(log, bias, rested if verify_rest and log.still.any() else None)
-    solution = solver(problem)
-    score = score_in_time(log, problem, solution)
-    return conclude(problem, solution, method, score).noted(*score.notes)
+    @within_numbers()
+    def identify(self, log: MotionLog) -> Estimate:
+        """Return the estimate of a log.
+
+        Noise that it does not declare is estimated; the order of its rows in time widens the error bars. Raises
+        CannotAnswer where the data do not fix mass and centre of mass.
+        """
+        bias = Bias.of(self.bias)
+
+        def rested(steady: MotionLog) -> MotionLog:
+            steady = without_noise_of_rest(steady)
+            first = self._fit(_problem(steady, replace(bias, drift=False), by_block=False))
+            return at_rest(steady, first.linear[:10], first.bias)
+
+        log, problem = prepared(log, bias, rested if self.verify_rest and log.still.any() else None)
+        solution = self._fit(problem)
+        score = score_in_time(log, problem, solution)
+        return conclude(problem, solution, self.method, score).noted(*score.notes)
+
+    @within_numbers()
+    def solve(self, moments: Moments) -> Estimate:
+        """Return the estimate from a statistic that carries its noise."""
+        problem = problem_of(moments, Bias.of(self.bias))
+        return conclude(problem, self._fit(problem), self.method)
+
+    @abstractmethod
+    def _fit(self, problem: Problem) -> Solution:
+        """Return the solution of a problem."""
 
 
 def prepared(

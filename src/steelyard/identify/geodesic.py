@@ -16,13 +16,10 @@ from scipy.linalg import eigh
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.cost.linear import solve_scaled
-from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.fit import Bias, Estimator
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
-from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import Moments
 
 ITERATIONS = 100
 NEUTRAL_RADIUS = 0.05
@@ -31,7 +28,7 @@ CONVERGED = 1e-9
 
 
 @dataclass(frozen=True)
-class Geodesic:
+class Geodesic(Estimator):
     """Options of the geodesic estimator.
 
     prior       the body to pull toward, in S; None = a ball of 5 cm with the mass and centre of least squares
@@ -39,6 +36,8 @@ class Geodesic:
     alpha       strength, as a share of the trace of the weighted normal matrix
     bias        "free" or "none"
     """
+
+    method = "geodesic"
 
     prior: InertialParameters | None = None
     distance: Literal["entropic", "riemannian"] = "entropic"
@@ -48,14 +47,6 @@ class Geodesic:
     def __post_init__(self) -> None:
         if self.distance not in ("entropic", "riemannian"):
             raise BadValue(f"distance must be entropic or riemannian; got {self.distance!r}.")
-
-    def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log; see `fit.fit_log`."""
-        return fit_log(log, Bias.of(self.bias), self._fit, "geodesic")
-
-    def solve(self, moments: Moments) -> Estimate:
-        """Return the estimate from a statistic that carries its noise."""
-        return fit_moments(moments, Bias.of(self.bias), self._fit, "geodesic")
 
     def _fit(self, problem: Problem) -> Solution:
         """Newton's method on the cone: the cost is convex in the parameters (entropic) or along geodesics."""

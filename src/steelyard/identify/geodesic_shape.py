@@ -13,20 +13,17 @@ from numpy.typing import ArrayLike
 from steelyard import check
 from steelyard.errors import CannotAnswer
 from steelyard.identify.cost.linear import solve_scaled
-from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.fit import Estimator
 from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
-from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import Moments
 from steelyard.parts.parts import Parts
 
 
 @dataclass(frozen=True, eq=False)
-class ShapeGeodesic:
-    """Options of GEO with the object's shape as prior.
+class ShapeGeodesic(Estimator):
+    """Options of GEO with the object's shape as prior; the sensor is taken to be tared.
 
     shape     the prior in S up to its mass: `uniform_body` of the parts, or `published_prior`
     mass      the mass of the prior [kg]; None = what least squares finds
@@ -34,18 +31,12 @@ class ShapeGeodesic:
     weighted  rows weighted by the wrench noise; as published N and N m count alike, and the pull is then far weaker
     """
 
+    method = "geodesic-shape"
+
     shape: InertialParameters
     mass: float | None = None
     alpha: float = 1e-5
     weighted: bool = False
-
-    def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log; the sensor is taken to be tared."""
-        return fit_log(log, Bias("none"), self._fit, "geodesic-shape")
-
-    def solve(self, moments: Moments) -> Estimate:
-        """Return the estimate from a statistic that carries its noise."""
-        return fit_moments(moments, Bias("none"), self._fit, "geodesic-shape")
 
     def _fit(self, problem: Problem) -> Solution:
         if not self.weighted:

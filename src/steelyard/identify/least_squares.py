@@ -14,14 +14,11 @@ from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.identify.cost.linear import reweighted, solve_scaled
+from steelyard.identify.cost.linear import solve_scaled
 from steelyard.identify.cost.noise_cost import weight
-from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.fit import Bias, Estimator
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
-from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import Moments
 
 # A column with less than this share of its size beside the bias is not excited.
 UNSEEN = 1e-14
@@ -29,7 +26,7 @@ KINDS = ("ordinary", "weighted", "total")
 
 
 @dataclass(frozen=True)
-class LeastSquares:
+class LeastSquares(Estimator):
     """Options of linear least squares.
 
     kind   "ordinary": every row and axis alike, N and N m mixed; "weighted": by the wrench noise; "total": noise in the
@@ -37,20 +34,14 @@ class LeastSquares:
     bias   "free" or "none"
     """
 
+    method = "least-squares"
+
     kind: Literal["ordinary", "weighted", "total"] = "weighted"
     bias: Bias | str = "free"
 
     def __post_init__(self) -> None:
         if self.kind not in KINDS:
             raise BadValue(f"kind must be one of {', '.join(KINDS)}; got {self.kind!r}.")
-
-    def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log; see `fit.fit_log`."""
-        return fit_log(log, Bias.of(self.bias), self._fit, "least-squares")
-
-    def solve(self, moments: Moments) -> Estimate:
-        """Return the estimate from a statistic that carries its noise."""
-        return fit_moments(moments, Bias.of(self.bias), self._fit, "least-squares")
 
     def _fit(self, problem: Problem) -> Solution:
         if self.kind == "total":
@@ -68,7 +59,7 @@ def _total(problem: Problem) -> Array:
     With K = sum_p x_p T_p + [0, 1, 0] both sum r^T W r and its expectation under noise alone are quadratic in (x, 1);
     the ratio of the two is least at the answer. Bias columns are exact and are projected out first.
     """
-    linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
+    linear = problem.reweighted(2)
     K = problem.residual_map(linear)
     unit = np.zeros((1, *problem.T.shape[1:]))
     unit[0, :, 12:18] = np.eye(6)

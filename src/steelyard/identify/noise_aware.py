@@ -15,14 +15,10 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.cost import newton
-from steelyard.identify.cost.linear import reweighted
-from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.fit import Bias, Estimator
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
-from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import Moments
 
 # No search starts with a centre of mass further than this from the sensor [m].
 FURTHEST = 3.0
@@ -31,7 +27,7 @@ SMALLEST, LARGEST, NEUTRAL = 0.005, 0.2, 0.05 / np.sqrt(5)
 
 
 @dataclass(frozen=True)
-class NoiseAware:
+class NoiseAware(Estimator):
     """Options of the noise-aware estimator.
 
     bias         "free", "none", or a Bias with a prior or a drift
@@ -40,6 +36,9 @@ class NoiseAware:
     size_spread  how far off `size` may be, as a factor e^size_spread (one standard deviation)
     iterations   Newton steps at most
     """
+
+    method = "noise-aware"
+    verify_rest = True
 
     bias: Bias | str = "free"
     prior: float = 0.5
@@ -55,19 +54,11 @@ class NoiseAware:
         if self.iterations < 1:
             raise BadValue(f"iterations must be 1 or more; got {self.iterations}.")
 
-    def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log; see `fit.fit_log`."""
-        return fit_log(log, Bias.of(self.bias), self._fit, "noise-aware", verify_rest=True)
-
-    def solve(self, moments: Moments) -> Estimate:
-        """Return the estimate from a statistic that carries its noise."""
-        return fit_moments(moments, Bias.of(self.bias), self._fit, "noise-aware")
-
     def _fit(self, problem: Problem) -> Solution:
         rows = newton.Rows(problem.T, problem.scatter, problem.acceleration, problem.wrench)
         bias = problem.bias_prior
         priors = newton.Priors(self.prior, float(np.log(self.size)), self.size_spread**-2, bias.mean, bias.precision)
-        linear = reweighted(*rows, 3)
+        linear = problem.reweighted(3)
         best = None
         for start in self._starts(linear):
             found = newton.minimise(start, rows, priors, self.iterations)

@@ -22,7 +22,7 @@ from steelyard.findings import OTHER_FRAME, Finding, counted
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared
-from steelyard.identify.masses.models import mixture
+from steelyard.identify.masses.models import log_evidence, mixture
 from steelyard.identify.masses.placement import ELSEWHERE, misplaced
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError
 from steelyard.identify.part_masses import PartMasses
@@ -96,7 +96,8 @@ class PartCuts:
     def _evidence(self, data: Effective, errors: list[Array]) -> Array:
         """Return the log evidence (K, S, F) of every cut in every place per family of density models."""
         cost = np.array([data.cost_of(error) for error in errors])
-        found = [[self._of(k, 0).log_evidence(data.blurred(error)) for error in errors] for k in range(len(self.cuts))]
+        blurred = [data.blurred(error) for error in errors]
+        found = [[log_evidence(seen, cut) for seen in blurred] for cut in self.cuts]
         return np.asarray(np.array(found) - (cost - cost[0])[:, None])
 
     def _seen(self, problem: Problem) -> tuple[Effective, list[Array]]:

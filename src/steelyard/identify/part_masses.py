@@ -21,7 +21,6 @@ from steelyard.findings import Finding
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.conclude import conclude, widened
-from steelyard.identify.cost.linear import reweighted
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
@@ -32,7 +31,6 @@ from steelyard.identify.masses.models import (
     averaged_masses,
     free_masses,
     free_mean,
-    log_evidence,
     material_masses,
 )
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
@@ -107,17 +105,13 @@ class PartMasses:
         body = self.parts.whole(self._masses(data, self.parts.whole(self.parts.volume), listed=False).mean)
         return self._data(problem, data.linear_at(body.vector), None), body
 
-    def log_evidence(self, data: Effective) -> Array:
-        """Return the log evidence (F,) of these parts per family of density models, up to what all cuts share."""
-        return log_evidence(data, self.parts)
-
     def problem(self, moments: Moments) -> Problem:
         """Return the problem of a statistic that carries its noise."""
         return problem_of(moments, Bias.of(self.bias))
 
     def _start(self, problem: Problem) -> Array:
         """Return the linear parameters (p,) of ten free numbers: the first weights come from them."""
-        linear = reweighted(problem.T, problem.scatter, problem.acceleration, problem.wrench, 2)
+        linear = problem.reweighted(2)
         if not linear[0] > 0:
             raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
         return linear if self.tool is None else linear - np.pad(self.tool.parameters.vector, (0, len(linear) - 10))

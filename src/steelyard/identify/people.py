@@ -11,6 +11,9 @@ import numpy as np
 
 from steelyard.check import Array
 
+ENTRIES = np.array(["xx", "xy", "xz", "yy", "yz", "zz"])  # of an inertia
+NAMES = ("mass", "com x", "com y", "com z", *(f"I{entry}" for entry in ENTRIES))
+
 
 @numba.njit(cache=True)
 def people_jacobian(phi: Array) -> Array:

@@ -17,24 +17,23 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.cost.linear import unit_diagonal
-from steelyard.identify.estimate import Estimate
-from steelyard.identify.fit import Bias, fit_log, fit_moments
+from steelyard.identify.fit import Estimator
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
-from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import Moments
 
 FEWEST = 4
 NEGLIGIBLE = 1e-12
 
 
 @dataclass(frozen=True, eq=False)
-class PointMasses:
-    """Options of the point-mass discretisation.
+class PointMasses(Estimator):
+    """Options of the point-mass discretisation; the sensor is taken to be tared.
 
     points  (K, 3) points inside the object, in S [m]
     """
+
+    method = "point-masses"
 
     points: Array
 
@@ -43,14 +42,6 @@ class PointMasses:
         if points.ndim != 2 or len(points) < FEWEST:
             raise BadValue(f"at least {FEWEST} points (K, 3) inside the object are needed; got {points.shape}.")
         object.__setattr__(self, "points", points)
-
-    def identify(self, log: MotionLog) -> Estimate:
-        """Return the estimate of a log; the sensor is taken to be tared."""
-        return fit_log(log, Bias("none"), self._fit, "point-masses")
-
-    def solve(self, moments: Moments) -> Estimate:
-        """Return the estimate from a statistic that carries its noise."""
-        return fit_moments(moments, Bias("none"), self._fit, "point-masses")
 
     def _fit(self, problem: Problem) -> Solution:
         """Return the best masses m >= 0: |R (B m - phi)|^2 with R^T R the weighted normal matrix of phi."""

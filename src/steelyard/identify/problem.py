@@ -2,15 +2,15 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import counted
-from steelyard.identify.cost.linear import normal_equations, solve_scaled
-from steelyard.identify.cost.noise_cost import residual_map_of, weights_at
+from steelyard.identify.cost.linear import normal_equations, reweighted, solve_scaled
+from steelyard.identify.cost.noise_cost import information, residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.identify.regressor import design
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
@@ -54,7 +54,7 @@ class Problem:
     block_class: Integers
     block_number: Integers
     still_samples: float = 0.0
-    bias_prior: BiasPrior = field(default=NOTHING_KNOWN)
+    bias_prior: BiasPrior = NOTHING_KNOWN
 
     @property
     def heard(self) -> Mask:
@@ -132,12 +132,24 @@ class Problem:
         out[10:16] += self.bias_prior.precision @ self.bias_prior.mean
         return out
 
+    def weights_at(self, linear: Array) -> Array:
+        """Return the weights (C, 6, 6) of the rows at the linear parameters (p,), noise of the acceleration counted."""
+        return np.asarray(weights_at(linear, self.T, self.acceleration, self.wrench))
+
+    def information(self, linear: Array) -> tuple[Array, Array, Array]:
+        """Return `noise_cost.information` (p, p) of all rows at the linear parameters (p,)."""
+        return information(self.residual_map(linear), self.T, self.scatter, self.acceleration, self.wrench)
+
+    def reweighted(self, passes: int) -> Array:
+        """Return the linear parameters (p,) of so many weighted solutions, each with the weights of the last."""
+        return reweighted(self.T, self.scatter, self.acceleration, self.wrench, passes)
+
     def fixed_weight_score(self, linear: Array, weights: Array) -> Array:
         """Return the variance (p, p) of the score of rows weighted by `weights` (C, 6, 6) under white noise.
 
         linear  (p,) the parameters, which carry the noise of the acceleration into the rows
         """
-        noise = np.linalg.inv(weights_at(linear, self.T, self.acceleration, self.wrench))
+        noise = np.linalg.inv(self.weights_at(linear))
         return np.asarray(normal_equations(self.T, self.scatter, weights @ noise @ weights)[0])
 
     def normal_equations(self, weights: Array) -> tuple[Array, Array]:

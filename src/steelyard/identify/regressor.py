@@ -18,22 +18,13 @@ from steelyard.inertia import forms
 from steelyard.spatial import axial_vector, cross_matrix
 
 
-def _omega_squared(index: int) -> Array:
-    """Return the symmetric unit matrix of entry `index` of xx xy xz yy yz zz."""
-    out = np.zeros((3, 3))
-    i, j = forms.UPPER[index]
-    out[i, j] = out[j, i] = 1
-    return out
-
-
 def _motion_map(phi: Array) -> Array:
     """Return L(phi) (6, 12)."""
     m, h, inertia = phi[0], phi[1:4], forms.inertia_matrix(phi)
     out = np.zeros((6, 12))
     out[:3, :3], out[:3, 3:6] = inertia, cross_matrix(h)
     out[3:, :3], out[3:, 3:6] = -cross_matrix(h), m * np.eye(3)
-    for k in range(6):
-        outer = _omega_squared(k)
+    for k, outer in enumerate(forms.inertia_matrix(np.eye(10)[4:])):
         # omega x (I omega) = the axial vector of I omega omega^T: eps_ijk (omega omega^T I)_jk.
         out[:3, 6 + k] = axial_vector(inertia @ outer)
         out[3:, 6 + k] = (outer - np.trace(outer) * np.eye(3)) @ h

@@ -11,13 +11,13 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import natural_sizes
 from steelyard.identify.cost.linear import unit_diagonal
+from steelyard.identify.people import NAMES
 from steelyard.inertia import InertialParameters, forms
 
 # A result is exact to this share of mass, radius of gyration and inertia: what is typed from a data sheet is rounded.
 EXACT = 1e-6
 # No direction is known better than this beside the best known quantities in it, as a variance.
 SHARPEST = 1e-8
-NAMES = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
 
 
 @dataclass(frozen=True)

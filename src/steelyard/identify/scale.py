@@ -28,8 +28,7 @@ def allow_scale(estimate: AnyEstimate, share: float, whole: bool) -> AnyEstimate
     masses = share * np.array([part.mass for part in estimate.parts])
     spread = estimate.part_covariance
     return replace(
-        estimate,
-        covariance=estimate.covariance + np.outer(slope, slope),
+        estimate.allowing(slope),
         parts=tuple(replace(p, std=float(np.hypot(p.std, m))) for p, m in zip(estimate.parts, masses, strict=True)),
         part_covariance=None if spread is None else spread + np.outer(masses, masses),
     )

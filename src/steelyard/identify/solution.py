@@ -29,11 +29,18 @@ class Solution:
         """Return a solution whose coordinates are the parameters `linear` (10,) or (16,), without a prior."""
         return cls(linear, np.eye(10), np.zeros((10, 10)), weights)
 
-    def chain(self, size: int) -> Array:
-        """Return J (size, size), the derivative of the linear parameters by the coordinates; a bias is its own."""
-        J = np.eye(size)
+    @property
+    def chain(self) -> Array:
+        """J (p, p), the derivative of the linear parameters by the coordinates; a bias is its own."""
+        J = np.eye(len(self.linear))
         J[:10, :10] = self.jacobian
         return J
+
+    def with_prior(self, H: Array) -> Array:
+        """Return information H (p, p) of the linear parameters as that of the coordinates, with the prior."""
+        A = self.chain.T @ H @ self.chain
+        A[:10, :10] += self.prior
+        return np.asarray(A)
 
     @property
     def bias(self) -> Array:

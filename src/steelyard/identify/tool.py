@@ -12,13 +12,13 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.conclude import identified, natural_sizes
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.people import ENTRIES
 from steelyard.identify.problem import BiasPrior
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import Mask
 
 # Two runs whose biases differ with a probability below this do not share one.
 SAME_BIAS = 1e-4
-_ENTRIES = np.array(["xx", "xy", "xz", "yy", "yz", "zz"])
 
 
 def bias_prior(tool: Estimate) -> BiasPrior | None:
@@ -73,7 +73,7 @@ def _own(rest: Estimate, of_load: Mask, of_tool: Mask) -> Estimate:
         "left open by the tool's run": of_load & ~of_tool,
         "lost in the error bars of load and tool": of_load & of_tool & ~fixed,
     }
-    told = [f"{', '.join(_ENTRIES[mask[4:]])} are {why}" for why, mask in lost.items() if mask[4:].any()]
+    told = [f"{', '.join(ENTRIES[mask[4:]])} are {why}" for why, mask in lost.items() if mask[4:].any()]
     rest = replace(rest, identified=fixed)
     if not told:
         return rest

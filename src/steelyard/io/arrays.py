@@ -16,6 +16,7 @@ from steelyard.io.entries import Entry, listed
 from steelyard.io.log_files import recording_of
 from steelyard.io.recordings.description import (
     ASSUMED,
+    SIGNS,
     Description,
     default_gravity,
     measures_gravity,
@@ -34,7 +35,6 @@ Given = np.ndarray[Any, np.dtype[Any]]
 # The measured gravity has another name than that of the world, which is an argument of the whole recording.
 _MEASURED_GRAVITY = "gravity_sensor"
 _KEYS = {_MEASURED_GRAVITY if name == "gravity" else name: name for name in QUANTITIES}
-_SENSE = {"on-object": 1, "on-sensor": -1}
 _CALL = 'sy.recording(time=t, force=f, torque=m, rotation=R, wrench="on-sensor", gravity=[0, 0, -9.81])'
 
 
@@ -130,7 +130,7 @@ def _description(
     specs: tuple[StreamSpec, ...], gravity: ArrayLike | None, wrench: str, noise: Mapping[str, float] | None, name: str
 ) -> Description:
     """Return what a file would say beside its columns; raises BadInput."""
-    if wrench not in _SENSE:
+    if wrench not in SIGNS:
         raise BadValue(f'{name}: wrench must be "on-object" or "on-sensor"; got {wrench!r}.')
     if noise is not None and not isinstance(noise, Mapping):
         raise BadValue(f'{name}: noise must be a dict, such as {{"force": 0.05}}; got {noise!r}.')
@@ -138,7 +138,7 @@ def _description(
     return Description(
         specs,
         default_gravity() if gravity is None else _gravity(gravity, name),
-        _SENSE[wrench],
+        SIGNS[wrench],
         parse_noise(Entry({key: _plain(value) for key, value in (noise or {}).items()}, f"{name}, noise")),
         notes=() if told else (f"no gravity was given: {ASSUMED} along -z of W, a level base, was assumed",),
         gravity_std=0.0 if told else ASSUMED_GRAVITY_STD,

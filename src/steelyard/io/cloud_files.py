@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 from pathlib import Path
 from typing import Any
 
@@ -13,7 +12,7 @@ from steelyard.io.in_file import in_file
 from steelyard.io.ply_files import read_ply
 from steelyard.io.shapes.kept_scans import CELLS, SCAN, bytes_of, kept_of
 from steelyard.io.shapes.pcd_files import read_pcd
-from steelyard.io.tables.array_table import ArrayTable, array_headers, read_numbers
+from steelyard.io.tables.array_table import ArrayTable, npz, read_numbers
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import Kept
 from steelyard.whole_files import write_bytes
@@ -86,8 +85,7 @@ def _of_arrays(path: Path) -> Cloud:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
     wanted = ("xyz", _coloured(header.groups), "label", "normals", "seen")
-    held = array_headers(path)
-    found = read_numbers(path, [name for name in (*wanted, SCAN, CELLS) if name in held])
+    found = read_numbers(path, [name for name in (*wanted, SCAN, CELLS) if name in header.shapes])
     kept = kept_of(path, found.get(SCAN), found.get(CELLS))
     return _checked(path, tuple(found.get(name) for name in wanted), kept)
 
@@ -122,11 +120,9 @@ def write_cloud(cloud: Cloud, path: Path | str) -> None:
         case ".ply":
             write_bytes(path, _ply(cloud))
         case ".npz":
-            content = io.BytesIO()
             names = ("xyz", "rgb", "label", "normals", "seen")
             columns = {name: getattr(cloud, name) for name in names if getattr(cloud, name) is not None}
-            np.savez_compressed(content, allow_pickle=False, **columns, **_beside(cloud))
-            write_bytes(path, content.getvalue())
+            write_bytes(path, npz({**columns, **_beside(cloud)}))
         case other:
             raise BadFile(f'{path}: a cloud is written as .ply or .npz, not as "{other}".')
 

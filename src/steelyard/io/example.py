@@ -39,6 +39,11 @@ sensor_link = "tool0"        # S: a link at the sensor's origin, along its axes
 _WIDTH = 8
 
 
+def lines_of(rows: Mapping[str, str]) -> str:
+    """Return the lines of a section, key and value."""
+    return "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows.items())
+
+
 def columns_text(names: Sequence[str]) -> str:
     """Return the list of names as TOML writes it."""
     return f"[{', '.join(toml_string(name) for name in names)}]"
@@ -51,17 +56,16 @@ def example_of(path: str, lines: Mapping[str, str], count: int | None = None) ->
     count  of the columns where the file has no names: they are called by number
     """
     attitude = next((name for name in _ATTITUDES if name in lines), "rotation")
-    rows = [("path", toml_string(path))]
+    rows = {"path": toml_string(path)}
     for name in ("time", "force", "torque", attitude):
         mark = "put your columns here" + _ELSE.get(name, "")
         usual = f"{_USUAL.get(name)}   # {mark}"
         if count is not None:
             usual = _NUMBERED[name] if _FIRST_BEYOND[name] <= count and not lines else f"{_NUMBERED[name]}   # {mark}"
-        rows.append((name, lines.get(name, usual)))
-    if "position" in lines:
-        rows.append(("position", lines["position"]))
+        rows[name] = lines.get(name, usual)
+    rows |= {name: text for name, text in lines.items() if name == "position"}
     robot = _ROBOT if attitude == "joint_position" else ""
-    return HEAD + "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows) + robot
+    return HEAD + lines_of(rows) + robot
 
 
 EXAMPLE = example_of("data.csv", _USUAL)

@@ -8,16 +8,17 @@ from pathlib import Path
 
 from steelyard import check
 from steelyard.errors import BadFile
-from steelyard.findings import Finding
+from steelyard.io.documents import load_toml
 from steelyard.io.recordings import guess
 from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
-from steelyard.io.recordings.description import Description, read_description
+from steelyard.io.recordings.description import Description, parse_description
 from steelyard.io.recordings.joined_tables import own_rows
-from steelyard.io.recordings.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
+from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
 from steelyard.io.streams.missing_rows import without_missing
 from steelyard.io.streams.requirements import require_answerable, require_matched_rows
+from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, find_file, open_table
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import Recording
 from steelyard.robots.serial import SerialArm
 
 
@@ -46,7 +47,7 @@ def _read(path: Path, data: Path | None) -> Recording:
         own = [cells] if len(joined) == 1 else read_cells(description.streams, joined)
         rows = own_rows(description.streams, joined, own)
         return replace(recording_of(description, joined, rows, path.name), name=path.stem, described=False)
-    description = read_description(path)
+    description = parse_description(load_toml(path), path.name)
     tables = open_tables(description.streams, path.parent, data)
     arm = None if description.arm is None else arm_of(description.arm, path, data)
     if arm is not None:
@@ -62,7 +63,7 @@ def _read(path: Path, data: Path | None) -> Recording:
 def recording_of(
     description: Description,
     tables: Sequence[Table],
-    cells: Sequence[Cells],
+    cells: Sequence[Columns],
     name: str,
     arm: SerialArm | None = None,
 ) -> Recording:
@@ -71,9 +72,12 @@ def recording_of(
     Raises BadDescription or BadValue; `name` stands in messages.
     """
     require_answerable(description.streams, name)
-    streams, findings = _streams(description, tables, cells, name)
+    specs = description.streams
+    found = streams_of(specs, tables, cells, [description.gravity] * len(specs), gaps=True)
+    require_matched_rows(found, name)
+    streams, findings = without_missing(specs, found)
     if arm is not None:
-        streams = tuple(posed(*each, arm) for each in zip(description.streams, streams, strict=True))
+        streams = tuple(posed(*each, arm) for each in zip(specs, streams, strict=True))
     placed = description.placed
     return Recording(
         streams,
@@ -87,28 +91,3 @@ def recording_of(
         notes=description.notes,
         gravity_std=description.gravity_std,
     )
-
-
-def _streams(
-    description: Description, tables: Sequence[Table], cells: Sequence[Cells], where: str
-) -> tuple[tuple[Stream, ...], tuple[Finding, ...]]:
-    """Return the streams in SI units without the rows that miss a number, and what was left out."""
-    specs = description.streams
-    channels = [channels_of(*each, description.gravity, True) for each in zip(specs, tables, cells, strict=True)]
-    times = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels], gaps=True)
-    names = stream_names(specs)
-    streams = tuple(
-        Stream(
-            name,
-            values,
-            time,
-            {q.name: "W" for q in spec.quantities if q.frame == "W"},
-            spec.delay,
-            spec.mount,
-            spec.poses,
-            "s" if spec.time is None else spec.time.unit,
-        )
-        for name, spec, values, time in zip(names, specs, channels, times, strict=True)
-    )
-    require_matched_rows(streams, where)
-    return without_missing(specs, streams)

@@ -186,7 +186,7 @@ def read_mesh_noting(path: Path | str) -> tuple[TriangleMesh, tuple[str, ...]]:
     return in_file(path, lambda: TriangleMesh(xyz, indices, part, rgb)), notes
 
 
-def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> None:
+def write_mesh(mesh: TriangleMesh, path: Path | str) -> None:
     """Write a mesh as PLY with double coordinates and part, red, green, blue per face; raises BadFile."""
     path = Path(path)
     rgb = mesh.rgb if mesh.rgb is not None else np.full((len(mesh), 3), 128, np.uint8)
@@ -195,18 +195,10 @@ def write_mesh(mesh: TriangleMesh, path: Path | str, *, ascii: bool = False) -> 
         vertex[axis] = mesh.vertices[:, k]
     face = np.zeros(len(mesh), [("n", "u1"), ("v", "<i4", 3), ("rgb", "u1", 3), ("part", "<i4")])
     face["n"], face["v"], face["rgb"], face["part"] = 3, mesh.triangles, rgb, mesh.part
-    kind = "ascii" if ascii else "binary_little_endian"
     header = (
-        f"ply\nformat {kind} 1.0\ncomment units metres\nelement vertex {len(vertex)}\n"
+        f"ply\nformat binary_little_endian 1.0\ncomment units metres\nelement vertex {len(vertex)}\n"
         "property double x\nproperty double y\nproperty double z\n"
         f"element face {len(face)}\nproperty list uchar int vertex_indices\n"
         "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int part\nend_header\n"
     )
-    if ascii:
-        lines = [" ".join(repr(float(x)) for x in row) for row in mesh.vertices]
-        table = np.column_stack([face["n"], face["v"], face["rgb"], face["part"]])
-        lines += [" ".join(map(str, row)) for row in table.tolist()]
-        body = ("\n".join(lines) + "\n").encode()
-    else:
-        body = vertex.tobytes() + face.tobytes()
-    write_bytes(path, header.encode() + body)
+    write_bytes(path, header.encode() + vertex.tobytes() + face.tobytes())

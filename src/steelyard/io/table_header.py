@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+Column = str | int  # as a description names one
 Columns = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
 

@@ -10,15 +10,17 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
-from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
+from steelyard.io.documents import load_toml
+from steelyard.io.recordings.arm_joints import arm_of, pose_channels, posed, with_joints_in_order
 from steelyard.io.recordings.description import default_gravity
-from steelyard.io.recordings.stream_files import Cells, channels_of, open_tables, read_cells, seconds_of, stream_names
+from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
 from steelyard.io.streams.entries import StreamSpec
+from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, find_file
 from steelyard.io.teams.joint_angles import require_likely
-from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, read_team_description
+from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, parse_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_streams import in_grasp_axes, on_one_clock, used_once
@@ -47,7 +49,7 @@ def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
             raise BadFile(
                 f"{path}: a team is described by a TOML text; found {path.suffix or 'a file without a suffix'}."
             )
-        return _team(read_team_description(path), path, folder)
+        return _team(parse_team_description(load_toml(path), path.name), path, folder)
     except OSError as error:
         raise BadFile(f"{error.filename or path}: cannot be read ({error.strerror or error}).") from None
 
@@ -134,7 +136,7 @@ def _require_equal_counts(said: TeamDescription, where: str) -> None:
 
 def _recording(
     meeting: _Meeting,
-    opened: Mapping[str, tuple[StreamSpec, Table, Cells]],
+    opened: Mapping[str, tuple[StreamSpec, Table, Columns]],
     arms: Mapping[str, SerialArm],
     where: str,
 ) -> TeamRecording:
@@ -142,14 +144,10 @@ def _recording(
     owners = [robot.name for robot, own in meeting.members for _ in own.streams]
     found = [opened[spec.where] for _, own in meeting.members for spec in own.streams]
     specs, tables, cells = [each[0] for each in found], [each[1] for each in found], [each[2] for each in found]
-    gravity = [robot.gravity for robot, own in meeting.members for _ in own.streams]
-    channels = [
-        channels_of(spec, table, mine, default_gravity() if down is None else down, gaps=True)
-        for spec, table, mine, down in zip(specs, tables, cells, gravity, strict=True)
-    ]
-    seconds = seconds_of(specs, tables, cells, [len(next(iter(c.values()))) for c in channels])
-    named = zip(stream_names(specs), specs, channels, seconds, strict=True)
-    streams = {spec.where: _stream(name, spec, values, time) for name, spec, values, time in named}
+    down = [robot.gravity for robot, own in meeting.members for _ in own.streams]
+    gravity = [default_gravity() if known is None else known for known in down]
+    made = streams_of(specs, tables, cells, gravity, gaps=False)
+    streams = {spec.where: _without_zeros(spec, stream) for spec, stream in zip(specs, made, strict=True)}
     for spec, owner in zip(specs, owners, strict=True):
         if owner in arms:
             streams[spec.where] = posed(spec, streams[spec.where], arms[owner])
@@ -163,10 +161,10 @@ def _recording(
         return TeamRecording(meeting.members[0][1].kind, tracks, meeting.name, away)
 
 
-def _stream(name: str, spec: StreamSpec, channels: Mapping[str, Array], time: Array | None) -> Stream:
-    kept = {n: values for n, values in channels.items() if not (n == "torque" and spec.zero_torque)}
-    frames = {q.name: "W" for q in spec.quantities if q.frame == "W"}
-    return Stream(name, kept, time, frames, spec.delay, spec.mount)
+def _without_zeros(spec: StreamSpec, stream: Stream) -> Stream:
+    """Return the stream without a torque that was only said to be zero."""
+    channels = {n: values for n, values in stream.channels.items() if not (n == "torque" and spec.zero_torque)}
+    return replace(stream, channels=channels)
 
 
 def _track(robot: RobotSpec, own: RecordingSpec, streams: Sequence[Stream]) -> Track:
@@ -205,12 +203,10 @@ def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
         return dict(channels)
     out = {name: values for name, values in channels.items() if not name.startswith("joint_")}
     joints = channels["joint_position"]
-    good = np.isfinite(joints).all(1)
+    good: Mask = np.asarray(np.isfinite(joints).all(1))
     robot = Omnid()
     require_likely(robot, joints[good])
-    pose = robot.pose(joints[good])
-    out["rotation"], out["position"] = np.full((len(joints), 3, 3), np.nan), np.full((len(joints), 3), np.nan)
-    out["rotation"][good], out["position"][good] = pose.rotation.matrix, pose.position
+    out |= pose_channels(robot.pose(joints[good]), good)
     if "joint_torque" in channels:
         _require_live(channels["joint_torque"])
         both = good & np.isfinite(channels["joint_torque"]).all(1)

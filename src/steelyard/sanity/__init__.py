@@ -1,8 +1,9 @@
 """Sanity: is the log what its description says, and does the answer look like one?"""
 
-from steelyard.sanity.after import after, drift_of, row_noise
+from steelyard.sanity.after import after, row_noise
 from steelyard.sanity.before import examine
 from steelyard.sanity.fitted.density import impossible_density, maybe_hollow
+from steelyard.sanity.fitted.drift import drift_of
 from steelyard.sanity.fitted.free_motion import examine_motion
 from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import examine_place

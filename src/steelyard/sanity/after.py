@@ -2,20 +2,19 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.people import NAMES
 from steelyard.logs.alignment import Aligned
 from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import noise_std
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.sanity.coverage import coverage
-from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.drift import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
 from steelyard.sanity.fitted.plausible import implausible
 from steelyard.sanity.readings.glance import channel
@@ -24,15 +23,8 @@ from steelyard.sanity.readings.glance import channel
 CHI2, NOISE_RATIO = 2.5, 2.5
 # A tilt counts beyond 2 degrees and four standard deviations, where it takes 30 % of the squared residual away.
 TILT, SURE, TILT_SHARE = np.radians(2.0), 4.0, 0.7
-# A drift counts beyond 2 % of the weight (at 0.1 m for torques), where it takes 20 % of the squared residual away.
-DRIFT_WEIGHT, DRIFT_ARM, DRIFT_SHARE = 0.02, 0.1, 0.8
-# A drift is beyond doubt from so many standard deviations on, by leaving out stretches: then the fit allows for it.
-# Rounding alone drifts by a share of the weight below the last.
-DRIFT_SURE, DRIFT_LEAST = 5.0, 1e-4
 # The prior dominates where it brings a standard deviation below half of what the data alone give.
 PRIOR_SHARE = 0.5
-# Leaving stretches out tells a spread from so many of them on.
-_FEWEST_ROWS, _FEWEST_BLOCKS = 8, 6
 # Rows come 2.5 times as often as the low-pass has Hz, which leaves this share of white noise up to half their rate.
 PASSED = 0.8
 
@@ -44,11 +36,10 @@ def after(
 
     Too few directions, nearly planar, base tilted, bias drift, declared noise off, an answer that is mostly the prior.
     """
-    known = {f.code for f in aligned.findings}
-    seen = tuple(f for f in coverage(log.gravity) if f.code not in known)
+    seen = tuple(f for f in coverage(log.gravity) if f.code not in codes(aligned.findings))
     rotation = rotation_of(log, aligned)
     tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
-    drifts = () if tilted else _drifts(drift)
+    drifts = () if tilted or drift is None else drift.findings
     size = implausible(estimate, float(np.linalg.norm(recording.gravity)), row_noise(log, recording, "force"))
     return (*seen, *tilted, *drifts, *_noise_level(estimate, recording), *_prior(estimate), *size)
 
@@ -66,76 +57,6 @@ def base_tilted(log: MotionLog, rotation: Array, gravity: Array, acceleration_fr
         "residual; the answer uses the direction given."
     )
     return (Finding.of("base-tilted", message),)
-
-
-@dataclass(frozen=True, eq=False)
-class Drift:
-    """A bias that grows in time: how much over the log [tau N m, f N] (6,), by how much it may be off, what it leaves.
-
-    left    squared residual beside that of a steady bias
-    weight  [N] of what is held
-    span    [s] of the log
-    """
-
-    growth: Array
-    std: Array
-    left: float
-    weight: float
-    span: float
-
-    @property
-    def sure(self) -> bool:
-        """Whether any channel drifts beyond doubt: left out, even a small drift moves mass and centre by bars."""
-        least = DRIFT_LEAST * self.weight * np.repeat([DRIFT_ARM, 1.0], 3)
-        return bool((np.abs(self.growth) > np.maximum(DRIFT_SURE * self.std, least)).any())
-
-    @property
-    def large(self) -> bool:
-        """Whether it is worth a finding."""
-        sizes, errors = self._sizes
-        large = sizes > np.maximum(DRIFT_SURE * errors, DRIFT_WEIGHT * self.weight * np.array([DRIFT_ARM, 1.0]))
-        return bool(large.any()) and self.left <= DRIFT_SHARE
-
-    @property
-    def words(self) -> str:
-        """How much it is."""
-        sizes, errors = self._sizes
-        return f"by {sizes[1]:.2g} ± {errors[1]:.1g} N and {sizes[0]:.2g} ± {errors[0]:.1g} N m over {self.span:.0f} s"
-
-    @property
-    def surest_words(self) -> str:
-        """How much the channel drifts that is surest to."""
-        i = int(np.argmax(np.abs(self.growth) / np.maximum(self.std, 1e-300)))
-        kind, unit = ("torque", "N m") if i < 3 else ("force", "N")
-        return f"{kind} along {'xyz'[i % 3]} by {self.growth[i]:.2g} ± {self.std[i]:.1g} {unit} over {self.span:.0f} s"
-
-    @property
-    def _sizes(self) -> tuple[Array, Array]:
-        parts = (self.growth, self.std)
-        sizes, errors = (np.array([np.linalg.norm(v[:3]), np.linalg.norm(v[3:])]) for v in parts)
-        return sizes, errors
-
-
-def drift_of(log: MotionLog) -> Drift | None:
-    """Return how the bias grows over the log; None without a clock, or for too short a log."""
-    if log.time is None or len(log) < _FEWEST_ROWS:
-        return None
-    rows, _ = Rows.of(log)
-    if rows.block.max() + 1 < _FEWEST_BLOCKS:
-        return None
-    steady, moving = rows.solve(), rows.solve(rows.drifting(), jackknife=True)
-    weight = abs(float(steady.solution[0])) * float(np.linalg.norm(log.gravity, axis=1).mean())
-    left = moving.left / steady.left if steady.left else 1.0
-    return Drift(moving.solution[16:], moving.spread[16:], left, weight, float(log.time[-1] - log.time[0]))
-
-
-def _drifts(found: Drift | None) -> tuple[Finding, ...]:
-    """Return `bias-drift` where a bias that grows with time explains much of the residual."""
-    if found is None or not found.large:
-        return ()
-    taken = f"a line in time takes {100 * (1 - found.left):.0f} % of the squared residual away"
-    message = f"The bias drifts {found.words}; {taken}."
-    return (Finding.of("bias-drift", message),)
 
 
 def rotation_of(log: MotionLog, aligned: Aligned) -> Array | None:
@@ -206,14 +127,13 @@ def _prior(estimate: Estimate) -> tuple[Finding, ...]:
     if spread is None or estimate.parts or not estimate.identified.all():
         return ()
     alone = spread / 2
-    names = ("mass", "com x", "com y", "com z", "Ixx", "Ixy", "Ixz", "Iyy", "Iyz", "Izz")
     led = np.isfinite(alone) & (estimate.std < PRIOR_SHARE * alone)
     led[:4] = False
     if not led.any():
         return ()
     worst = int(np.argmax(np.where(led, alone / np.maximum(estimate.std, 1e-300), 0)))
     message = (
-        f"The prior decides {', '.join(n for n, own in zip(names, led, strict=True) if own)}: for {names[worst]} the "
+        f"The prior decides {', '.join(n for n, own in zip(NAMES, led, strict=True) if own)}: for {NAMES[worst]} the "
         f"data alone have {alone[worst] / max(float(estimate.std[worst]), 1e-300):.1f} times the std shown."
     )
     return (Finding.of("prior-dominated", message),)

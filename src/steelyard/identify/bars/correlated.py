@@ -59,14 +59,14 @@ def score_in_time(log: MotionLog, problem: Problem, solution: Solution) -> Score
         return NOTHING
     K, D = problem.residual_map(solution.linear), directions(problem)
     rows = _read(log.rows(np.argsort(log.time, kind="stable")), K, D, problem, solution.weights)
-    variance = _by_noise(rows, K, problem, solution)
+    variance = _by_noise(rows, problem, solution)
     recurring = pose_errors(problem, solution, D, _along(rows))
     return Score(variance) if recurring is None else Score(variance, recurring.variance, (recurring.note,))
 
 
-def _by_noise(rows: _Rows, K: Array, problem: Problem, solution: Solution) -> Array:
+def _by_noise(rows: _Rows, problem: Problem, solution: Solution) -> Array:
     """Return the variance (p, p) of the score under noise that rows remember."""
-    H, extra, plain = noise_cost.information(K, problem.T, problem.scatter, problem.acceleration, problem.wrench)
+    H, extra, plain = problem.information(solution.linear)
     variance, squares, memory = np.zeros_like(H), 0.0, 0.0
     for channel in range(6):
         kernel = rows.kernel(rows.white[:, channel])

@@ -8,7 +8,6 @@ from functools import cached_property
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.linear import inverse_scaled, nonnegative, right_side, without_bias
 from steelyard.identify.problem import Problem
 
@@ -38,12 +37,10 @@ class Effective:
         H is the information with the noise of the acceleration taken out of the scatter, so that H phi = g is
         consistent; V adds what that noise does to the score, or is `score` where the log's own correlation is known.
         """
-        data, noise = (problem.T, problem.scatter), (problem.acceleration, problem.wrench)
-        weights = noise_cost.weights_at(linear, problem.T, *noise)
-        H, extra, plain = noise_cost.information(problem.residual_map(linear), *data, *noise)
+        H, extra, plain = problem.information(linear)
         H = nonnegative(H, plain)
         V = problem.plus_bias_prior(H + extra if score is None else score)
-        g = problem.plus_bias_pull(right_side(*data, weights))
+        g = problem.plus_bias_pull(right_side(problem.T, problem.scatter, problem.weights_at(linear)))
         F, G, follow, own = without_bias(problem.plus_bias_prior(H), V)
         half = F @ inverse_scaled(G)
         information = half @ F

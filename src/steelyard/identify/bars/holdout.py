@@ -21,7 +21,7 @@ from steelyard.inertia import forms
 FEWEST_BLOCKS = 4
 
 
-def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Array | None = None) -> dict[str, Any]:
+def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Array | None) -> dict[str, Any]:
     """Return the hold-out errors and jackknife deviations of `Evidence` by name, or nothing where blocks are few.
 
     H         (p, p) information of the whole log
@@ -33,10 +33,7 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Arra
     numbers = np.unique(problem.block_number[problem.block_number >= 0])
     if len(numbers) < FEWEST_BLOCKS:
         return {}
-    J = np.eye(len(solution.linear))
-    J[:10, :10] = solution.jacobian
-    full = J.T @ H @ J
-    full[:10, :10] += solution.prior
+    J, full = solution.chain, solution.with_prior(H)
 
     def left(plain: Array) -> Array:
         return response if response is not None else J @ inverse_scaled(full - J.T @ plain @ J) @ J.T

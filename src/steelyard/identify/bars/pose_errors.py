@@ -16,7 +16,6 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
-from steelyard.identify.cost.noise_cost import weights_at
 from steelyard.identify.problem import Problem
 from steelyard.identify.regressor import motion_map
 from steelyard.identify.solution import Solution
@@ -119,9 +118,7 @@ class _Fit:
     @classmethod
     def of(cls, problem: Problem, solution: Solution, D: Array) -> _Fit:
         """Return what a solution makes of errors along the axes of D (K, Z)."""
-        weights = solution.weights
-        if weights is None:
-            weights = weights_at(solution.linear, problem.T, problem.acceleration, problem.wrench)
+        weights = problem.weights_at(solution.linear) if solution.weights is None else solution.weights
         along = problem.scatter @ D.T
         pull = np.einsum("cij,pjz,czk->pik", weights, problem.T, along, optimize=True).reshape(len(problem.T), -1)
         share = weights.diagonal(axis1=1, axis2=2) * problem.heard
@@ -196,11 +193,8 @@ class _Seen:
 
 def _response(problem: Problem, solution: Solution, weights: Array) -> Array:
     """Return how the parameters follow the score, (p, p)."""
-    J = solution.chain(len(problem.T))
-    H = problem.plus_bias_prior(normal_equations(problem.T, problem.scatter, weights)[0])
-    A = J.T @ H @ J
-    A[:10, :10] += solution.prior
-    return np.asarray(J @ inverse_scaled(A) @ J.T)
+    J, H = solution.chain, problem.plus_bias_prior(normal_equations(problem.T, problem.scatter, weights)[0])
+    return np.asarray(J @ inverse_scaled(solution.with_prior(H)) @ J.T)
 
 
 def _gains(felt: Array, heard: Mask) -> Array:

@@ -172,10 +172,8 @@ def place_of(row: Integers, known: Integers, count: int) -> int:
 
 
 @numba.njit(cache=True)
-def equal_groups(
-    A: Array, b: Array, volume: Array, start: Array, starts: Integers
-) -> tuple[Array, Array, Array, Integers, int]:
-    """Return masses (N, P), log evidence (N,), covariance (N, P, P), partitions (N, P) and how many were looked at.
+def equal_groups(A: Array, b: Array, volume: Array, start: Array, starts: Integers) -> tuple[Array, Array, Array, int]:
+    """Return masses (N, P), log evidence (N,), covariance (N, P, P) of models, and how many were looked at.
 
     From each of the partitions `starts` (K, P) every part is tried in every other group and in one of its own, sweep by
     sweep, as long as the evidence rises; everything looked at counts in the average.
@@ -199,7 +197,7 @@ def equal_groups(
                     place = place_of(trial, known, count)
                     if place == count:
                         if count == N:
-                            return masses, evidence, spread, known, count
+                            return masses, evidence, spread, count
                         count += 1
                         evidence[place] = _grouped(A, b, volume, trial, groups, start, masses[place], spread[place])
                     if evidence[place] > best + 1e-9:
@@ -209,7 +207,7 @@ def equal_groups(
                     most = max(most, current[i] + 1)
             if sweep and not improved:
                 break
-    return masses, evidence, spread, known, count
+    return masses, evidence, spread, count
 
 
 @numba.njit(cache=True)
@@ -245,8 +243,8 @@ def first_partitions(start: Array) -> Integers:
     return np.stack(out)
 
 
-def averaged(families: list[tuple[Array, Array, Array]]) -> tuple[Array, Array, list[Array]]:
-    """Return mean masses (P,), covariance (P, P) with the spread between models, and the weights per family.
+def averaged(families: list[tuple[Array, Array, Array]]) -> tuple[Array, Array]:
+    """Return mean masses (P,) and their covariance (P, P) with the spread between models.
 
     Each family brings masses (N, P), log evidence (N,) and covariances (N, P, P). Within a family models count by their
     evidence; families count alike, since Laplace's evidence does not compare across them: with parts cut in pieces the
@@ -257,9 +255,13 @@ def averaged(families: list[tuple[Array, Array, Array]]) -> tuple[Array, Array, 
     mean = sum((w @ m for w, (m, _, _) in zip(weights, families, strict=True)), np.zeros(families[0][0].shape[1]))
     covariance = np.zeros((len(mean), len(mean)))
     for w, (m, _, c) in zip(_weights(families, TRUST), families, strict=True):
-        off = m - mean
-        covariance += np.tensordot(w, c, 1) + (w * off.T) @ off
-    return mean, covariance, weights
+        covariance += spread_of(w, m - mean, c)
+    return mean, covariance
+
+
+def spread_of(weight: Array, off: Array, covariance: Array) -> Array:
+    """Return the covariance (P, P) of models (N,) by weight, each `off` (N, P) the mean and (N, P, P) about itself."""
+    return np.asarray(np.tensordot(weight, covariance, 1) + (weight * off.T) @ off)
 
 
 def _weights(families: list[tuple[Array, Array, Array]], trust: float) -> list[Array]:

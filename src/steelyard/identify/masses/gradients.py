@@ -196,8 +196,7 @@ def freed(search: Search, fits: list[Fit], enough: float) -> list[Fit]:
         if total(fits) < best or search.data.misfit(base.phi) < enough:
             break
         best = total(fits)
-    tried.sort(key=lambda fit: -fit.evidence)
-    return [fit for fit in tried if fit.evidence > tried[0].evidence + UNLIKELY]
+    return _likely(tried)
 
 
 def _with(fit: Fit, part: int) -> tuple[tuple[int, ...], Array, Array]:

@@ -15,7 +15,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.masses.density_priors import TRUST, log_det, mode, spread_masses
+from steelyard.identify.masses.density_priors import TRUST, log_det, mode, spread_masses, spread_of
 from steelyard.identify.masses.material_sampling import draw, material_prior
 from steelyard.logs.log import Integers, Mask
 from steelyard.parts.material import Material
@@ -49,8 +49,7 @@ class Choices:
     def mixture(self) -> tuple[Array, Array]:
         """Return mean masses (P,) and their covariance (P, P), with the spread between choices."""
         mean = self.weight @ self.masses
-        off = self.masses - mean
-        return mean, np.tensordot(self.doubt, self.spread, 1) + (self.doubt * off.T) @ off
+        return mean, spread_of(self.doubt, self.masses - mean, self.spread)
 
     def shares(self, materials: int) -> Array:
         """Return the probability (P, materials) of each material for each part."""

@@ -42,8 +42,7 @@ def averaged_masses(data: Effective, parts: Parts) -> Masses:
     A, b = _in_masses(data, parts)
     if len(parts) == 1:
         return free_masses(data, parts)
-    mean, covariance, _ = density_priors.averaged(_families(A, b, parts.volume))
-    return Masses(mean, covariance)
+    return Masses(*density_priors.averaged(_families(A, b, parts.volume)))
 
 
 def log_evidence(data: Effective, parts: Parts) -> Array:
@@ -83,5 +82,5 @@ def _families(A: Array, b: Array, volume: Array) -> list[tuple[Array, Array, Arr
     common = density_priors.common_density(A, b, volume, start)
     widest = np.log(common[0][-1] / volume)
     starts = density_priors.first_partitions(widest)
-    masses, evidence, spread, _, looked = density_priors.equal_groups(A, b, volume, widest, starts)
+    masses, evidence, spread, looked = density_priors.equal_groups(A, b, volume, widest, starts)
     return [common, (masses[:looked], evidence[:looked], spread[:looked])]

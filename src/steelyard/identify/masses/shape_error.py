@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.people import half_trace_com, parameter_jacobian
-from steelyard.inertia import InertialParameters
+from steelyard.inertia import InertialParameters, forms
 from steelyard.spatial import Pose, Rotation
 
 # How far the centre of mass of a scan errs along an axis, over the stretch of its radius of gyration.
@@ -146,7 +146,7 @@ def _turned(inertia: Array) -> Array:
     """Return what small turns about each axis do to the inertia about the centre of mass (6, 3), per radian."""
     cross = np.cross(np.eye(3), np.eye(3)[:, None])  # (3, 3, 3): cross[k] @ v = e_k x v
     change = cross @ inertia - inertia @ cross
-    return np.asarray(change[:, *np.triu_indices(3)].T)
+    return forms.upper(change).T
 
 
 def _stretched(inertia: Array, stretch: float) -> Array:
@@ -161,13 +161,12 @@ def _stretched(inertia: Array, stretch: float) -> Array:
     moments = np.maximum(moments, 0)
     root = axes * np.sqrt(moments)
     across = CORE * (1 - np.sqrt(moments / max(float(moments[-1]), 1e-300)))
-    rows, columns = np.triu_indices(3)
     out = np.empty((6, 6))
-    for k, (i, j) in enumerate(zip(rows, columns, strict=True)):
+    for k, (i, j) in enumerate(forms.UPPER):
         E = np.zeros((3, 3))
         E[i, j] = E[j, i] = np.hypot(stretch, across[i]) if i == j else stretch * np.sqrt(0.5)
         change = root @ E @ root.T
-        out[:, k] = (np.trace(change) * np.eye(3) - change)[rows, columns]
+        out[:, k] = forms.upper(np.trace(change) * np.eye(3) - change)
     return out
 
 

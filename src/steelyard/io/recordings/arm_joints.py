@@ -21,6 +21,7 @@ from steelyard.io.units import ANGLE
 from steelyard.io.urdf_files import read_arm
 from steelyard.logs.recording import Stream
 from steelyard.robots.serial import SerialArm
+from steelyard.spatial import Pose
 
 # From so many turning joints on, an arm at work holds one of them beyond 6.3 degrees.
 _ARM = 3
@@ -52,11 +53,15 @@ def posed(spec: StreamSpec, stream: Stream, arm: SerialArm) -> Stream:
     positions = stream.channels["joint_position"] / np.where(sliding, ANGLE[quantity.unit], 1.0)
     good: Mask = np.asarray(np.isfinite(positions).all(1))
     _require_likely(quantity, positions[good][:, ~sliding])
-    pose = arm.pose(positions[good])
-    found = {"rotation": np.full((len(good), 3, 3), np.nan), "position": np.full((len(good), 3), np.nan)}
-    found["rotation"][good], found["position"][good] = pose.rotation.matrix, pose.position
     kept = {name: values for name, values in stream.channels.items() if name != "joint_position"}
-    return replace(stream, channels=kept | {name: check.frozen(values) for name, values in found.items()})
+    return replace(stream, channels=kept | pose_channels(arm.pose(positions[good]), good))
+
+
+def pose_channels(pose: Pose, good: Mask) -> dict[str, Array]:
+    """Return `rotation` (N, 3, 3) and `position` (N, 3) of poses (M,) in the `good` rows (N,), NaN in the others."""
+    rotation, position = np.full((len(good), 3, 3), np.nan), np.full((len(good), 3), np.nan)
+    rotation[good], position[good] = pose.rotation.matrix, pose.position
+    return {"rotation": check.frozen(rotation), "position": check.frozen(position)}
 
 
 def _columns(spec: QuantitySpec, table: Table, arm: SerialArm) -> tuple[int, ...]:

@@ -4,14 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
-from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.example import EXAMPLE
 from steelyard.io.object_pose import ObjectPose, parse_object_pose
@@ -22,6 +20,7 @@ from steelyard.logs.recording import ASSUMED_GRAVITY_STD, STANDARD_GRAVITY
 _WEAKEST, _STRONGEST = 0.1, 100.0
 _LOUDEST = 1e6
 NOISE = ("force", "torque", "acceleration", "angular_acceleration")  # whose standard deviation can be told
+SIGNS = {"on-object": 1, "on-sensor": -1}  # of the wrench
 ARM = ("urdf", "sensor_link", "base_link")  # keys that describe an arm
 _SECTIONS = ("log", "noise", "object", "stream", "robot")
 
@@ -74,11 +73,6 @@ class Description:
     gravity_std: float = 0.0
 
 
-def read_description(path: Path) -> Description:
-    """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
-    return parse_description(load_toml(path), path.name)
-
-
 def parse_description(values: Mapping[str, Any], name: str) -> Description:
     """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription."""
     top = Entry(values, name)
@@ -96,7 +90,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
     return Description(
         streams=streams,
         gravity=gravity,
-        wrench_sign=-1 if log.choice("wrench", ("on-sensor", "on-object"), "on-object") == "on-sensor" else 1,
+        wrench_sign=SIGNS[log.choice("wrench", ("on-sensor", "on-object"), "on-object")],
         noise=parse_noise(top.section("noise")),
         tool=log.text("tool"),
         placed=placed,

@@ -32,17 +32,17 @@ from steelyard.io.streams.usual_names import (
     time_columns,
     vector_named,
 )
+from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table
 from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
-Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
 _UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
 
 _NEW_POSE = float(np.cos(np.radians(5)))
 
 
-def describe(table: Table) -> tuple[Description, Cells]:
+def describe(table: Table) -> tuple[Description, Columns]:
     """Return what the names in the file say, and its cells; raises BadDescription with an example."""
     names = _simplified(table)
     vectors = {quantity: found for quantity in STEMS if (found := vector_named(names, quantity))}
@@ -56,7 +56,10 @@ def describe(table: Table) -> tuple[Description, Cells]:
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
     require_told(table, names, [spec.name for spec in specs])
-    time = TimeSpec(stamps, _time_units(table, names, stamps, cells), 0.0, "time") if stamps else None
+    time = None
+    if stamps:
+        units = ("s", "ns") if len(stamps) > 1 else (_time_unit(table, names, stamps[0], cells),)
+        time = TimeSpec(stamps, units, 0.0, "time")
     gravity, notes = _gravity(specs, cells)
     poses = time is None and _turns_each_row(specs, cells, gravity)
     where = table.path.name
@@ -74,7 +77,7 @@ def _rises(column: np.ndarray[Any, np.dtype[Any]]) -> bool:
     return bool(len(known)) and bool((known[1:] >= known[:-1]).all()) and bool(known[-1] > known[0])
 
 
-def _topics(specs: Sequence[QuantitySpec], cells: Cells, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
+def _topics(specs: Sequence[QuantitySpec], cells: Columns, time: TimeSpec | None) -> list[tuple[QuantitySpec, ...]]:
     """Return the quantities of each stream: all in one, or those of each topic where topics were joined by time."""
     if time is None:
         return [tuple(specs)]
@@ -123,7 +126,7 @@ def _simplified(table: Table) -> Names:
 
 
 def _vector_spec(
-    table: Table, names: Names, quantity: str, numbers: tuple[int, ...], cells: Cells
+    table: Table, names: Names, quantity: str, numbers: tuple[int, ...], cells: Columns
 ) -> QuantitySpec | None:
     """Return the vector with its unit, None where its size does not tell what it is."""
     said = said_units(names, quantity, numbers)
@@ -139,11 +142,7 @@ def _vector_spec(
     return None if unit is None else QuantitySpec(quantity, numbers, unit, quantity)
 
 
-def _time_units(table: Table, names: Names, stamps: Sequence[int], cells: Cells) -> tuple[str, ...]:
-    return ("s", "ns") if len(stamps) > 1 else (_time_unit(table, names, stamps[0], cells),)
-
-
-def _time_unit(table: Table, names: Names, number: int, cells: Cells) -> str:
+def _time_unit(table: Table, names: Names, number: int, cells: Columns) -> str:
     """Return the unit from the name (t_ms, t [ms]), from the size of stamps since 1970, or seconds."""
     said = said_unit(names, number)
     if said is not None:
@@ -157,7 +156,7 @@ def _time_unit(table: Table, names: Names, number: int, cells: Cells) -> str:
     return unit or "s"
 
 
-def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[str, ...]]:
+def _gravity(specs: Sequence[QuantitySpec], cells: Columns) -> tuple[Array, tuple[str, ...]]:
     """Return gravity in W, z up, as long as the file's own gravity; standard where it has none, which a note says."""
     for spec in specs:
         if spec.name == "gravity":
@@ -169,7 +168,7 @@ def _gravity(specs: Sequence[QuantitySpec], cells: Cells) -> tuple[Array, tuple[
     )
 
 
-def _turns_each_row(specs: Sequence[QuantitySpec], cells: Cells, gravity: Array) -> bool:
+def _turns_each_row(specs: Sequence[QuantitySpec], cells: Columns, gravity: Array) -> bool:
     """Whether gravity turns by more than 5 degrees from row to row: then each row is a still pose."""
     spec = next(s for s in reversed(specs) if s.name in ("rotation", "gravity", "specific_force"))
     values = channel_with_gaps(spec, [cells[int(n)].astype(np.float64) for n in spec.columns], gravity)

@@ -10,12 +10,13 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Mask
-from steelyard.io.recordings.stream_files import Cells, time_columns
+from steelyard.io.recordings.stream_files import time_columns
 from steelyard.io.streams.entries import StreamSpec
+from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table
 
 
-def own_rows(specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Cells]) -> list[Cells]:
+def own_rows(specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Columns]) -> list[Columns]:
     """Return the cells of every stream without rows in which all its quantities are empty, where others share its file.
 
     Streams without stamps keep all: their rows belong to those of the others by number.
@@ -28,7 +29,7 @@ def own_rows(specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequen
     ]
 
 
-def _own(cells: Cells, clock: Sequence[int]) -> Cells:
+def _own(cells: Columns, clock: Sequence[int]) -> Columns:
     """Return the rows that hold a quantity; all where none does, or where lengths differ, which others refuse."""
     if len({len(column) for column in cells.values()}) > 1:
         return cells

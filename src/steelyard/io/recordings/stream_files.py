@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -12,13 +11,13 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadValue
 from steelyard.io.entries import listed
-from steelyard.io.streams.channels import channel, channel_with_gaps, require_one_length
+from steelyard.io.streams.channels import channel_with_gaps, require_one_length
 from steelyard.io.streams.clocks import Clock, common_origin, require_likely_step, steady
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
 from steelyard.io.streams.split_stamps import one_column
+from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
-
-Cells = dict[int, np.ndarray[Any, np.dtype[Any]]]
+from steelyard.logs.recording import Stream
 
 
 def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> list[Table]:
@@ -31,7 +30,7 @@ def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) ->
     return [opened[spec.source] for spec in specs]
 
 
-def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cells]:
+def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Columns]:
     """Return the cells of every stream's own columns; each file is read once, whatever number of streams share it."""
     own: list[set[int]] = []
     wanted: dict[int, set[int]] = {}
@@ -41,7 +40,7 @@ def read_cells(specs: Sequence[StreamSpec], tables: Sequence[Table]) -> list[Cel
         own.append({*_chosen(spec, table, stamps), *stamps})
         wanted.setdefault(id(table), set()).update(own[-1])
         exact.setdefault(id(table), set()).update(stamps)
-    cells: dict[int, Cells] = {}
+    cells: dict[int, Columns] = {}
     for table in tables:
         if id(table) not in cells:
             cells[id(table)] = table.read(sorted(wanted[id(table)]), sorted(exact[id(table)]))
@@ -77,12 +76,37 @@ def time_columns(spec: StreamSpec, table: Table) -> tuple[int, ...]:
     return choose_columns(table.header, spec.time.columns, len(spec.time.units), spec.time.where)
 
 
-def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, gaps: bool = False) -> dict[str, Array]:
-    """Return quantity -> channel in SI; with `gaps`, rows that hold NaN pass as NaN, else they are an error."""
+def streams_of(
+    specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Columns], gravity: Sequence[Array], gaps: bool
+) -> list[Stream]:
+    """Return the streams in SI units, their clocks from one origin; rows that miss a number are NaN.
+
+    gravity  (3,) [m/s^2] of every stream: what one g is
+    gaps     whether stamps may be missing, too
+    """
+    channels = [_channels(*each) for each in zip(specs, tables, cells, gravity, strict=True)]
+    times = _seconds(specs, tables, cells, [len(next(iter(c.values()))) for c in channels], gaps)
+    return [
+        Stream(
+            name,
+            values,
+            time,
+            {q.name: "W" for q in spec.quantities if q.frame == "W"},
+            spec.delay,
+            spec.mount,
+            spec.poses,
+            "s" if spec.time is None else spec.time.unit,
+        )
+        for name, spec, values, time in zip(_names(specs), specs, channels, times, strict=True)
+    ]
+
+
+def _channels(spec: StreamSpec, table: Table, cells: Columns, gravity: Array) -> dict[str, Array]:
+    """Return quantity -> channel in SI; rows that miss a number are NaN, unless all do."""
     out: dict[str, Array] = {}
     for quantity in spec.quantities:
         columns = [cells[n].astype(np.float64, copy=False) for n in _numbers(quantity, table)]
-        values = (channel_with_gaps if gaps else channel)(quantity, columns, gravity)
+        values = channel_with_gaps(quantity, columns, gravity)
         out[quantity.name] = values
         if quantity.name in ("force", "torque") and len(values) > 1 and not np.nan_to_num(values).any():
             passive = ' or say torque = "zero" if the wrist passes no moment' if quantity.name == "torque" else ""
@@ -101,12 +125,12 @@ def channels_of(spec: StreamSpec, table: Table, cells: Cells, gravity: Array, ga
     return out
 
 
-def seconds_of(
+def _seconds(
     specs: Sequence[StreamSpec],
     tables: Sequence[Table],
-    cells: Sequence[Cells],
+    cells: Sequence[Columns],
     rows: Sequence[int],
-    gaps: bool = False,
+    gaps: bool,
 ) -> list[Array | None]:
     """Return seconds after one common origin; a stream with only a rate starts with the earliest clock.
 
@@ -128,7 +152,7 @@ def seconds_of(
     return seconds
 
 
-def stream_names(specs: Sequence[StreamSpec]) -> list[str]:
+def _names(specs: Sequence[StreamSpec]) -> list[str]:
     """Return one name per stream: its path and topic, with #2, #3 .. behind where one serves several streams."""
     names: list[str] = []
     called = [spec.path if spec.topic is None else f"{spec.path}:{spec.topic}" for spec in specs]

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 from collections.abc import Mapping
 from pathlib import Path
@@ -15,6 +14,7 @@ from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recordings.recording_files import object_table
+from steelyard.io.tables.array_table import npz
 from steelyard.io.view_folders import write_views
 from steelyard.logs.recording import KNOWN_PLACE
 from steelyard.parts.known import KnownObject
@@ -64,11 +64,11 @@ def write_object(
         write_mesh(known.mesh, new / "mesh.ply")
         cloud = known.cloud
         points = {"xyz": cloud.xyz, "rgb": cloud.rgb, "label": cloud.labels.astype(np.int32)}
-        write_bytes(new / "points.npz", _npz(points))
-        write_bytes(new / "motion.npz", _npz(known.track.columns()))
+        write_bytes(new / "points.npz", npz(points))
+        write_bytes(new / "motion.npz", npz(known.track.columns()))
         write_text(new / "truth.json", json.dumps(truth_dict(known), indent=1) + "\n")
         if sensed is not None:
-            write_bytes(new / "log.npz", _npz(dict(sensed)))
+            write_bytes(new / "log.npz", npz(sensed))
         log = _LOG.format(path="motion.npz" if sensed is None else "log.npz", said=said)
         write_text(new / "log.toml", f"{log}\n{object_table(known.X_SO, KNOWN_PLACE)}")
 
@@ -79,12 +79,6 @@ def write_object_views(views: Views, X_SW: Pose, folder: Path | str) -> None:
     `steelyard identify log.toml --scan FOLDER --pose-in-sensor FOLDER/object.toml` then runs as it stands.
     """
     write_views(views, folder, {"object.toml": object_table(X_SW, KNOWN_PLACE, of="the world of the views")})
-
-
-def _npz(arrays: dict[str, Any]) -> bytes:
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    return buffer.getvalue()
 
 
 def truth_dict(known: KnownObject) -> dict[str, Any]:

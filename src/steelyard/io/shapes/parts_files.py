@@ -6,7 +6,6 @@ twice (volumes, centroids) must agree.
 
 from __future__ import annotations
 
-import io
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -18,7 +17,8 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.tables.array_table import read_arrays
+from steelyard.io.in_file import in_file
+from steelyard.io.tables.array_table import npz, read_arrays
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import Integers
@@ -142,9 +142,7 @@ def write_parts(saved: SavedParts, path: Path | str) -> None:
         arrays["names"] = np.array(saved.names)
     if saved.tree is not None:
         arrays |= {name: getattr(saved.tree, name) for name in _TREE}
-    buffer = io.BytesIO()
-    np.savez_compressed(buffer, allow_pickle=False, **arrays)
-    write_bytes(Path(path), buffer.getvalue())
+    write_bytes(Path(path), npz(arrays))
 
 
 def read_parts(path: Path | str) -> SavedParts:
@@ -163,19 +161,21 @@ def read_parts(path: Path | str) -> SavedParts:
             )
     if len(arrays["tets"]) > MOST_CELLS:
         raise BadFile(f"{path}: {len(arrays['tets'])} cells are more than the {MOST_CELLS} that can be handled.")
-    try:
-        solid = TetMesh(arrays["vertices"], arrays["tets"])
-        if float(np.ptp(solid.vertices, axis=0).max()) > _LONGEST_M:
-            raise BadValue(f"the solid is over {_LONGEST_M:g} m long. Vertices are in metres; are these millimetres?")
-        tree = None
-        if all(name in arrays for name in _TREE):
-            tree = Hierarchy(arrays["piece"], arrays["merges"], arrays["cost"])
-        names = tuple(str(name)[:_LONGEST_NAME] for name in _texts(path, arrays, len(solid)))
-        unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
-        saved = SavedParts(solid, arrays["labels"], arrays.get("rgb"), tree, names, *unsure)
-        _agree(saved, arrays)
-    except BadValue as error:
-        raise BadFile(f"{path}: {error}") from None
+    return in_file(path, lambda: _saved(path, arrays))
+
+
+def _saved(path: Path, arrays: dict[str, Any]) -> SavedParts:
+    """Return the parts of these arrays; raises BadFile or BadValue."""
+    solid = TetMesh(arrays["vertices"], arrays["tets"])
+    if float(np.ptp(solid.vertices, axis=0).max()) > _LONGEST_M:
+        raise BadValue(f"the solid is over {_LONGEST_M:g} m long. Vertices are in metres; are these millimetres?")
+    tree = None
+    if all(name in arrays for name in _TREE):
+        tree = Hierarchy(arrays["piece"], arrays["merges"], arrays["cost"])
+    names = tuple(str(name)[:_LONGEST_NAME] for name in _texts(path, arrays, len(solid)))
+    unsure = (_number(path, arrays, name) for name in ("com_std_m", "stretch", "turn_std_rad"))
+    saved = SavedParts(solid, arrays["labels"], arrays.get("rgb"), tree, names, *unsure)
+    _agree(saved, arrays)
     return saved
 
 

@@ -10,11 +10,10 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, listed
 from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
+from steelyard.io.table_header import Column
 from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, spelled
 from steelyard.logs.recording import QUANTITIES, Mount
 from steelyard.spatial import Rotation
-
-Column = str | int
 
 FRAMED = (
     "force",

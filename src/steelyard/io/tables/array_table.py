@@ -6,10 +6,11 @@ means all of them, in order, and "name[0]" one of them.
 
 from __future__ import annotations
 
+import io
 import math
 import zipfile
 import zlib
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from tokenize import TokenError
@@ -101,6 +102,13 @@ def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs", mos
     require_bounded(path, sum(held[name].size for name in wanted), most)
     with np.load(path, allow_pickle=False) as archive:
         return {name: _array(path, name, archive) for name in wanted}
+
+
+def npz(arrays: Mapping[str, Any]) -> bytes:
+    """Return the content of an NPZ file of these arrays, packed."""
+    content = io.BytesIO()
+    np.savez_compressed(content, allow_pickle=False, **arrays)
+    return content.getvalue()
 
 
 def _array(path: Path, name: str, archive: Any) -> np.ndarray[Any, np.dtype[Any]]:

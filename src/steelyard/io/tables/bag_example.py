@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 from steelyard.io.bags import TRANSFORMS, Topic
-from steelyard.io.example import HEAD
+from steelyard.io.example import HEAD, lines_of
 from steelyard.io.tables.bag_frames import Frames
 from steelyard.io.toml_string import toml_string
 
@@ -21,7 +21,6 @@ _POSE = {
 }
 _JOINTS = {"joint_position": '{ columns = ["position"], unit = "rad" }'}
 _ROBOT = 'urdf        = "arm.urdf"   # put the file of your arm here\n'
-_WIDTH = 8
 
 
 def bag_example(path: str, topics: Sequence[Topic], frames: Frames) -> str:
@@ -55,5 +54,4 @@ def first_wrench(topics: Sequence[Topic]) -> Topic | None:
 
 
 def _stream(path: str, topic: Topic, lines: dict[str, str]) -> str:
-    rows = {"path": toml_string(path), "topic": toml_string(topic.name), **lines}
-    return "".join(f"{name:{_WIDTH}s} = {text}\n" for name, text in rows.items())
+    return lines_of({"path": toml_string(path), "topic": toml_string(topic.name), **lines})

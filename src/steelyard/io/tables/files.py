@@ -9,9 +9,7 @@ from typing import Protocol
 
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.entries import close_match, listed
-from steelyard.io.table_header import Columns, Header
-
-Column = str | int
+from steelyard.io.table_header import Column, Columns, Header
 
 TEXT = (".csv", ".tsv", ".txt")
 KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag"
@@ -41,7 +39,7 @@ def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | N
     from steelyard.io import bags
     from steelyard.io.tables import array_table, bag_table, parquet_table, text_table, transform_table
 
-    suffix = data_suffix(path)
+    suffix = (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
     if bags.is_bag(path):
         if topic is not None and frames is not None:
             return transform_table.TransformTable.open(path, topic, frames)
@@ -61,11 +59,6 @@ def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | N
     if suffix == ".parquet":
         return parquet_table.ParquetTable.open(path)
     return text_table.TextTable.open(path)
-
-
-def data_suffix(path: Path) -> str:
-    """Return the suffix that decides the reader, lower case and without .gz."""
-    return (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
 
 
 def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Path:

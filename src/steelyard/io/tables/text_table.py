@@ -13,7 +13,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from operator import methodcaller
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -42,8 +41,6 @@ from steelyard.io.tables.text_cells import (
 )
 
 _INTEGER = re.compile(r"[+-]?\d+")
-
-Numbers = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True)

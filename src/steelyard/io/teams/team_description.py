@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any, get_args
 
 from steelyard.check import Array
-from steelyard.io.documents import load_toml
 from steelyard.io.entries import Entry
 from steelyard.io.recordings.description import (
     ARM,
+    SIGNS,
     ArmSpec,
     default_gravity,
     measures_gravity,
@@ -38,7 +37,6 @@ model = "omnid"                  # then joint_position and joint_torque suffice
     joint_position = { columns = ["q1", "q2", "q3", "q4", "q5", "q6"], unit = "rad" }
     joint_torque   = { columns = ["tau1", "tau2", "tau3"], unit = "N*m" }
 """
-_SIGNS = {"on-object": 1, "on-sensor": -1}
 
 
 @dataclass(frozen=True)
@@ -75,11 +73,6 @@ class TeamDescription:
     robots: tuple[RobotSpec, ...]
     reference: str
     gravity_std: float = 0.0
-
-
-def read_team_description(path: Path) -> TeamDescription:
-    """Read and check the TOML description at `path`; raises BadFile or BadDescription."""
-    return parse_team_description(load_toml(path), path.name)
 
 
 def parse_team_description(values: Mapping[str, Any], name: str) -> TeamDescription:
@@ -120,7 +113,7 @@ def _robot(entry: Entry, team: Entry) -> RobotSpec:
         raise entry.error('"model" and "urdf" say the same. Give one of them.')
     arm = parse_arm(entry) if set(ARM) & set(entry.values) else None
     base: Any = entry.choice("base", get_args(Base), "still")
-    sign = _SIGNS[entry.choice("wrench", list(_SIGNS), team.choice("wrench", list(_SIGNS), "on-object"))]
+    sign = SIGNS[entry.choice("wrench", list(SIGNS), team.choice("wrench", list(SIGNS), "on-object"))]
     rows = _tables(entry, "recording", "[[robot.recording]]")
     if not rows:
         raise entry.error(f"no [[robot.recording]] is given. A robot looks like this:\n{EXAMPLE}")
@@ -148,9 +141,7 @@ def _recording(entry: Entry, known: Sequence[str]) -> RecordingSpec:
     entry.only("kind", "name", "away", "stream")
     entry.require("kind", f'kind = "motion"; one of {", ".join(KINDS)}')
     kind: Any = entry.choice("kind", KINDS, "")
-    away = entry.values.get("away", False)
-    if not isinstance(away, bool):
-        raise entry.error(f'"away" must be true or false; got {away!r}.')
+    away = entry.flag("away")
     rows = _tables(entry, "stream", "[[robot.recording.stream]]")
     if away and rows:
         raise entry.error('"away" says that the robot holds nothing in this recording; leave out its streams.')

@@ -12,15 +12,16 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Integers
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.fitted.two_masses import CALM, ELSEWHERE, noise_share
+from steelyard.sanity.fitted.full_fit import FEWEST_BLOCKS, Rows
+from steelyard.sanity.fitted.seen_motion import CALM, noise_share
+from steelyard.sanity.fitted.two_masses import ELSEWHERE
 
 # It is said where accelerations explain so much of what is left, in stretches that were left out, and that is so much
 # of what accelerations make of the wrench. A real arm's vibration reached 0.15, sound made logs nothing.
 EXPLAINED, SHARE = 0.25, 0.1
-_FEWEST_ROWS, _FEWEST_BLOCKS = 100, 6
+_FEWEST_ROWS = 100
 _TOLD = ELSEWHERE | {"sensor-turned", "gains-differ", "bias-drift"}
 _REMEDY = (
     "Check the stamps, filters and smoothing of poses and wrench. In a simulator that damps joints implicitly "
@@ -31,7 +32,7 @@ _KINDS = {"torque": slice(0, 3), "force": slice(3, 6)}
 
 def examine_motion(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Return `motion-mismatch` where what a body leaves of force or torque follows the accelerations."""
-    if {f.code for f in known} & _TOLD or log.noise is None or log.dead.any() or noise_share(log) > CALM:
+    if codes(known) & _TOLD or log.noise is None or log.dead.any() or noise_share(log) > CALM:
         return ()
     followed = following(log)
     if not followed:
@@ -50,15 +51,15 @@ def following(log: MotionLog) -> dict[str, float]:
     rows, _ = Rows.of(log)
     moving = ~rows.log.still
     block = rows.block[moving]
-    if moving.sum() < _FEWEST_ROWS or len(np.unique(block)) < _FEWEST_BLOCKS:
+    if moving.sum() < _FEWEST_ROWS or len(np.unique(block)) < FEWEST_BLOCKS:
         return {}
-    phi = rows.solve().solution
-    left = (rows.values - rows.columns @ phi)[moving]
+    fit = rows.solve()
+    left = (rows.values - rows.columns @ fit.solution)[moving]
     motion = np.concatenate([rows.log.angular_acceleration, rows.log.acceleration], 1)[moving]
     predicted = _unseen(np.concatenate([motion, np.ones((len(motion), 1))], 1), left, block)
     nothing = np.zeros_like(rows.log.gravity)
     at_rest = replace(rows.log, acceleration=nothing, angular_velocity=nothing, angular_acceleration=nothing)
-    made = (rows.log.predicted(phi[:10]) - at_rest.predicted(phi[:10]))[moving]
+    made = (rows.log.predicted(fit.phi) - at_rest.predicted(fit.phi))[moving]
     out = {}
     for kind, part in _KINDS.items():
         before, after = _square(left[:, part]), _square(left[:, part] - predicted[:, part])

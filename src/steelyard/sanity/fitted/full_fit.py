@@ -22,6 +22,7 @@ _MOST_ROWS = 3000
 _BLOCKS = 12
 _SMALLEST = 1e-9
 _MEAN_S = 1.0  # of what is slow in a residual
+FEWEST_BLOCKS = 6  # stretches: leaving each out in turn tells a spread from so many of them on
 RANK = 1e-9  # of the largest eigenvalue: what is below is not told
 
 
@@ -32,16 +33,37 @@ class FullFit:
     solution    (p,) phi (10), bias (6), then the extra columns
     covariance  (p, p) by leaving out stretches
     left        weighted sum of squares, over the same weights for every fit of one `Rows`
+    own         how many columns the rows have by themselves: those behind are extra
     """
 
     solution: Array
     covariance: Array
     left: float
+    own: int
 
     @property
-    def spread(self) -> Array:
-        """Standard deviations (p,) by leaving out stretches."""
-        return np.asarray(np.sqrt(np.diag(self.covariance)))
+    def phi(self) -> Array:
+        """The parameters (10,)."""
+        return self.solution[:10]
+
+    @property
+    def extra(self) -> Array:
+        """What the extra columns (k,) take."""
+        return self.solution[self.own :]
+
+    @property
+    def extra_covariance(self) -> Array:
+        """Covariance (k, k) of that, by leaving out stretches."""
+        return self.covariance[self.own :, self.own :]
+
+    @property
+    def extra_std(self) -> Array:
+        """Standard deviations (k,) of that, by leaving out stretches."""
+        return np.asarray(np.sqrt(np.diag(self.extra_covariance)))
+
+    def beside(self, plain: FullFit) -> float:
+        """Return the squared residual beside that of a fit without extra columns; what leaves none is not bettered."""
+        return self.left / plain.left if plain.left else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,6 +96,11 @@ class Rows:
         """Return the regressor (N, 6, 16) of parameters and bias."""
         return np.asarray(-np.einsum("pij,nj->nip", design(True), features(log), optimize=True))
 
+    @property
+    def split(self) -> bool:
+        """Whether they are of stretches enough to tell a spread by leaving each out."""
+        return int(self.block.max()) + 1 >= FEWEST_BLOCKS
+
     def solve(self, extra: Array | None = None, jackknife: bool = False) -> FullFit:
         """Return the solution with extra columns (N, 6, k)."""
         X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
@@ -87,7 +114,7 @@ class Rows:
         if jackknife and blocks > 2:
             moved = np.stack([_solution(total - s, size) for s in scatter]) - solution
             covariance = (blocks - 1) / blocks * moved.T @ moved
-        return FullFit(solution, covariance, max(left, 0.0))
+        return FullFit(solution, covariance, max(left, 0.0), self.columns.shape[2])
 
     def told(self, extra: Array, least: float) -> Array:
         """Return the combinations (k, j) of extra columns (N, 6, k) that no body with a bias mimics.

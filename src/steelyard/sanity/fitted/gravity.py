@@ -44,22 +44,19 @@ def fitted_gravity(log: MotionLog, rotation: Array, gravity: Array, acceleration
     given, pick = Rows.of(log)
     R = rotation[pick]
     level = given.solve()
-    found, phi = gravity, level.solution[:10]
-    spread, left = np.zeros(3), level.left
+    found, phi = gravity, level.phi
     for _ in range(_ROUNDS):
         rows = _with_gravity(given, R, found)
         columns, axes = _visible(rows, rows.tilting(phi, R, found))
         if columns is None:
             return None
         fit = rows.solve(columns, jackknife=True)
-        turn, spread, left = axes @ fit.solution[16:], np.abs(axes) @ fit.spread[16:], fit.left
-        found, phi = Rotation.exp(turn).apply(found), fit.solution[:10]
+        turn, spread = axes @ fit.extra, np.abs(axes) @ fit.extra_std
+        found, phi = Rotation.exp(turn).apply(found), fit.phi
         if np.linalg.norm(turn) < 1e-4:
             break
     angle = float(np.arccos(np.clip(found @ gravity / (gravity @ gravity), -1, 1)))
-    # What leaves nothing, as a log without noise may, cannot be bettered.
-    share = left / level.left if level.left else 1.0
-    return FittedGravity(found, angle, float(np.linalg.norm(spread)), share)
+    return FittedGravity(found, angle, float(np.linalg.norm(spread)), fit.beside(level))
 
 
 def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> MotionLog:

@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
-from steelyard.sanity.fitted.two_masses import ELSEWHERE, noise_share, two_masses
+from steelyard.sanity.fitted.two_masses import ELSEWHERE, two_masses
 from steelyard.sanity.readings.torques import UNITS, compared
 from steelyard.spatial import cross_matrix
 
@@ -28,9 +29,6 @@ APART, SURE, LEFT, FARTHEST = 0.01, 8.0, 0.95, 2.0
 SLOWLY = 0.93
 # From so many standard deviations on a point is held by the bars.
 MAYBE = 2.5
-# Noise of an acceleration draws the point to the centre of mass by its share of the variance; so many times that is
-# allowed, and no point is told above the second share.
-NOISE, CALM = 3.0, 0.05
 # Forces k times too large look like a point at 1 - k times the centre of mass. So near, the unit is likelier.
 NEAR = 0.03
 # The unit, or sign, is told where the ratio that it puts the point at is known to this share.
@@ -39,7 +37,6 @@ TOLD = 0.1
 ROUNDS, SETTLED = 5, 1e-5
 # Along an axis of S about which alone it turns, no point is told from another: the motion shows this much less of it.
 BLIND = 0.01
-_FEWEST_ROWS, _FEWEST_BLOCKS = 50, 6
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +141,7 @@ class Misplaced:
 
     def allowed(self, estimate: Estimate) -> Estimate:
         """Return the estimate of the origin of S with bars that hold all that the point would change."""
-        wider = replace(estimate, covariance=estimate.covariance + np.outer(self.moved, self.moved))
-        return wider.noted(
+        return estimate.allowing(self.moved).noted(
             f"the load moves as if {self._what[0]} a point {self._size}; error bars hold what that changes"
         )
 
@@ -169,29 +165,28 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
 
     drift  whether the bias may grow with time
     """
-    if log.dead.any() or (~log.still).sum() < _FEWEST_ROWS or not log.acceleration.any():
+    if not moves(log):
         return None
     rows, _ = Rows.of(log, drift)
-    if rows.block.max() + 1 < _FEWEST_BLOCKS:
+    if not rows.split:
         return None
     once = rows.solve()
-    phi, place, at = once.solution[:10], np.zeros(3), len(once.solution)
+    phi, place = once.phi, np.zeros(3)
     lever = _lever(rows.log)
     axes, blind = _axes(lever)
     for _ in range(ROUNDS):
         # What a body misses in its wrench where the point at one metre along each axis is taken for S.
-        missed = -np.concatenate([cross_matrix(phi[1:4]) @ lever, phi[0] * lever], 1)
-        fit = rows.solve(missed @ axes, jackknife=True)
-        before, place, phi = place, axes @ fit.solution[at:], fit.solution[:10]
+        missed = -np.concatenate([cross_matrix(phi[1:4]) @ lever, phi[0] * lever], 1) @ axes
+        fit = rows.solve(missed, jackknife=True)
+        before, place, phi = place, axes @ fit.extra, fit.phi
         if np.linalg.norm(place - before) < SETTLED:
             break
-    left = fit.left / once.left if once.left else 1.0
     slow = rows.slowly(once)
-    slowly = rows.slowly(fit, missed @ axes) / slow if slow else 1.0
-    std, moved = np.sqrt(axes**2 @ fit.spread[at:] ** 2), once.solution[:10] - phi
+    slowly = rows.slowly(fit, missed) / slow if slow else 1.0
+    std, moved = np.sqrt(axes**2 @ fit.extra_std**2), once.phi - phi
     com = phi[1:4] / phi[0]
     trace = float(phi[4] + phi[7] + phi[9] - 2 * phi[0] * com @ com)
-    return Misplaced(place, std, left, slowly, moved, com, trace, noise_share(log), blind)
+    return Misplaced(place, std, fit.beside(once), slowly, moved, com, trace, noise_share(log), blind)
 
 
 def examine_place(
@@ -204,7 +199,7 @@ def examine_place(
 
     known  what was found before: where the motion or the wrench is no body's, no point is looked for
     """
-    if {f.code for f in known} & ELSEWHERE:
+    if codes(known) & ELSEWHERE:
         return None, ()
     found = misplaced(log, drift)
     if found is None or not (found.seen or found.maybe):

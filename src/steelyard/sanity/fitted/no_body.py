@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import ROUNDED_GRAVITY
@@ -43,7 +43,7 @@ def examine_wrench_unit(
     before    findings of before the fit
     """
     chi2 = estimate.evidence.chi2_per_dof
-    if chi2 is None or chi2 <= UNEXPLAINED or {f.code for f in (*before, *late)} & ELSEWHERE:
+    if chi2 is None or chi2 <= UNEXPLAINED or codes((*before, *late)) & ELSEWHERE:
         return late
     larger = [(1 / factor, words) for factor, words in UNITS if 1 < 1 / factor < LARGEST]
     explain = sorted((times, words) for times, words in larger if _left(identify, log, times) < SOUND)
@@ -66,7 +66,7 @@ def examine_body(
     gravity  its size [m/s^2]
     noise    of the torque from row to row [N m], zero where the log has no clock
     """
-    if {f.code for f in known} & (ELSEWHERE | TOLD):
+    if codes(known) & (ELSEWHERE | TOLD):
         return ()
     chi2, miss = estimate.evidence.chi2_per_dof, estimate.evidence.residual_torque_Nm
     weight = ARM * estimate.mass * gravity

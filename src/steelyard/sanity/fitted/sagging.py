@@ -6,13 +6,14 @@ one axis than along another does, and where a log's poses are lopsided it passes
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
+from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.two_masses import ELSEWHERE
@@ -22,11 +23,10 @@ from steelyard.sanity.fitted.two_masses import ELSEWHERE
 SURE, SLOWLY = 8.0, 0.5
 # Combinations of compliances that a body and a bias mimic to this share of their squares are not told.
 TOLD = 1e-3
-_FEWEST_ROWS, _FEWEST_BLOCKS = 100, 6
+_FEWEST_ROWS = 100
 # Compliances that are not alike along all axes: symmetric matrices (5, 3, 3) without a trace.
-_UNEVEN = np.zeros((5, 3, 3))
-_UNEVEN[[0, 0, 1, 1], [0, 1, 1, 2], [0, 1, 1, 2]] = [1.0, -1.0, 1.0, -1.0]
-_UNEVEN[[2, 2, 3, 3, 4, 4], [0, 1, 0, 2, 1, 2], [1, 0, 2, 0, 2, 1]] = 1.0
+_XX, _XY, _XZ, _YY, _YZ, _ZZ = forms.inertia_matrix(np.eye(10)[4:])
+_UNEVEN = np.stack([_XX - _YY, _YY - _ZZ, _XY, _XZ, _YZ])
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,22 +50,20 @@ def sag(log: MotionLog) -> Sag | None:
     if log.time is None or log.dead.any() or len(log) < _FEWEST_ROWS:
         return None
     rows, _ = Rows.of(log)
-    if rows.block.max() + 1 < _FEWEST_BLOCKS:
+    if not rows.split:
         return None
     once = rows.solve()
-    columns = _yielding(rows.log, float(once.solution[0]))
+    columns = _yielding(rows.log, float(once.phi[0]))
     told = rows.told(columns, TOLD)
     slow = rows.slowly(once)
     if not told.size or not slow:
         return None
     columns = columns @ told
     fit = rows.solve(columns, jackknife=True)
-    at = len(once.solution)
-    terms = fit.solution[at:]
-    sure = float((np.abs(terms) / np.maximum(fit.spread[at:], 1e-300)).max())
-    yields = np.linalg.eigvalsh(np.einsum("k,kij->ij", told @ terms, _UNEVEN))
+    sure = float((np.abs(fit.extra) / np.maximum(fit.extra_std, 1e-300)).max())
+    yields = np.linalg.eigvalsh(np.einsum("k,kij->ij", told @ fit.extra, _UNEVEN))
     uneven = float(yields[2] - yields[0]) * float(np.linalg.norm(log.gravity, axis=1).mean())
-    return Sag(uneven, sure, rows.slowly(fit, columns) / slow, once.solution[:10] - fit.solution[:10])
+    return Sag(uneven, sure, rows.slowly(fit, columns) / slow, once.phi - fit.phi)
 
 
 def allow_sag(log: MotionLog, estimate: Estimate, known: tuple[Finding, ...]) -> Estimate:
@@ -73,13 +71,12 @@ def allow_sag(log: MotionLog, estimate: Estimate, known: tuple[Finding, ...]) ->
 
     known  what was found before: where motion or wrench are no body's, a sag is not looked for
     """
-    if {f.code for f in known} & ELSEWHERE:
+    if codes(known) & ELSEWHERE:
         return estimate
     found = sag(log)
     if found is None or found.sure < SURE or found.slowly > SLOWLY:
         return estimate
-    wider = replace(estimate, covariance=estimate.covariance + np.outer(found.moved, found.moved))
-    return wider.noted(
+    return estimate.allowing(found.moved).noted(
         f"the load sags in its grip as gravity turns, {1e3 * found.uneven:.2g} mm more along one axis than along "
         "another; error bars hold what that changes"
     )

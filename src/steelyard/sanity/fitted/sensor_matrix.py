@@ -12,14 +12,16 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.people import parameter_jacobian
+from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.mounts import mount_of, mount_remedy, vector
+from steelyard.sanity.readings.glance import stream_of
 from steelyard.spatial import Rotation, cross_matrix
 
 # A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many
@@ -32,8 +34,7 @@ ELSEWHERE = {"base-tilted", "weight-compensated", "wrench-unexplained"}
 TOLD = 3e-3
 # The turn is linearised anew until it changes by less [rad].
 ROUNDS, SETTLED = 5, 1e-5
-# Leaving stretches out tells a spread from so many of them on.
-_FEWEST_ROWS, _FEWEST_BLOCKS = 8, 6
+_FEWEST_ROWS = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,16 +72,8 @@ class SensorMatrix:
 
 
 # Symmetric matrices (5, 3, 3) without a trace, which add up to any.
-_STRETCHES = np.array(
-    [
-        [[1, 0, 0], [0, 0, 0], [0, 0, -1]],
-        [[0, 0, 0], [0, 1, 0], [0, 0, -1]],
-        [[0, 1, 0], [1, 0, 0], [0, 0, 0]],
-        [[0, 0, 1], [0, 0, 0], [1, 0, 0]],
-        [[0, 0, 0], [0, 0, 1], [0, 1, 0]],
-    ],
-    np.float64,
-)
+_XX, _XY, _XZ, _YY, _YZ, _ZZ = forms.inertia_matrix(np.eye(10)[4:])
+_STRETCHES = np.stack([_XX - _ZZ, _YY - _ZZ, _XY, _XZ, _YZ])
 
 
 def sensor_matrix(log: MotionLog, drift: bool = False, turn: Rotation | None = None) -> SensorMatrix | None:
@@ -92,27 +85,25 @@ def sensor_matrix(log: MotionLog, drift: bool = False, turn: Rotation | None = N
     if len(log) < _FEWEST_ROWS or log.dead.any():
         return None
     rows, _ = Rows.of(log, drift)
-    if rows.block.max() + 1 < _FEWEST_BLOCKS:
+    if not rows.split:
         return None
     plain, turn = rows.solve(), turn or Rotation.identity()
     values = rows.values
-    phi = replace(rows, values=_rotated(turn.inverse(), values)).solve().solution[:10]
+    phi = replace(rows, values=_rotated(turn.inverse(), values)).solve().phi
     for _ in range(ROUNDS):
         felt = rows.columns[:, :, :10] @ phi
         right = replace(rows, values=_rotated(turn.inverse(), values))
         extra = np.concatenate([_turned(felt), _stretched(felt)], 2)
         told = rows.told(extra, TOLD)
         fit = right.solve(extra @ told, jackknife=True)
-        own = slice(len(plain.solution), None)
-        value, covariance = told @ fit.solution[own], told @ fit.covariance[own, own] @ told.T
-        turn, phi = turn @ Rotation.exp(value[:3]), fit.solution[:10]
+        value, covariance = told @ fit.extra, told @ fit.extra_covariance @ told.T
+        turn, phi = turn @ Rotation.exp(value[:3]), fit.phi
         if np.linalg.norm(value[:3]) < SETTLED:
             break
     stretch = np.tensordot(value[3:], _STRETCHES, 1)
     spread = np.sqrt(np.einsum("kij,kl,lij->ij", _STRETCHES, covariance[3:, 3:], _STRETCHES))
-    left = fit.left / plain.left if plain.left else 1.0
-    moved = plain.solution[:4] - fit.solution[:4]
-    return SensorMatrix(turn.log(), np.sqrt(np.diag(covariance)[:3]), stretch, spread, left, moved)
+    moved = plain.phi[:4] - fit.phi[:4]
+    return SensorMatrix(turn.log(), np.sqrt(np.diag(covariance)[:3]), stretch, spread, fit.beside(plain), moved)
 
 
 def _rotated(turn: Rotation, wrench: Array) -> Array:
@@ -140,7 +131,7 @@ def examine_sensor(
     known     what was found before: a tilted base or a wrench that nothing explains is not looked at again
     drift     whether the bias was taken to grow with time
     """
-    stream, found = wrench_stream(recording), _looked_at(log, recording, known, drift)
+    stream, found = stream_of(recording, "force"), _looked_at(log, known, drift)
     if stream is None or found is None:
         return estimate, ()
     turned = found.turned and not in_world(stream)
@@ -158,27 +149,21 @@ def turn_of(
     log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[float, float, float] | None:
     """Return the rotation vector [rad] by which the wrench is turned beyond doubt, None where it is not."""
-    stream, found = wrench_stream(recording), _looked_at(log, recording, known, drift)
+    stream, found = stream_of(recording, "force"), _looked_at(log, known, drift)
     if stream is None or in_world(stream) or found is None or not found.turned:
         return None
     x, y, z = (float(v) for v in found.turn)
     return x, y, z
 
 
-def _looked_at(log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
+def _looked_at(log: MotionLog, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
     """Return what the wrench, turned back into S, says of the sensor; None where something else is wrong with it.
 
     Where a large turn was told, it begins with the turn that the force shows at once.
     """
-    codes = {f.code for f in known}
-    if codes & ELSEWHERE:
+    if codes(known) & ELSEWHERE:
         return None
-    return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes else None)
-
-
-def wrench_stream(recording: Recording) -> Stream | None:
-    """Return the stream of the wrench, None where the recording has none."""
-    return next((s for s in recording.streams if "force" in s.channels), None)
+    return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes(known) else None)
 
 
 def in_world(stream: Stream) -> bool:
@@ -224,5 +209,4 @@ def _widened(estimate: Estimate, found: SensorMatrix) -> Estimate:
     # Three gains with this spread have a mean that is known no better; of torques as of forces, which alone show mass.
     gain = np.sqrt(np.square(found.stretch).sum() / 2 / 3)
     of_force, of_torque = gain * np.eye(10)[0] * phi[0], gain * np.append(0.0, phi[1:])
-    more = sum(np.outer(v, v) for v in (moved, of_force, of_torque))
-    return replace(estimate, covariance=estimate.covariance + more)
+    return estimate.allowing(moved, of_force, of_torque)

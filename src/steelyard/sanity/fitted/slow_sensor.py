@@ -14,21 +14,20 @@ from steelyard.logs.conditioning import signal
 from steelyard.logs.filtered import SHARE, taken
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.seen_motion import moves
 
 # It is said where it is so large beside the bars that are.
 WORTH_SAYING = 1.0
-_FEWEST_ROWS = 50
 
 
 def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
     """Return the estimate with bars that hold what a filter may take away which makes the wrench `late` [s]."""
-    moving = ~log.still
-    if late <= 0 or log.time is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
+    if late <= 0 or log.time is None or not moves(log):
         return estimate
     rows, pick = Rows.of(log)
-    lost = taken_away(log.time, log.predicted(rows.solve().solution[:10]), late)
-    moved = np.sqrt(SHARE) * replace(rows, values=lost[pick]).solve().solution[:10]
-    wider = replace(estimate, covariance=estimate.covariance + np.outer(moved, moved))
+    lost = taken_away(log.time, log.predicted(rows.solve().phi), late)
+    moved = np.sqrt(SHARE) * replace(rows, values=lost[pick]).solve().phi
+    wider = estimate.allowing(moved)
     known = estimate.identified
     if not (wider.std[known] > np.hypot(1, WORTH_SAYING) * estimate.std[known]).any():
         return wider

@@ -6,7 +6,7 @@ the wrench w to w - w''/(2 pi f0)^2. A slow filter of the force does the contrar
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -15,6 +15,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.logs.conditioning import signal
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.seen_motion import moves
 
 # It is said beyond so many standard deviations, by leaving out stretches, and where it leaves less of the residual.
 SURE, LEFT = 6.0, 0.995
@@ -22,7 +23,6 @@ SURE, LEFT = 6.0, 0.995
 SLOW = 8.0
 # [s^2] Where none is seen, an arm may still have its first mode near 16 Hz, which moves an inertia by a bar of its own.
 USUAL = 1e-4
-_FEWEST_ROWS = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -48,19 +48,16 @@ class Softness:
 
 def softness(log: MotionLog) -> Softness | None:
     """Return how soft the arm is that moved the load; None for too few moving rows, no clock or dead channels."""
-    moving = ~log.still
-    if log.time is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
+    if log.time is None or not moves(log):
         return None
     rows, pick = Rows.of(log)
     once = rows.solve()
     even = np.arange(log.time[0], log.time[-1], 1 / (8 * SLOW))
-    slow = signal(log.time, log.predicted(once.solution[:10]), SLOW).at(even)
+    slow = signal(log.time, log.predicted(once.phi), SLOW).at(even)
     bends = np.gradient(np.gradient(slow, even, axis=0), even, axis=0)
     bends = signal(even, bends).at(log.time[pick])[:, :, None]
     fit = rows.solve(bends, jackknife=True)
-    left = fit.left / once.left if once.left else 1.0
-    moved = once.solution[:10] - fit.solution[:10]
-    return Softness(float(fit.solution[16]), float(fit.spread[16]), left, moved)
+    return Softness(float(fit.extra[0]), float(fit.extra_std[0]), fit.beside(once), once.phi - fit.phi)
 
 
 def allow_softness(log: MotionLog, estimate: Estimate) -> Estimate:
@@ -72,9 +69,9 @@ def allow_softness(log: MotionLog, estimate: Estimate) -> Estimate:
     if found is None or found.follows == 0:
         return estimate
     if abs(found.follows) < SURE * found.std or found.left > LEFT:
-        possible = found.moved * found.possible / found.follows
-        return replace(estimate, covariance=estimate.covariance + np.outer(possible, possible))
+        return estimate.allowing(found.moved * found.possible / found.follows)
     rate = 1 / (2 * np.pi * np.sqrt(abs(found.follows)))
     what = f"an arm with its first mode near {rate:.0f} Hz" if found.follows < 0 else "a slow filter of the force"
-    wider = replace(estimate, covariance=estimate.covariance + np.outer(found.moved, found.moved))
-    return wider.noted(f"the wrench bends with the motion as with {what}; error bars hold what that changes")
+    return estimate.allowing(found.moved).noted(
+        f"the wrench bends with the motion as with {what}; error bars hold what that changes"
+    )

@@ -11,10 +11,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.logs.alignment_findings import planar_finding
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
 from steelyard.sanity.readings.both_masses import TAKEN_AWAY, clock_words
 from steelyard.spatial import cross_matrix
 
@@ -26,12 +27,8 @@ SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
 TAKEN = 8.0
 # No tool's tip is farther [m] from the sensor.
 FARTHEST = 5.0
-# Noise of an acceleration lowers the mass that it shows by its share of the variance; so many times that is allowed.
-# Where centres lie is judged below the second share only.
-NOISE, CALM = 3.0, 0.05
 # Below this share a controller has not only taken a weight away.
 TOO_MUCH = -0.7
-_FEWEST_ROWS = 50
 ELSEWHERE = {"weight-compensated", "motion-mismatch", "wrench-unexplained", "base-tilted", "force-unit"}
 
 
@@ -65,26 +62,13 @@ class TwoMasses:
 
 def two_masses(log: MotionLog) -> TwoMasses | None:
     """Return both masses; None for too few moving rows or channels that do not measure."""
-    moving = ~log.still
-    if log.noise is None or log.dead.any() or moving.sum() < _FEWEST_ROWS or not log.acceleration.any():
+    if log.noise is None or not moves(log):
         return None
     rows, _ = Rows.of(log)
     once = rows.solve()
     fit = rows.solve(_weight(rows.log.gravity), jackknife=True)
-    left = fit.left / once.left if once.left else 1.0
-    phi = fit.solution
-    return TwoMasses(float(phi[0]), phi[1:4], phi[16:20], fit.spread[16:20], left, noise_share(log))
-
-
-def noise_share(log: MotionLog) -> float:
-    """Return the share of its uncertainty in the squared acceleration of moving rows, linear or angular, the larger."""
-    moving = ~log.still
-    if log.noise is None or not moving.any():
-        return 0.0
-    variance = np.stack([n.acceleration + n.taken for n in log.noise])[log.noise_class][moving]
-    sizes = np.concatenate([log.angular_acceleration, log.acceleration], 1)[moving] ** 2
-    shares = [variance[:, part].sum() / max(float(sizes[:, part].sum()), 1e-300) for part in (slice(0, 3), slice(3, 6))]
-    return float(max(shares))
+    phi, left = fit.phi, fit.beside(once)
+    return TwoMasses(float(phi[0]), phi[1:4], fit.extra, fit.extra_std, left, noise_share(log))
 
 
 def _weight(gravity: Array) -> Array:
@@ -97,7 +81,7 @@ def _weight(gravity: Array) -> Array:
 
 def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Return `weight-compensated` or `motion-mismatch` where a log weighs another body than it accelerates."""
-    if {f.code for f in known} & ELSEWHERE:
+    if codes(known) & ELSEWHERE:
         return ()
     found = two_masses(log)
     if found is None or found.left > LEFT or min(found.mass, found.weighed) <= TOO_MUCH * abs(found.mass):

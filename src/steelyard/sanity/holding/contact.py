@@ -101,7 +101,7 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
     found = _likelier(slices, found, touches)
     touches = _touches(slices, found, memory)
     touches = [t for t in touches if _large(found.x, t)]
-    guarded = _guarded(touches, len(slices.y))
+    guarded = _away(touches, len(slices.y), guarded=True)
     if not touches or not _possible(found.x, touches) or guarded.mean() < LEAST_LEFT:
         return everything, ()
     moving = np.bincount(row, ~log.still) > 0.5 * np.bincount(row)
@@ -228,9 +228,7 @@ def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Con
 
     Two touches that happen to press alike are less likely than one touch between them, even a longer one.
     """
-    out = np.zeros(len(slices.y), np.bool_)
-    for t in touches:
-        out[t.first : t.last] = True
+    out = ~_away(touches, len(slices.y))
     if len(touches) < 2 or len(runs(found.kept)) > 1:
         return found
     other = consensus.refine(slices, consensus.fit(slices, out, found.tolerance), out)
@@ -240,11 +238,11 @@ def _likelier(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> Con
     return other if looser < LOOSER and len(runs(~other.kept)) == 1 else found
 
 
-def _guarded(touches: Sequence[Touch], count: int) -> Mask:
-    """Return the slices (F,) that are away from every touch."""
+def _away(touches: Sequence[Touch], count: int, guarded: bool = False) -> Mask:
+    """Return the slices (F,) outside every touch, or well away from each where they are `guarded`."""
     kept = np.ones(count, np.bool_)
     for t in touches:
-        margin = min(1 + int(np.ceil(GUARD * (t.last - t.first))), LONGEST_GUARD)
+        margin = min(1 + int(np.ceil(GUARD * (t.last - t.first))), LONGEST_GUARD) if guarded else 0
         kept[max(t.first - margin, 0) : t.last + margin] = False
     return kept
 
@@ -294,9 +292,7 @@ def _unlike_hands(kept: Mask, moving: Mask) -> bool:
 
 def _swappable(slices: Slices, found: Consensus, touches: Sequence[Touch]) -> bool:
     """Whether one constant wrench explains the touches, and they last at least half as long as what was kept."""
-    out = np.zeros(len(slices.y), np.bool_)
-    for t in touches:
-        out[t.first : t.last] = True
+    out = ~_away(touches, len(slices.y))
     if slices.weight[out].sum() < 0.5 * slices.weight[found.kept].sum():
         return False
     rest = (found.residual[out] - np.median(found.residual[out], axis=0)) / found.tolerance[out]

@@ -63,15 +63,15 @@ def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | N
     steady, jumped = rows.solve(), rows.solve(jump)
     found = rows.solve(moment, jackknife=True)
     taken = steady.left - found.left
-    if found.left > LEFT * steady.left or taken < BESIDE_JUMP * (steady.left - jumped.left) or found.solution[0] <= 0:
+    if found.left > LEFT * steady.left or taken < BESIDE_JUMP * (steady.left - jumped.left) or found.phi[0] <= 0:
         return None
     if found.left - rows.solve(np.concatenate([moment, jump], 2)).left > JUMP_TOO * taken:
         return None
     if rotation is not None and gravity is not None:
-        tilted = rows.solve(rows.tilting(steady.solution[:10], rotation[pick], gravity))
+        tilted = rows.solve(rows.tilting(steady.phi, rotation[pick], gravity))
         if taken < BESIDE_TILT * (steady.left - tilted.left):
             return None
-    moved, std = found.solution[-3:] / found.solution[0], found.spread[-3:] / found.solution[0]
+    moved, std = found.extra / found.phi[0], found.extra_std / found.phi[0]
     sure = bool((np.abs(moved) > SURE * std).any())
     return Slip(when, moved, std) if sure and SMALLEST < np.linalg.norm(moved) < LARGEST else None
 

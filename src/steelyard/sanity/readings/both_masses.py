@@ -7,8 +7,6 @@ unit than was said, make accelerations too large, and the mass that they show to
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from steelyard.check import Array
@@ -36,7 +34,7 @@ def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, A
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
     """
-    seen = replace(view, acceleration=None).seen(gravity, rotation)
+    seen = view.still.seen(gravity, rotation)
     slowed = view.seen(np.zeros(3), rotation).pull
     columns = beside(np.stack([-slowed, -seen.pull], 2), seen.lever)
     masses, spread, left = solve(columns * seen.heard(1), seen.wrench[:, 3:], view.block)

@@ -11,9 +11,9 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, percent
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.readings.glance import glance, resampled
+from steelyard.sanity.readings.glance import glance, resampled, stream_of
 from steelyard.sanity.readings.rivals import best_rival, reading_of
 
 # As given the force must leave more than the first share of its variance, or share no time with the poses; moved, less
@@ -33,8 +33,7 @@ REMEDY = (
 
 def examine_offset(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with the streams of other files moved to the clock of the wrench, and what is said of it."""
-    felt = next((s for s in recording.streams if {"force", "torque"} <= set(s.channels)), None)
-    posed = next((s for s in recording.streams if "rotation" in s.channels), None)
+    felt, posed = stream_of(recording, "force", "torque"), stream_of(recording, "rotation")
     if felt is None or posed is None or felt.time is None or posed.time is None or posed.delay is not None:
         return recording, ()
     if _file(felt) == _file(posed) or felt.frames.get("force", "S") == "W" or _explained(recording):
@@ -50,8 +49,8 @@ def examine_offset(recording: Recording) -> tuple[Recording, tuple[Finding, ...]
     )
     text = (
         f"The stamps of '{posed.name}' are {'late' if late > 0 else 'early'} by {abs(late):.1f} s against the wrench: "
-        f"so moved, {100 * left:.2g} % of the force variance is left unexplained"
-        f"{f' instead of {100 * before:.2g} %' if before < 1 else ', and as given they share too little time'}. "
+        f"so moved, {percent(left)} of the force variance is left unexplained"
+        f"{f' instead of {percent(before)}' if before < 1 else ', and as given they share too little time'}. "
         "The answer assumes this."
     )
     return replace(recording, streams=moved), (Finding("stream-delayed", text, REMEDY),)

@@ -14,7 +14,7 @@ from steelyard.findings import Finding
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.both_masses import both_masses
-from steelyard.sanity.readings.glance import glance
+from steelyard.sanity.readings.glance import glance, stream_of
 from steelyard.spatial import Rotation
 
 # Turns are judged from so many rows on.
@@ -45,7 +45,7 @@ def examine_clock(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
 
 def _doubted(recording: Recording) -> Recording:
     """Return the recording with a note where its poses turn little by little although rows are seconds apart."""
-    turning = next((s for s in recording.streams if "rotation" in s.channels), None)
+    turning = stream_of(recording, "rotation")
     if turning is None or turning.time is None or len(turning) < FEWEST_ROWS:
         return recording
     step, span = median_step(turning.time), float(turning.time[-1] - turning.time[0])

@@ -17,7 +17,7 @@ from steelyard.findings import REMEDIES, Finding, percent
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.blind_tilt import blind_tilt
 from steelyard.sanity.readings.both_masses import both_masses, examine_both_masses
-from steelyard.sanity.readings.glance import Glance, glance
+from steelyard.sanity.readings.glance import Glance, glance, stream_of
 from steelyard.sanity.readings.level import examine_level
 from steelyard.sanity.readings.rivals import (
     GOOD,
@@ -180,16 +180,16 @@ def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[F
     if not found.sign or found.arm < FURTHEST_ARM or size < 5 * spread or found.torque_share > 0.7:
         return recording, ()
     where = f"The centre of mass comes out {found.arm:.3g} m from the sensor, with a mass of {abs(found.mass):.3g} kg"
-    stream = next((s for s in recording.streams if "torque" in s.channels and "force" in s.channels), None)
+    stream = stream_of(recording, "force", "torque")
     if stream is None:
         return recording, ()
     if found.arm / 1000 < FURTHEST_ARM and abs(found.mass) < 0.02:
         message = (
             f"{where}: the force is a thousand times too small, as when kN are read as N; it was multiplied by 1000."
         )
-        return scaled(recording, stream, ("force",), 1e3), (Finding.of("force-unit", message),)
+        return scaled(recording, stream, "force", 1e3), (Finding.of("force-unit", message),)
     if found.arm / 1000 < FURTHEST_ARM:
         message = f"{where}: the torque is in N mm; it was divided by 1000."
-        return scaled(recording, stream, ("torque",), 1e-3), (Finding.of("length-in-mm", message),)
+        return scaled(recording, stream, "torque", 1e-3), (Finding.of("length-in-mm", message),)
     message = f"{where}: the units of force and torque do not belong together."
     return recording, (replace(Finding.of("force-unit", message), left_in=True),)

@@ -6,13 +6,13 @@ low-passed alike, so that a body at rest or in slow motion obeys f = m (a - g), 
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterator
+from collections.abc import Callable, Collection, Iterator
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.inertia import forms
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.imu import first_mount
 from steelyard.logs.recording import Recording, Stream
@@ -24,6 +24,8 @@ _MOST_ROWS = 20_000
 _FEWEST_ROWS = 60
 _BLOCKS = 12
 _PARTS = ("torque", "force")
+
+OnRows = Callable[[Stream, Array], Array]  # a channel (M, ..) as it is at the rows of a glance (N, ..)
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,11 @@ class Glance:
     def halves(self) -> tuple[Array, Array]:
         """Torque and force (N, 3), each in its own axes."""
         return self.wrench[:, :3], self.wrench[:, 3:]
+
+    @property
+    def still(self) -> Glance:
+        """The same as if nothing told the acceleration."""
+        return replace(self, acceleration=None)
 
     def smooth(self, values: Array) -> Array:
         """Return values (N, k) through the common low-pass; the rows of a table as they are."""
@@ -122,9 +129,7 @@ def _turning(rotation: Array, rate: float) -> tuple[Array, Array]:
     alpha = np.gradient(omega, 1 / rate, axis=0)
     across = cross_matrix(omega)
     lever = cross_matrix(alpha) + across @ across
-    entries = np.zeros((6, 3, 3))
-    for k, (i, j) in enumerate(((0, 0), (0, 1), (0, 2), (1, 1), (1, 2), (2, 2))):
-        entries[k, i, j] = entries[k, j, i] = 1.0
+    entries = forms.inertia_matrix(np.eye(10)[4:])
     spin = np.einsum("kij,nj->nik", entries, alpha) + across @ np.einsum("kij,nj->nik", entries, omega)
     return lever, spin
 
@@ -137,7 +142,7 @@ def angular_velocity(rotation: Array, rate: float) -> Array:
 
 def glance(recording: Recording) -> Glance | None:
     """Return the rows, or None where the recording has no wrench, no direction of gravity, or next to no rows."""
-    stream = next((s for s in recording.streams if {"force", "torque"} <= set(s.channels)), None)
+    stream = stream_of(recording, "force", "torque")
     if stream is None:
         return None
     return _of_table(recording, stream) if stream.time is None else _of_clocks(recording, stream)
@@ -151,6 +156,11 @@ def in_axes(recording: Recording, world: Collection[str]) -> Recording:
         return replace(stream, frames={**stream.frames, **felt}) if felt else stream
 
     return replace(recording, streams=tuple(map(said, recording.streams)))
+
+
+def stream_of(recording: Recording, *quantities: str) -> Stream | None:
+    """Return the first stream that holds all of the quantities; None where there is none."""
+    return next((s for s in recording.streams if set(quantities) <= set(s.channels)), None)
 
 
 def channel(recording: Recording, *quantities: str) -> Iterator[tuple[Stream, str, Array]]:
@@ -200,34 +210,30 @@ def _of_table(recording: Recording, stream: Stream) -> Glance | None:
     if any(len(s) != rows for s in recording.streams) or rows < 3:
         return None
     rotation = next((v for _, _, v in channel(recording, "rotation")), None)
-    pull = mirrored = None
-    if rotation is None:
-        given = [v for _, _, v in channel(recording, "gravity", "specific_force")]
-        pull = _pull_channel(recording, given, wrench)
-        if pull is None:
-            return None
-        mirrored = _pull_channel(recording, given, -wrench) if _loose(recording) else None
+    pull, mirrored = (None, None) if rotation is not None else _pulls(recording, lambda _, values: values, wrench)
+    if rotation is None and pull is None:
+        return None
     place = next((v for _, _, v in channel(recording, "position")), None)
     return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, mirrored, position=place)
 
 
-def _pull_channel(recording: Recording, values: list[Array], wrench: Array) -> Array | None:
-    """Return gravity in S from a gravity channel, else from an accelerometer whose mount is known or found."""
-    found = next(iter(channel(recording, "gravity", "specific_force")), None)
-    if found is None or not values:
-        return None
-    stream, quantity, _ = found
+def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array | None, Array | None]:
+    """Return gravity in S (N, 3) from a gravity channel, else from an accelerometer whose mount is known or found.
+
+    Then the same with the wrench of the other sign, where the wrench itself decides how the accelerometer sits; None
+    where there is neither.
+    """
+    found = next(channel(recording, "gravity", "specific_force"), None)
+    if found is None:
+        return None, None
+    stream, quantity, given = found
+    values = on_rows(stream, given)
     if quantity == "gravity":
-        return values[0] if stream.turn is None else stream.turn.apply(values[0])
-    return -(stream.turn or first_mount(values[0], None, wrench[:, 3:])).apply(values[0])
-
-
-def _loose(recording: Recording) -> bool:
-    """Tell whether gravity in S comes from an accelerometer whose mount is not given, where no rotation tells it."""
-    found = next(iter(channel(recording, "gravity", "specific_force")), None)
-    if found is None or found[1] == "gravity":
-        return False
-    return found[0].turn is None
+        return values if stream.turn is None else stream.turn.apply(values), None
+    if stream.turn is not None:
+        return -stream.turn.apply(values), None
+    pull, mirrored = (-first_mount(values, None, sign * wrench[:, 3:]).apply(values) for sign in (1, -1))
+    return pull, mirrored
 
 
 def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
@@ -249,24 +255,21 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
 
     raw, world = _wrench(recording, stream)
     wrench = np.where(recording.dead, 0.0, on_grid(stream, raw))
-    rotation = next((on_grid(s, v) for s, _, v in channel(recording, "rotation") if s in used), None)
-    pull = mirrored = None
-    if rotation is None:
-        values = [on_grid(s, v) for s, _, v in channel(recording, "gravity", "specific_force") if s in used]
-        pull = _pull_channel(recording, values, wrench)
-        if pull is None:
-            return None
-        mirrored = _pull_channel(recording, values, -wrench) if _loose(recording) else None
+    seen = replace(recording, streams=tuple(used))
+    rotation = next((on_grid(s, v) for s, _, v in channel(seen, "rotation")), None)
+    pull, mirrored = (None, None) if rotation is not None else _pulls(seen, on_grid, wrench)
+    if rotation is None and pull is None:
+        return None
     acceleration = _acceleration(recording, rotation, on_grid, rate)
     block = np.minimum(np.arange(rows) * _BLOCKS // rows, _BLOCKS - 1)
     felt = None
     if rotation is not None:
-        felt = next((on_grid(s, v) for s, _, v in channel(recording, "specific_force") if s in used), None)
-    place = next((on_grid(s, v) for s, _, v in channel(recording, "position") if s in used), None)
+        felt = next((on_grid(s, v) for s, _, v in channel(seen, "specific_force")), None)
+    place = next((on_grid(s, v) for s, _, v in channel(seen, "position")), None)
     return Glance(wrench, rotation, pull, acceleration, block, rate, world, mirrored, felt, recording.dead, place)
 
 
-def _acceleration(recording: Recording, rotation: Array | None, on_grid: Any, rate: float) -> Array | None:
+def _acceleration(recording: Recording, rotation: Array | None, on_grid: OnRows, rate: float) -> Array | None:
     """Return the acceleration (N, 3) of the S origin in W from the first channel that tells it."""
     if rotation is None:
         return None

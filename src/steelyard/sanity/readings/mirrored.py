@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
@@ -33,7 +33,7 @@ def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
     """
     if view.rotation is None or any(view.dead[3:]):
         return None
-    seen = replace(view, acceleration=None).seen(gravity, view.rotation)
+    seen = view.still.seen(gravity, view.rotation)
     force, down = force_and_weight(seen, sign)
     # force = X m down: the trace with X is largest for the right one.
     X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))

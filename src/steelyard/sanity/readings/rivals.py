@@ -22,7 +22,7 @@ from steelyard.findings import Finding, percent
 from steelyard.logs.misread import INVERTED, MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
-from steelyard.sanity.readings.static_fit import StaticFit, fit
+from steelyard.sanity.readings.static_fit import StaticFit, better_fit
 from steelyard.sanity.readings.tilt import GlanceTilt, tilt_of, turned_sensor
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
@@ -64,15 +64,11 @@ class Reading:
 def reading_of(
     view: Glance, words: str, gravity: Array, rotation: Array | None, misread: Misread | None = None
 ) -> Reading:
-    """Return a reading with the better of two fits: with the measured acceleration and without.
+    """Return a reading with its better fit.
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the reading has them
     """
-    found = fit(view.seen(gravity, rotation), view.block)
-    if view.acceleration is not None:
-        still = fit(replace(view, acceleration=None).seen(gravity, rotation), view.block)
-        found = min(found, still, key=lambda f: f.force_share)
-    return Reading(words, gravity, rotation, found, misread)
+    return Reading(words, gravity, rotation, better_fit(view, gravity, rotation), misread)
 
 
 def best_rival(recording: Recording, view: Glance, given: Reading) -> Reading | None:
@@ -205,7 +201,7 @@ def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
 
 def _varies(view: Glance, reading: Reading) -> bool:
     """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
-    pull = replace(view, acceleration=None).seen(reading.gravity, reading.rotation).pull
+    pull = view.still.seen(reading.gravity, reading.rotation).pull
     return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
 
 

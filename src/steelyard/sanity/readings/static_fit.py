@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array, Integers
-from steelyard.sanity.readings.glance import Seen
+from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
@@ -54,6 +54,15 @@ def fit(seen: Seen, block: Integers) -> StaticFit:
     mass, mass_std, force_share = solve(forced * seen.heard(1), seen.wrench[:, 3:], block)
     moment, moment_std, torque_share = solve(turned * seen.heard(0), seen.wrench[:, :3], block)
     return StaticFit(float(mass[0]), float(mass_std[0]), moment[:3], moment_std[:3], force_share, torque_share)
+
+
+def better_fit(view: Glance, gravity: Array, rotation: Array | None) -> StaticFit:
+    """Return the better of two fits: with the measured acceleration and without.
+
+    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
+    """
+    views = (view,) if view.acceleration is None else (view, view.still)
+    return min((fit(v.seen(gravity, rotation), v.block) for v in views), key=lambda found: found.force_share)
 
 
 def columns(seen: Seen) -> tuple[Array, Array]:

@@ -5,14 +5,14 @@ Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone giv
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.readings.glance import Glance, Seen
-from steelyard.sanity.readings.static_fit import beside, fit, leave_out, solve
+from steelyard.sanity.readings.static_fit import beside, better_fit, leave_out, solve
 from steelyard.spatial import Rotation, cross_matrix
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
@@ -60,13 +60,12 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
     """
     if rotation is None:
         return None
-    still = replace(view, acceleration=None)
-    seen = still.seen(gravity, rotation)
+    seen = view.still.seen(gravity, rotation)
     force = seen.wrench[:, 3:]
     if view.acceleration is not None:
         force = force + mass * view.seen(np.zeros(3), rotation).pull
     turned = np.swapaxes(rotation, 1, 2).reshape(len(rotation), 9)
-    columns = -still.smooth(turned).reshape(-1, 3, 3) * seen.heard(1)
+    columns = -view.smooth(turned).reshape(-1, 3, 3) * seen.heard(1)
     force = force * seen.heard(1)[:, 0]
     lever = None if seen.lever is None else seen.lever * seen.heard(1)
     sign = np.sign(mass) or 1.0
@@ -75,9 +74,7 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
         return None
     found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
     angle = angle_between(found, gravity)
-    best = fit(view.seen(found, rotation), view.block)
-    if view.acceleration is not None:
-        best = min(best, fit(still.seen(found, rotation), view.block), key=lambda f: f.force_share)
+    best = better_fit(view, found, rotation)
     return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _axis_unseen(shown))
 
 
@@ -132,11 +129,10 @@ def turned_sensor(view: Glance, gravity: Array, sign: float) -> Turn | None:
     """
     if view.rotation is None or any(view.dead[3:]):
         return None
-    still = replace(view, acceleration=None)
-    force, down = force_and_weight(still.seen(gravity, view.rotation), sign)
+    force, down = force_and_weight(view.still.seen(gravity, view.rotation), sign)
     turn = Rotation.aligning(force.T @ down)
     force = view.seen(gravity, view.rotation).wrench[:, 3:]
-    turns = (_refined(v.seen(gravity, v.rotation), force, turn, view.block) for v in (view, still))
+    turns = (_refined(v.seen(gravity, v.rotation), force, turn, view.block) for v in (view, view.still))
     return min(turns, key=lambda turn: turn.force_share)
 
 

@@ -12,7 +12,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding
+from steelyard.findings import Finding, percent
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording
 from steelyard.sanity.readings.glance import Glance, Seen, in_axes
 from steelyard.sanity.readings.mirrored import REFLECTIONS, in_words
@@ -86,7 +86,7 @@ def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[R
         f"What turns shows the centre of mass {ratio:.0f} ± {std:.1g} times as far from S as the torques do: they are "
         "in N m, not in N mm, and were multiplied by 1000."
     )
-    return scaled(recording, stream, ("torque",), 1e3), (Finding.of("length-in-mm", text),)
+    return scaled(recording, stream, "torque", 1e3), (Finding.of("length-in-mm", text),)
 
 
 def _elsewhere(
@@ -96,7 +96,7 @@ def _elsewhere(
     rotation = reading.rotation
     if rotation is None:
         return recording, ()
-    axes = _in_other_axes(view, seen, turned, reading)
+    axes = _in_other_axes(view, turned, reading)
     rivals = [axes, *((r.left, r.words) for r in misread_rotations(recording, view, reading))]
     fitting = sorted(rival for rival in rivals if rival[0] <= MUCH_BETTER * share)
     least = fitting[0][0] if fitting else 0.0
@@ -104,14 +104,14 @@ def _elsewhere(
     alike = [words for left, words in fitting if BESIDE * left < least or doubtful]
     if len(alike) > 1 or doubtful:
         text = (
-            f"The torques fit one body where {'; or where '.join(alike)}: so read, {_percent(least)} of their "
-            f"variance is left unexplained instead of {_percent(share)}. The answer does not assume this."
+            f"The torques fit one body where {'; or where '.join(alike)}: so read, {percent(least)} of their "
+            f"variance is left unexplained instead of {percent(share)}. The answer does not assume this."
         )
         return recording, (Finding("wrench-unexplained", text, WHICH, left_in=True),)
     if fitting and fitting[0] == axes:
         text = (
-            f"T{axes[1][1:]}: so read, {_percent(axes[0])} of their variance is left unexplained "
-            f"instead of {_percent(share)}. The answer assumes this."
+            f"T{axes[1][1:]}: so read, {percent(axes[0])} of their variance is left unexplained "
+            f"instead of {percent(share)}. The answer assumes this."
         )
         remedy = f'Set frame = "{"S" if "torque" in view.world else "W"}" in the torque of this stream.'
         return in_axes(recording, view.world ^ {"torque"}), (Finding("gravity-frame", text, remedy),)
@@ -122,13 +122,13 @@ def _elsewhere(
     if left > MUCH_BETTER * share:
         return recording, ()
     text = (
-        f"The torques are about the origin of W, not of S: so read, {_percent(left)} of their variance is left "
-        f"unexplained instead of {_percent(share)}; the answer does not assume this."
+        f"The torques are about the origin of W, not of S: so read, {percent(left)} of their variance is left "
+        f"unexplained instead of {percent(share)}; the answer does not assume this."
     )
     return recording, (Finding("wrench-unexplained", text, ABOUT_S, left_in=True),)
 
 
-def _in_other_axes(view: Glance, seen: Seen, turned: Array, reading: Reading) -> tuple[float, str]:
+def _in_other_axes(view: Glance, turned: Array, reading: Reading) -> tuple[float, str]:
     """Return what torques in the other axes leave, S for W or W for S, and the words for it."""
     other = replace(view, world=view.world ^ {"torque"})
     left = solve(turned, other.seen(np.zeros(3), reading.rotation).wrench[:, :3], view.block)[2]
@@ -144,8 +144,8 @@ def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array)
     # Either sign fits as well: the force decides, or else fewer changes are likelier.
     side = float(moment[:3] @ felt) or float(X.sum())
     text = (
-        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {_percent(left)} of "
-        f"their variance is left unexplained instead of {_percent(share)}; the answer does not assume this."
+        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {percent(left)} of "
+        f"their variance is left unexplained instead of {percent(share)}; the answer does not assume this."
     )
     return (Finding("force-unit", text, REMEDY, left_in=True),)
 
@@ -180,7 +180,3 @@ def compared(ratio: float, std: float) -> tuple[Finding, ...]:
             )
             return (replace(Finding.of("force-unit", text), left_in=True),)
     return ()
-
-
-def _percent(share: float) -> str:
-    return f"{100 * share:.2g} %"

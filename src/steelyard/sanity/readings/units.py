@@ -34,13 +34,9 @@ def examine_units(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
     return recording, tuple(found)
 
 
-def scaled(recording: Recording, stream: Stream, quantities: tuple[str, ...], factor: float) -> Recording:
-    """Return the recording with some channels of one stream multiplied by `factor`."""
-
-    def multiply(name: str, values: Array) -> Array:
-        return values * factor if name in quantities else values
-
-    changed = replace(stream, channels={q: multiply(q, v) for q, v in stream.channels.items()})
+def scaled(recording: Recording, stream: Stream, quantity: str, factor: float) -> Recording:
+    """Return the recording with one channel of one stream multiplied by `factor`."""
+    changed = replace(stream, channels={**stream.channels, quantity: stream.channels[quantity] * factor})
     return replace(recording, streams=tuple(changed if s is stream else s for s in recording.streams))
 
 
@@ -62,9 +58,8 @@ def _gravity(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     if not ONE_G[0] < size < ONE_G[1]:
         return recording, ()
     message = f"[log] gravity has the length {size:.3g}, so it is in g; it was multiplied by {STANDARD_GRAVITY} m/s^2."
-    return replace(recording, gravity=recording.gravity * (STANDARD_GRAVITY / size)), (
-        Finding.of("gravity-in-g", message),
-    )
+    recording = replace(recording, gravity=recording.gravity * (STANDARD_GRAVITY / size))
+    return recording, (Finding.of("gravity-in-g", message),)
 
 
 def _gravity_channel(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -75,7 +70,7 @@ def _gravity_channel(recording: Recording) -> tuple[Recording, tuple[Finding, ..
                 f"Gravity in '{stream.name}' has the length {size:.3g}, so it is in g; it was multiplied by "
                 f"{STANDARD_GRAVITY}."
             )
-            return scaled(recording, stream, (quantity,), STANDARD_GRAVITY), (Finding.of("gravity-in-g", message),)
+            return scaled(recording, stream, quantity, STANDARD_GRAVITY), (Finding.of("gravity-in-g", message),)
     return recording, ()
 
 
@@ -92,7 +87,7 @@ def _specific_force(recording: Recording) -> tuple[Recording, tuple[Finding, ...
                 f"{gravity:.4g}: {'its numbers are in g' if factor > 1 else 'g was applied twice'}; multiplied by "
                 f"{factor:.4g}."
             )
-            return scaled(recording, stream, (quantity,), factor), (Finding.of("gravity-in-g", message),)
+            return scaled(recording, stream, quantity, factor), (Finding.of("gravity-in-g", message),)
     return recording, ()
 
 
@@ -103,7 +98,7 @@ def _positions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
         for stream, _, values in list(channel(recording, quantity)):
             why = judge(stream, values)
             if why:
-                recording = scaled(recording, stream, (quantity,), 1e-3)
+                recording = scaled(recording, stream, quantity, 1e-3)
                 name = quantity.replace("_", " ")
                 message = f"The {name} in '{stream.name}' {why}: no arm does that in metres; taken as millimetres."
                 found.append(Finding.of("length-in-mm", message))

@@ -15,6 +15,7 @@ from steelyard.check import Array, Mask
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
+from steelyard.sanity.readings.glance import channel, stream_of
 from steelyard.sanity.rows.still_rows import angles, as_table, spans, split
 
 # Between two rows, a turn beyond the first [rad] is a leap where it is faster than the second [rad/s], which no arm is,
@@ -43,7 +44,7 @@ def examine_sparse(recording: Recording) -> Recording:
     if first is None or any(s.time is None or not np.array_equal(s.time, first) for s in recording.streams):
         return recording
     step = median_step(first) if len(first) > 1 else 0.0
-    R = next((s.channels["rotation"] for s in recording.streams if "rotation" in s.channels), None)
+    R = next((v for _, _, v in channel(recording, "rotation")), None)
     if step < SPARSE_S or R is None or not (angles(np.swapaxes(R[:-1], 1, 2) @ R[1:]) > TURN).any():
         return recording
     streams = tuple(replace(s, time=None, poses=True, delay=None) for s in recording.streams)
@@ -56,14 +57,16 @@ def examine_leaps(recording: Recording) -> Recording:
 
     A note says so. Logs without leaps, tables and logs without rotations come back as they are.
     """
-    turning = next((s for s in recording.streams if "rotation" in s.channels), None)
-    if turning is None or any(s.time is None for s in recording.streams) or len(turning) < 2 * FEWEST_ROWS:
+    turning = stream_of(recording, "rotation")
+    if turning is None or turning.time is None or any(s.time is None for s in recording.streams):
         return recording
-    leap, pause = _partings(turning)
-    rests = _rests(turning, leap | pause)
+    if len(turning) < 2 * FEWEST_ROWS:
+        return recording
+    leap, pause = _partings(turning, turning.time)
+    rests = _rests(turning.channels["rotation"], turning.time, leap | pause)
     if len(rests) > 1:
         return _as_table(recording, rests)
-    return _with_pauses(recording, turning, leap)
+    return _with_pauses(recording, turning.time, leap)
 
 
 def _as_table(recording: Recording, rests: Array) -> Recording:
@@ -80,12 +83,11 @@ def _as_table(recording: Recording, rests: Array) -> Recording:
     return replace(recording, streams=streams, noise={}, notes=(*recording.notes, note))
 
 
-def _with_pauses(recording: Recording, turning: Stream, leap: Mask) -> Recording:
-    """Return the recording with a pause in all streams wherever the poses leap (N - 1,) and stay there."""
-    time = turning.time
-    lengths = np.diff(np.concatenate([[0], np.flatnonzero(leap) + 1, [len(turning)]]))
+def _with_pauses(recording: Recording, time: Array, leap: Mask) -> Recording:
+    """Return the recording with a pause in all streams wherever poses at `time` (N,) leap (N - 1,) and stay there."""
+    lengths = np.diff(np.concatenate([[0], np.flatnonzero(leap) + 1, [len(time)]]))
     lasting = np.minimum(lengths[:-1], lengths[1:]) >= FEWEST_ROWS
-    if time is None or not lasting.any() or leap.mean() > MOST:
+    if not lasting.any() or leap.mean() > MOST:
         return recording
     after = time[1:][leap][lasting]
     streams = tuple(
@@ -97,11 +99,9 @@ def _with_pauses(recording: Recording, turning: Stream, leap: Mask) -> Recording
     return replace(recording, streams=streams, notes=(*recording.notes, note))
 
 
-def _partings(stream: Stream) -> tuple[Mask, Mask]:
+def _partings(stream: Stream, time: Array) -> tuple[Mask, Mask]:
     """Return between which rows (N - 1,) poses leap, and between which there is a pause."""
-    R, time = stream.channels["rotation"], stream.time
-    if time is None:
-        return np.zeros(len(R) - 1, np.bool_), np.zeros(len(R) - 1, np.bool_)
+    R = stream.channels["rotation"]
     step = np.maximum(np.diff(time), 1e-9)
     turn = angles(np.swapaxes(R[:-1], 1, 2) @ R[1:])
     leap = (turn > TURN) & (turn / step > FASTEST_TURN)
@@ -111,13 +111,13 @@ def _partings(stream: Stream) -> tuple[Mask, Mask]:
     return leap, step > max(PAUSE_S, STEPS * float(np.median(step)))
 
 
-def _rests(stream: Stream, parted: Mask) -> Array:
-    """Return the first and last stamp (K, 2) [s] of the rests that a stream with rotations consists of.
+def _rests(R: Array, time: Array, parted: Mask) -> Array:
+    """Return the first and last stamp (K, 2) [s] of the rests that rotations (N, 3, 3) at `time` (N,) consist of.
 
     None of them (0, 2) where it holds something else, or where nothing parts them (N - 1,).
     """
-    R, time, none = stream.channels["rotation"], stream.time, np.zeros((0, 2))
-    if time is None or not parted.any():
+    none = np.zeros((0, 2))
+    if not parted.any():
         return none
     stretch = np.concatenate([[0], np.cumsum(parted)])
     rest = np.zeros(len(time), np.bool_)

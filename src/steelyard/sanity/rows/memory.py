@@ -13,6 +13,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.readings.glance import channel
 from steelyard.sanity.rows.still_rows import angles, as_table, spans, split
 
 # Gravity turns by less between rows of one pose [rad], of which there are so many on average.
@@ -39,7 +40,8 @@ def examine_memory(recording: Recording) -> Recording:
     if len(down) < FEWEST_ROWS * len(poses) or (_apart(middle, down) > SAME).any():
         return recording
     worth = _worth(np.hstack(felt), poses)
-    apart = _apart_by(recording, poses, worth)
+    pull = down if down.ndim == 2 else np.swapaxes(down, 1, 2) @ recording.gravity
+    apart = _apart_by(recording, pull, poses, worth)
     if apart < WORTH_LESS and worth < WORTH_LESS:
         return recording
     length = np.inf if apart >= WORTH_LESS else float(np.ceil(TIMES * worth))
@@ -81,16 +83,16 @@ def _worth(values: Array, poses: Integers) -> float:
     return worth
 
 
-def _apart_by(recording: Recording, poses: Integers, worth: float) -> float:
+def _apart_by(recording: Recording, pull: Array, poses: Integers, worth: float) -> float:
     """Return how many times more than by their rows' scatter the poses' means are off; 0 where chance may do it.
 
-    `worth` rows of a pose are worth one. Off from what is linear in gravity, so that gains, signs, and where and how
-    the sensor sits, do not count.
+    `worth` rows of a pose are worth one. Off from what is linear in gravity `pull` (N, 3) in S, up to a constant turn,
+    so that gains, signs, and where and how the sensor sits, do not count.
     """
     from scipy.special import gammaincc
 
-    pull, felt = _pull(recording), _felt(recording)
-    if pull is None or felt is None:
+    felt = _felt(recording)
+    if felt is None:
         return 0.0
     count = np.diff(poses, axis=1)[:, 0]
     means, down = (np.add.reduceat(v, poses[:, 0], axis=0) / count[:, None] for v in (felt, pull))
@@ -103,19 +105,11 @@ def _apart_by(recording: Recording, poses: Integers, worth: float) -> float:
     return float(np.sqrt(excess / freedom)) if freedom and gammaincc(freedom / 2, excess / 2) < CHANCE else 0.0
 
 
-def _pull(recording: Recording) -> Array | None:
-    """Return gravity (N, 3) in S, up to a constant turn, by rotations or else by a channel; None where neither is."""
-    down = next((d for s in recording.streams if (d := _down(s)) is not None), None)
-    return down if down is None or down.ndim == 2 else np.swapaxes(down, 1, 2) @ recording.gravity
-
-
 def _felt(recording: Recording) -> Array | None:
     """Return torque and force (N, 6) in S, up to where and how the sensor sits; None where no rotation leads there."""
-    turn = next((s.channels["rotation"] for s in recording.streams if "rotation" in s.channels), None)
+    turn = next((v for _, _, v in channel(recording, "rotation")), None)
     parts = []
-    for part in ("torque", "force"):
-        stream = next(s for s in recording.streams if part in s.channels)
-        values = stream.channels[part]
+    for stream, part, values in channel(recording, "torque", "force"):
         if stream.frames.get(part, "S") == "W":
             if turn is None:
                 return None
