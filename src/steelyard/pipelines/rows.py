@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog
@@ -28,6 +28,7 @@ from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
 from steelyard.sanity.fitted.sensor_matrix import turn_of
 from steelyard.sanity.holding.consensus import FINE
+from steelyard.sanity.holding.contact import agreeing
 from steelyard.sanity.holding.small_slip import small_slip
 
 # How the note begins that says which direction of gravity was used.
@@ -36,6 +37,12 @@ GRAVITY_FOUND = "gravity was estimated"
 ROUNDS, SETTLED = 3, 1e-3
 # Where the acceleration comes from if an accelerometer gives it.
 MEASURED = "specific_force"
+# Findings before the fit that say that rows in motion carry another mass than rows at rest.
+UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
+# Stretches of time (start, end) [s].
+Spans = tuple[tuple[float, float], ...]
+# So often clocks are found anew without the time of a hand.
+HANDS = 2
 # A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where without
 # its time one body leaves less than so much of that. Where one was found, clocks without its time may leave this much.
 POOR, CLEARER, WORSE = 0.03, 0.3, 2.0
@@ -61,7 +68,7 @@ class FitRows:
     level: tuple[str, ...]
     unmeasured: tuple[str, ...]
     touched: tuple[Finding, ...]
-    left_out: tuple[tuple[float, float], ...] = ()
+    left_out: Spans = ()
     place: Misplaced | None = None
     maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
@@ -121,19 +128,24 @@ def _placed(
 def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
     """Return the rows to fit, aligned as said; where a hand touched the object, the rest alone tells the clocks.
 
-    A strong hand draws delays so far off that the wrong time, or none, seems free of it: it is looked for with clocks
-    as stamped, too, and the time counts in which one body explains most, and best.
+    A strong hand draws delays so far off that the wrong time, or none, seems free of it: what agrees with clocks as
+    stamped is tried, too, and the time counts in which one body explains most, and best.
     """
     rows = _as_aligned(recording, before, options, how)
-    sought = how.estimate_delays and any(rows.aligned.delays_std_s.values())
     left = force_left(rows.log)
-    if rows.unmeasured or not sought or not (rows.left_out or left > POOR * np.ptp(rows.log.wrench[:, 3:])):
+    poor = rows.left_out or left > POOR * np.ptp(rows.log.wrench[:, 3:])
+    misread = any(f.left_in for f in before) or codes(before) & UNLIKE_ONE_BODY
+    if rows.unmeasured or misread or not poor or not any(rows.aligned.delays_std_s.values()):
         return rows
-    stamped = _as_aligned(recording, before, options, replace(how, estimate_delays=False))
-    hands = {r.left_out: None for r in (rows, stamped) if r.touched and r.left_out}
-    again = [_as_aligned(recording, before, options, replace(how, touched=hand)) for hand in hands]
-    again = [r for r in again if r.left_out and force_left(r.log) < (WORSE if rows.left_out else CLEARER) * left]
-    return min(again, key=_cost, default=rows)
+    stamped, _ = levelled_as(options.gravity, _aligned(recording, replace(how, estimate_delays=False)), recording)
+    agree = _times_of(stamped.log, agreeing(stamped.log, options.bias == "free"))
+    best, tried = rows, set[Spans]()
+    for _ in range(HANDS):
+        hands = {rows.left_out, agree, best.left_out} - tried - {()}
+        again = [_as_aligned(recording, before, options, replace(how, touched=hand)) for hand in sorted(hands)]
+        again = [r for r in again if r.left_out and force_left(r.log) < (WORSE if rows.left_out else CLEARER) * left]
+        best, tried = min(again, key=_cost, default=best), tried | hands
+    return best
 
 
 def _cost(rows: FitRows) -> float:
@@ -143,16 +155,15 @@ def _cost(rows: FitRows) -> float:
 
 def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
     """Return the rows to fit, aligned as said."""
-    codes = {f.code for f in before}
     aligned, level = levelled_as(options.gravity, _aligned(recording, how), recording)
-    log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes)
+    log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes(before))
     keep: slice | Mask = slice(None)
     touched: tuple[Finding, ...] = ()
     # Where a cause is left in, nothing fits one body: rows that are left out as touched would be chance.
     whole = not unmeasured and not any(f.left_in for f in before)
     if whole:
         keep, touched = one_body(since_start(log, recording), recording, options.bias == "free", options.drift)
-    if codes & {"motion-mismatch", "weight-compensated"}:
+    if codes(before) & UNLIKE_ONE_BODY:
         touched = ()  # moving rows carry another mass, and only look touched
     left_out = _times_of(log, keep)
     log = without_dead(with_declared(log.rows(keep), recording.noise))
@@ -165,7 +176,7 @@ def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Opti
     return FitRows(log, aligned, level, unmeasured, touched, left_out)
 
 
-def _times_of(log: MotionLog, keep: slice | Mask) -> tuple[tuple[float, float], ...]:
+def _times_of(log: MotionLog, keep: slice | Mask) -> Spans:
     """Return first and last time [s] of every stretch of rows that is not kept."""
     if log.time is None or isinstance(keep, slice):
         return ()

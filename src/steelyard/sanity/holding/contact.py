@@ -83,6 +83,18 @@ def untouched(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
     return mask, findings
 
 
+def agreeing(log: MotionLog, with_bias: bool) -> Mask:
+    """Return the rows (N,), in order of time, that one body explains best, be the others touched or not.
+
+    Unlike `untouched` it asks nothing of the rest: clocks that are late may be what spoils it.
+    """
+    everything = np.ones(len(log), np.bool_)
+    if log.time is None or len(log) < FEWEST_SLICES * FEWEST_ROWS:
+        return everything
+    slices, row = _slices(log, with_bias)
+    return consensus.largest(slices).kept[row] if len(slices.y) >= FEWEST_SLICES else everything
+
+
 def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
     """Return what `untouched` returns for rows that are in order of time."""
     everything = np.ones(len(log), np.bool_)
