@@ -139,13 +139,14 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
         return rows
     stamped, _ = levelled_as(options.gravity, _aligned(recording, replace(how, estimate_delays=False)), recording)
     agree = _times_of(stamped.log, agreeing(stamped.log, options.bias == "free"))
-    best, tried = rows, set[Spans]()
+    enough = (WORSE if rows.left_out else CLEARER) * left
+    found: list[FitRows] = []
+    hands = {rows.left_out, agree} - {()}
     for _ in range(HANDS):
-        hands = {rows.left_out, agree, best.left_out} - tried - {()}
         again = [_as_aligned(recording, before, options, replace(how, touched=hand)) for hand in sorted(hands)]
-        again = [r for r in again if r.left_out and force_left(r.log) < (WORSE if rows.left_out else CLEARER) * left]
-        best, tried = min(again, key=_cost, default=best), tried | hands
-    return best
+        found += [r for r in again if r.left_out and force_left(r.log) < enough]
+        hands = {min(found, key=_cost).left_out} - hands if found else set()
+    return min(found, key=_cost, default=rows)
 
 
 def _cost(rows: FitRows) -> float:
