@@ -43,9 +43,9 @@ UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
 HANDS = 2
-# A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where without
-# its time one body leaves less than so much of that. Where one was found, clocks without its time may leave this much.
-POOR, CLEARER, WORSE = 0.03, 0.3, 2.0
+# A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part of
+# the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave this.
+POOR, LEAST_KEPT, CLEARER, WORSE = 0.03, 1 / 3, 0.3, 2.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,11 @@ class FitRows:
     place: Misplaced | None = None
     maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
+
+    @property
+    def kept(self) -> float:
+        """The share of the aligned rows that is fitted."""
+        return len(self.log) / max(len(self.aligned.log), 1)
 
     @property
     def delayed(self) -> bool:
@@ -144,14 +149,14 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     hands = {rows.left_out, agree} - {()}
     for _ in range(HANDS):
         again = [_as_aligned(recording, before, options, replace(how, touched=hand)) for hand in sorted(hands)]
-        found += [r for r in again if r.left_out and force_left(r.log) < enough]
+        found += [r for r in again if r.left_out and r.kept > LEAST_KEPT and force_left(r.log) < enough]
         hands = {min(found, key=_cost).left_out} - hands if found else set()
     return min(found, key=_cost, default=rows)
 
 
 def _cost(rows: FitRows) -> float:
     """Return the log of what one body leaves, and a fine on the time left out."""
-    return float(np.log(max(force_left(rows.log), 1e-12))) - FINE * len(rows.log) / max(len(rows.aligned.log), 1)
+    return float(np.log(max(force_left(rows.log), 1e-12))) - FINE * rows.kept
 
 
 def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
