@@ -43,8 +43,9 @@ UNLIKE_ONE_BODY = {"motion-mismatch", "weight-compensated"}
 Spans = tuple[tuple[float, float], ...]
 # So often clocks are found anew without the time of a hand.
 HANDS = 2
-# A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part of
-# the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave this.
+# A hand may hide where one body leaves more (rms) than this share of the range of the forces. It is there where a part
+# of the log, no smaller than that, leaves less than so much of it. Where one was found, clocks without it may leave so
+# many times as much.
 POOR, LEAST_KEPT, CLEARER, WORSE = 0.03, 1 / 3, 0.3, 2.0
 
 
@@ -183,10 +184,11 @@ def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Opti
 
 
 def _times_of(log: MotionLog, keep: slice | Mask) -> Spans:
-    """Return first and last time [s] of every stretch of rows that is not kept."""
+    """Return the stretches of rows that are not kept, without end beyond the log: delays move what it covers."""
     if log.time is None or isinstance(keep, slice):
         return ()
-    return tuple((float(log.time[a]), float(log.time[b - 1])) for a, b in runs(~keep).tolist())
+    time = np.concatenate([[-np.inf], log.time[1:-1], [np.inf]])
+    return tuple((float(time[a]), float(time[b - 1])) for a, b in runs(~keep).tolist())
 
 
 def since_start(log: MotionLog, recording: Recording) -> MotionLog:
