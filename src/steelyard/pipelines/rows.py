@@ -1,7 +1,8 @@
 """From a recording to the rows that are fitted: aligned, those whose motion is known, and that nobody touched.
 
 Where the poses turn out to be of another point than S, all is done anew for that point: delays and contact hang on it.
-A sensor that is turned looks like a delay, too: then delays are found anew without the turn.
+A sensor that is turned looks like a delay, too: then delays are found anew without the turn. A hand spoils delays as
+well: then they are found anew without its time.
 """
 
 from __future__ import annotations

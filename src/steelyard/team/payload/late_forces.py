@@ -147,17 +147,15 @@ def _asked(fit: Fitted, rows: Rows, highest_hz: float) -> LateForces | None:
     edges = band_edges(moving, highest_hz)
     beside = iter(moving)
     payload = _in_motion(fit.payload, lambda part: gathered(_with_rates(next(beside)), edges, highest_hz))
-    each = np.zeros((count, 6, count, 6))
-    each[range(count), :, range(count)] = np.moveaxis(D.reshape(6, count, 6), 1, 0)
-    rates = np.concatenate(
-        [np.zeros((count, 6, 12 + 6 * count)), each.reshape(count, 6, -1), np.zeros((count, 6, 1))], axis=2
-    )
+    summed = np.moveaxis(D.reshape(6, count, 6), 1, 0)
+    first, last = 12 + 6 * count, 12 + 12 * count
     body, W = motion_map(payload.parameters), payload.weights[0]
     H, g = np.zeros((count, count)), np.zeros(count)
     for part, bias in zip(payload.groups[0].parts, payload.biases, strict=True):
         left = np.concatenate([-body, D, np.zeros_like(D), -bias[:, None]], axis=1)
-        seen = W @ (rates[:, None] @ part.scatter)
-        H += np.einsum("akiz,biz->ab", seen, rates)
+        changing = part.scatter[:, first:last].reshape(len(W), count, 6, -1).swapaxes(0, 1)
+        seen = W @ (summed[:, None] @ changing)
+        H += np.einsum("akibj,bij->ab", seen[..., first:last].reshape(*seen.shape[:3], count, 6), summed, optimize=True)
         g += np.einsum("akiz,iz->a", seen, left)
     moved = moved_by_pushes(payload, np.concatenate([np.zeros_like(D), D], axis=1))[:, count:]
     H = H - moved.T @ payload.information @ moved + np.eye(count) / USUAL_S**2
