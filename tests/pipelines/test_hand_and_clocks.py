@@ -9,9 +9,13 @@ import numpy as np
 import pytest
 
 from logs.made_recordings import BODY, Swing, recording
+from steelyard.errors import CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording
+from steelyard.logs.alignment import Aligned, align
+from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Recording
+from steelyard.pipelines import rows
 from steelyard.pipelines.held_object import identify
 from steelyard.spatial import Rotation
 
@@ -61,6 +65,18 @@ def test_a_hand_moves_no_clock(size: float, spans: tuple[tuple[float, float], ..
     assert found.delays_s == pytest.approx(sound.delays_s, abs=1e-3)
     assert abs(found.mass - BODY.mass) < 3 * found.std[0]
     assert found.com == pytest.approx(BODY.com, abs=1.5e-3)
+
+
+def test_where_too_little_is_left_for_clocks_all_rows_tell_them(monkeypatch: pytest.MonkeyPatch) -> None:
+    def scarce(recording: Recording, options: AlignOptions) -> Aligned:
+        if options.touched:
+            raise CannotAnswer("too few rows are left")
+        return align(recording, options)
+
+    monkeypatch.setattr(rows, "align", scarce)
+    found = identify(pushed(made(0), 6.0, (4.0, 5.5)))
+    assert "contact" in found.codes()
+    assert abs(found.mass - BODY.mass) < 3 * found.std[0]
 
 
 @pytest.mark.parametrize("run", ["kuka_run1", "kuka_run2"])

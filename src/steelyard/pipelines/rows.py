@@ -150,8 +150,13 @@ def _rows(recording: Recording, before: tuple[Finding, ...], options: Options, h
     found: list[FitRows] = []
     hands = {rows.left_out, agree} - {()}
     for _ in range(HANDS):
-        again = [_as_aligned(recording, before, options, replace(how, touched=hand)) for hand in sorted(hands)]
-        found += [r for r in again if r.left_out and r.kept > LEAST_KEPT and force_left(r.log) < enough]
+        for hand in sorted(hands):
+            try:
+                again = _as_aligned(recording, before, options, replace(how, touched=hand))
+            except CannotAnswer:
+                continue  # too little is left for clocks: what all rows say stands
+            if again.left_out and again.kept > LEAST_KEPT and force_left(again.log) < enough:
+                found.append(again)
         hands = {min(found, key=_cost).left_out} - hands if found else set()
     return min(found, key=_cost, default=rows)
 
