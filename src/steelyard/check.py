@@ -7,13 +7,15 @@ from typing import Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, CannotAnswer
 
 Array = NDArray[np.float64]
 Integers = NDArray[np.int64]
 Mask = NDArray[np.bool_]
 # What NumPy and Python raise where numbers degenerate: a fit that has diverged, or data of no body.
 BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
+# What a fit raises that comes to nothing.
+FAILURES = (BadValue, CannotAnswer, *BREAKDOWNS)
 _IDENTITY = np.eye(3)
 _LARGEST_WHOLE = 2.0**53  # beyond it float64 holds no longer every integer
 _ORTHONORMAL = 1e-6  # how far R^T R of a rotation may be from the identity, entry by entry

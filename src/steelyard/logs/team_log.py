@@ -6,10 +6,10 @@ share no world frame.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal, get_args
+from typing import Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -24,6 +24,7 @@ Kind = Literal["grasp", "still", "motion"]
 Base = Literal["still", "moving"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 _TURNING = ("rotation", "angular_velocity")
+T = TypeVar("T")
 
 __all__ = ["KINDS", "Base", "Kind", "Mask", "TeamLog", "TeamRecording", "TeamRobot", "Track"]
 
@@ -68,6 +69,12 @@ class TeamRecording:
         """Whether all tracks have the same stamps, to a microsecond."""
         first, *others = self.tracks.values()
         return all(first.stamped_at(track.time) for track in others)
+
+    def changed(self, change: Callable[[Track, T], Track], by: Mapping[str, T]) -> TeamRecording:
+        """Return the recording with the tracks of the robots in `by` as `change` makes them of what stands there."""
+        if not self.tracks.keys() & by.keys():
+            return self
+        return replace(self, tracks={n: change(t, by[n]) if n in by else t for n, t in self.tracks.items()})
 
 
 @dataclass(frozen=True, eq=False)
@@ -217,17 +224,10 @@ class TeamLog:
     def with_homes(self, homes: Mapping[str, Pose]) -> TeamLog:
         """Return the log as recorded with other home frames: X_AH of each new home A; others keep theirs."""
         robots = tuple(_rehomed(robot, homes.get(robot.name)) for robot in self.robots)
-        recordings = tuple(
-            replace(r, tracks={n: _moved(t, homes.get(n)) for n, t in r.tracks.items()}) for r in self.recordings
-        )
-        return replace(self, robots=robots, recordings=recordings)
+        return replace(self, robots=robots, recordings=tuple(r.changed(Track.moved, homes) for r in self.recordings))
 
 
 def _rehomed(robot: TeamRobot, home: Pose | None) -> TeamRobot:
     if home is None or robot.gravity is None:
         return robot
     return replace(robot, gravity=home.rotation.apply(robot.gravity))
-
-
-def _moved(track: Track, home: Pose | None) -> Track:
-    return track if home is None else track.moved(home)

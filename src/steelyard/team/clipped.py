@@ -42,10 +42,7 @@ def without_clipped(log: TeamLog) -> tuple[TeamLog, tuple[Finding, ...]]:
                 lost[places[k]][name] = mask
     if not any(lost):
         return log, tuple(found)
-    recordings = [
-        replace(r, tracks={n: without_wrench(t, gone[n]) if n in gone else t for n, t in r.tracks.items()})
-        for r, gone in zip(log.recordings, lost, strict=True)
-    ]
+    recordings = [r.changed(without_wrench, gone) for r, gone in zip(log.recordings, lost, strict=True)]
     return log.with_recordings(*recordings), tuple(found)
 
 

@@ -7,8 +7,6 @@ Source: own.
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from steelyard.check import Array, Mask
@@ -38,8 +36,7 @@ def without_frozen(log: TeamLog) -> tuple[TeamLog, tuple[Finding, ...]]:
             text = f"The force of '{name}' stands still in {int(rows.sum())} of {len(rows)} rows of '{recording.name}'"
             found.append(Finding.of("channel-stuck", f"{text} and nowhere else; {TOO_MANY if many else LEFT_OUT}."))
         used = {n: rows for n, rows in gone.items() if rows.mean() <= MOST_LEFT_OUT}
-        tracks = {n: without_wrench(t, used[n]) if n in used else t for n, t in recording.tracks.items()}
-        recordings.append(replace(recording, tracks=tracks) if used else recording)
+        recordings.append(recording.changed(without_wrench, used))
     return (log.with_recordings(*recordings) if found else log), tuple(found)
 
 

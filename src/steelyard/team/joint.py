@@ -17,7 +17,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.whose_slip import whose_slip
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.jumps import cut_at_jumps
-from steelyard.team.clocks.search import F, searched
+from steelyard.team.clocks.search import searched
 from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge.bodies import hinge_findings
@@ -26,6 +26,7 @@ from steelyard.team.hinge.team import identify_two_bodies
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.twists import require_one_velocity_unit
+from steelyard.team.motion_fit import F
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import Yields, stiffened
@@ -127,7 +128,7 @@ class JointTeam:
         of = partial(PoseTeam.of, other=self.slipped or ())
         try:
             log, team, begun = self._fitted(log, of)
-        except (CannotAnswer, BadValue, *check.BREAKDOWNS):
+        except check.FAILURES:
             require_well_read(log)
             raise
         log, team, yields = stiffened(log, team, lambda stiff: of(stiff, self.clocks))
@@ -155,7 +156,7 @@ class JointTeam:
             return None
         try:
             team, payload = identify_two_bodies(log, split, self.clocks, self.gains, self.wrists, self.highest_hz)
-        except (CannotAnswer, BadValue, *check.BREAKDOWNS):
+        except check.FAILURES:
             return None
         team = clocked(team, begun.first(log))
         found = [

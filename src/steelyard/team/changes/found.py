@@ -7,20 +7,18 @@ others say. Then slips, the clearest first, each judged anew by a fit without wh
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import Field, replace
+from dataclasses import replace
 from functools import partial
-from typing import Any, ClassVar, Protocol, TypeVar
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS, Array
-from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.check import FAILURES, Array
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.presence import LIGHT, SHARE, as_long, idle, let_go, presence_findings, strayers
 from steelyard.team.changes.slips import SlipAt
-from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.errors import NOTHING
+from steelyard.team.motion_fit import F
 from steelyard.team.stacked import Stretch
 
 MOST_SLIPS = 3
@@ -28,39 +26,6 @@ MOST_SLIPS = 3
 BETTER = 3.0
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
-
-
-class Fitted(Protocol):
-    """A joint fit of poses or twists, with what it leaves."""
-
-    __dataclass_fields__: ClassVar[dict[str, Field[Any]]]
-
-    @property
-    def fit(self) -> Any:
-        """The optimum, with its noise (N, 2)."""
-
-    @property
-    def findings(self) -> tuple[Finding, ...]:
-        """What was found on the way."""
-
-    @property
-    def rough(self) -> bool:
-        """Whether robots disagree."""
-
-    def clock_errors(self, log: TeamLog) -> ClockErrors:
-        """Return what clocks seem to be off by in single recordings."""
-
-    def off(self, log: TeamLog) -> list[Array]:
-        """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
-
-    def slip(self, log: TeamLog) -> SlipAt | None:
-        """Return the clearest slip."""
-
-    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
-        """Return a slip with time and step by this fit, which was made without what follows it."""
-
-
-F = TypeVar("F", bound=Fitted)
 
 
 def without_changes(
@@ -98,7 +63,7 @@ def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit],
     nobody_bare = not any(rows.any() for rows in bare)
     try:
         return light, fitted(partial(_unseen, rows=light))
-    except (BadValue, CannotAnswer, *BREAKDOWNS):
+    except FAILURES:
         if not nobody_bare:
             return bare, fitted(partial(_unseen, rows=bare))
     best: tuple[Sequence[Mask], F] | None = None
@@ -106,7 +71,7 @@ def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit],
         own = [rows & (np.arange(rows.shape[1]) == robot) for rows in light]
         try:
             team = fitted(partial(_unseen, rows=own))
-        except (BadValue, CannotAnswer, *BREAKDOWNS):
+        except FAILURES:
             continue
         if best is None or np.log(team.fit.noise).sum() < np.log(best[1].fit.noise).sum():
             best = own, team
@@ -139,7 +104,7 @@ def _without_slips(
         before, again = team, edited(edit, [*slips, found])
         try:
             team = fitted(again)
-        except (BadValue, CannotAnswer, *BREAKDOWNS):
+        except FAILURES:
             break
         # Recordings that differ for another reason than a slip still do.
         if before.rough and found.between and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER):

@@ -7,7 +7,7 @@ along directions that err independently of each other: what turns the others' mo
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 
 import numba
@@ -125,6 +125,19 @@ class SlipAt:
             "grasp-slipped",
             f"{what}; from there on its motion is left out and its forces act from where it then was.",
         )
+
+
+def clearest(found: Iterable[SlipAt | None]) -> SlipAt | None:
+    """Return the slip of the highest score, None where there is none."""
+    return max((slip for slip in found if slip is not None), key=lambda slip: slip.slip.score, default=None)
+
+
+def slip_within(
+    number: int, part: Stretch, apart: Array, seen: Mask, noise: Array, drifts: bool = False
+) -> SlipAt | None:
+    """Return the clearest slip of recording `number`, None where there is none; the others as of `find_slip`."""
+    slip = find_slip(apart, seen, part.rate, noise, drifts)
+    return None if slip is None else SlipAt(number, float(part.time[slip.row]), slip)
 
 
 def alone(residual: Array, J: Array, W: Array) -> Array:

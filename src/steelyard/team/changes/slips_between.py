@@ -15,7 +15,7 @@ import numpy as np
 from scipy.special import fdtri
 
 from steelyard.check import Array
-from steelyard.team.changes.slips import WINDOW_S, Slip, SlipAt
+from steelyard.team.changes.slips import WINDOW_S, Slip, SlipAt, clearest
 from steelyard.team.stacked import Stretch, row_slices
 
 # How likely noise alone may be taken for a slip, in one log, and the size [m, rad] from which a step counts.
@@ -31,16 +31,13 @@ def slip_between(parts: Sequence[Stretch], apart: Array) -> SlipAt | None:
 
     apart  (T, N, 6) rotation vector and position of each grasp against what the others say, recording after recording
     """
-    best: SlipAt | None = None
-    count = apart.shape[1]
+    found, count = list[SlipAt | None](), apart.shape[1]
     for robot in range(count):
         means, recording = _windows(parts, apart[:, robot], robot)
         for first in np.unique(recording)[1:]:
-            chance = CHANCE / (count * (len(parts) - 1))
-            slip = _step(means, recording, int(first), robot, chance)
-            if slip is not None and (best is None or slip.score > best.slip.score):
-                best = SlipAt(int(first), -np.inf, slip)
-    return best
+            slip = _step(means, recording, int(first), robot, CHANCE / (count * (len(parts) - 1)))
+            found.append(None if slip is None else SlipAt(int(first), -np.inf, slip))
+    return clearest(found)
 
 
 def step_between(found: SlipAt, parts: Sequence[Stretch], apart: Array) -> SlipAt:

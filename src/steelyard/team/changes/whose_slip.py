@@ -11,8 +11,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import FAILURES
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.estimate import TeamEstimate
 
@@ -35,7 +34,7 @@ def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEst
     for number in range(_slips(found)):
         try:
             turned = answer((*chosen, True))
-        except (BadValue, CannotAnswer, *BREAKDOWNS):
+        except FAILURES:
             chosen = (*chosen, False)
             continue
         better = _misfit(found) / max(_misfit(turned), np.finfo(float).tiny)

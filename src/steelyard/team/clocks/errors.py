@@ -126,10 +126,7 @@ def _of_reference(reference: str, recording: TeamRecording, errors: Errors) -> E
 
 def punctual(recording: TeamRecording, errors: Errors) -> TeamRecording:
     """Return the recording with stamps put right."""
-    if not any(name in recording.tracks for name in errors):
-        return recording
-    tracks = {n: t.stamped(errors[n].right(t.time)) if n in errors else t for n, t in recording.tracks.items()}
-    return replace(recording, tracks=tracks)
+    return recording.changed(lambda track, error: track.stamped(error.right(track.time)), errors)
 
 
 def _moving(log: TeamLog) -> list[int]:

@@ -7,15 +7,13 @@ the shift at which their robots turn alike. A fit starts anew from there, and is
 from __future__ import annotations
 
 from collections.abc import Callable
-from typing import Any, Protocol, TypeVar
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS, Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import FAILURES, Array
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
-from steelyard.team.clocks.unsteady import Steady
+from steelyard.team.motion_fit import F
 from steelyard.team.turning_speed import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps of STEP_S.
@@ -28,21 +26,6 @@ ALIKE, MORE = 0.7, 0.1
 BETTER = 10.0
 
 
-class Fitted(Steady, Protocol):
-    """A joint fit of poses or of twists."""
-
-    @property
-    def fit(self) -> Any:
-        """The optimum, with its noise (N, 2)."""
-
-    @property
-    def rough(self) -> bool:
-        """Whether robots disagree."""
-
-
-F = TypeVar("F", bound=Fitted)
-
-
 def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog, F, ClockErrors]:
     """Return log, fit, and how late clocks are beside what it finds: as they are, or begun from other clocks."""
     lags = far_lags(log)
@@ -51,7 +34,7 @@ def searched(log: TeamLog, team: F, of: Callable[[TeamLog], F]) -> tuple[TeamLog
     try:
         moved = lags.corrected(log)
         again = of(moved)
-    except (BadValue, CannotAnswer, *BREAKDOWNS):
+    except FAILURES:
         return log, team, NOTHING
     if float(np.log(team.fit.noise / again.fit.noise).sum()) < np.log(BETTER):
         return log, team, NOTHING

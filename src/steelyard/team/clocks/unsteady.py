@@ -8,20 +8,19 @@ Source: own.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS, Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import FAILURES, Array
 from steelyard.logs.log import Integers, Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.clocks.jumps import LEAST_S as PART_S
 from steelyard.team.clocks.jumps import MOST, cut_at_step
 from steelyard.team.clocks.steps import Best, Step, clearest
+from steelyard.team.motion_fit import F
 from steelyard.team.scores import Scores
 
 # Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
@@ -49,21 +48,6 @@ class Left:
     slope: Array
 
 
-class Steady(Protocol):
-    """A joint fit that says what its clocks are off by, recording by recording."""
-
-    @property
-    def clocks_left(self) -> ClockErrors:
-        """What clocks seem to be off by beside one offset per robot, noise and all."""
-
-    @property
-    def late(self) -> Mapping[str, float]:
-        """How late each clock is [s], in all recordings alike."""
-
-
-F = TypeVar("F", bound=Steady)
-
-
 def steadied(
     log: TeamLog, team: F, of: Callable[[TeamLog], F], errors: ClockErrors = NOTHING
 ) -> tuple[TeamLog, F, ClockErrors]:
@@ -79,7 +63,7 @@ def steadied(
         try:
             cut, before = cut_at_step(log, errors, step, team.late)
             team = of(cut)
-        except (BadValue, CannotAnswer, *BREAKDOWNS):
+        except FAILURES:
             break
         log, errors = cut, before
     for _ in range(ROUNDS):
@@ -90,7 +74,7 @@ def steadied(
         try:
             moved = wrong.corrected(log)
             team = of(moved)
-        except (BadValue, CannotAnswer, *BREAKDOWNS):
+        except FAILURES:
             break
         log, errors = moved, errors + wrong
     of_reference = errors.of_reference(log) if errors else NOTHING

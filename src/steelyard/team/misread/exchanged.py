@@ -11,8 +11,8 @@ from itertools import combinations
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS, Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import FAILURES, Array
+from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.poses.fit import ROUGHLY, fit_poses
@@ -78,5 +78,5 @@ def _noise(parts: tuple[Stretch, ...], names: tuple[str, ...], reference: int) -
     data = TeamMotion(*all_poses(parts))
     try:
         return fit_poses(data, first_team(data, reference, names), reference, close=ROUGHLY).noise
-    except (CannotAnswer, BadValue, *BREAKDOWNS):
+    except FAILURES:
         return None

@@ -12,8 +12,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS, Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import FAILURES, Array
+from steelyard.errors import BadValue
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
@@ -234,7 +234,7 @@ class _Judge:
         size = _size(data)
         try:
             noise = self._noise(data, exact)
-        except (CannotAnswer, BadValue, *BREAKDOWNS):
+        except FAILURES:
             noise = np.full_like(size, np.nan)
         fits = bool(np.isfinite(noise).all())
         return _Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)

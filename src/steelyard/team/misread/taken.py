@@ -32,13 +32,7 @@ def maps_of(names: Sequence[str], D: Array, taken: Array, reading: tuple[int, Ar
 
 def as_taken(log: TeamLog, maps: Mapping[str, Array]) -> TeamLog:
     """Return the log with wrenches as they were taken."""
-    if not maps:
-        return log
-    made = [
-        replace(r, tracks={n: _mapped(t, maps[n]) if n in maps else t for n, t in r.tracks.items()})
-        for r in log.recordings
-    ]
-    return log.with_recordings(*made)
+    return log.with_recordings(*(r.changed(_mapped, maps) for r in log.recordings))
 
 
 def in_few_words(taken: Array) -> str:

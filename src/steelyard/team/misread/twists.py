@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS
-from steelyard.errors import BadValue, CannotAnswer
-from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.check import FAILURES
+from steelyard.errors import BadValue
+from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.team.twists.team import TwistTeam
 
@@ -42,19 +42,14 @@ def _tried(log: TeamLog) -> Iterator[tuple[float, float, str, str]]:
         for unit, size in UNITS.items():
             try:
                 share = TwistTeam.of(
-                    log.with_recordings(*(_scaled(r, name, size) for r in log.recordings)), False
+                    log.with_recordings(*(r.changed(_times, {name: size}) for r in log.recordings)), False
                 ).share
-            except (CannotAnswer, BadValue, *BREAKDOWNS):
+            except FAILURES:
                 continue
             yield float(np.sqrt((share**2).mean())), float(share.max()), name, unit
 
 
-def _scaled(recording: TeamRecording, name: str, size: float) -> TeamRecording:
-    track = recording.tracks.get(name)
-    if track is None or not track.has("linear_velocity"):
-        return recording
-    return replace(recording, tracks={**recording.tracks, name: _times(track, size)})
-
-
 def _times(track: Track, size: float) -> Track:
+    if not track.has("linear_velocity"):
+        return track
     return replace(track, channels={**track.channels, "linear_velocity": size * track.channels["linear_velocity"]})

@@ -10,15 +10,15 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.changes.found import Edit, without_changes
-from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
+from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
 from steelyard.team.changes.slips_between import slip_between, step_between
-from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.motion_fit import MotionFit
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.poses import rows as pose_rows
 from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
@@ -52,17 +52,11 @@ STILL_TURNS = 0.9
 
 
 @dataclass(frozen=True, eq=False)
-class PoseTeam:
-    """Recordings with their clocks right, the joint fit of poses, and how late each clock is [s]: zero on average.
-
-    clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
-    """
+class PoseTeam(MotionFit):
+    """The joint fit of poses; how late clocks are is zero on average."""
 
     parts: tuple[Stretch, ...]
     fit: PoseFit
-    late: Mapping[str, float]
-    findings: tuple[Finding, ...] = ()
-    clocks_left: ClockErrors = NOTHING
 
     @classmethod
     def of(cls, log: TeamLog, clocks: bool, other: Sequence[bool] = ()) -> PoseTeam:
@@ -112,20 +106,17 @@ class PoseTeam:
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        left = []
-        for part, rows in zip(self.parts, row_slices(self.parts), strict=True):
-            left.append(Left(part.time, part.seen, self.fit.rows.residual[rows], self.fit.rows.data.twists[rows]))
-        return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
+        apart, slope = self.fit.rows.residual, self.fit.rows.data.twists
+        each = zip(self.parts, row_slices(self.parts), strict=True)
+        left = tuple(Left(part.time, part.seen, apart[rows], slope[rows]) for part, rows in each)
+        return clock_errors(log, left, self.fit.J, self.fit.W)
 
     def slip(self, log: TeamLog) -> SlipAt | None:
         """Return the clearest slip, within a recording or else between two."""
-        best = None
         apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
-        for number, (part, rows) in enumerate(zip(self.parts, row_slices(self.parts), strict=True)):
-            slip = find_slip(apart[rows], part.seen, part.rate, noise)
-            if slip is not None and (best is None or slip.score > best.slip.score):
-                best = SlipAt(number, float(part.time[slip.row]), slip)
-        return best if best is not None else slip_between(self.parts, apart)
+        places = enumerate(zip(self.parts, row_slices(self.parts), strict=True))
+        within = clearest(slip_within(k, part, apart[rows], part.seen, noise) for k, (part, rows) in places)
+        return slip_between(self.parts, apart) if within is None else within
 
     def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""

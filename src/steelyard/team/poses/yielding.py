@@ -15,8 +15,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import BREAKDOWNS, Array
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.check import FAILURES, Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Integers
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -55,12 +54,10 @@ class Yields:
 
         Where a wrench is not known, poses are off by the mean one, and left out where other recordings in motion do.
         """
-        by_name = {name: (self.size[i], self.mean[i]) for i, name in enumerate(log.names) if self.size[i].any()}
-        enough = any(r.kind != "still" and all(_felt(r, name) for name in by_name) for r in log.recordings)
-        return log.with_recordings(*(
-            replace(r, tracks={n: _stiff(t, *by_name[n], enough) if n in by_name else t for n, t in r.tracks.items()})
-            for r in log.recordings
-        ))  # fmt: skip
+        yielding = [i for i in range(len(log.names)) if self.size[i].any()]
+        enough = any(r.kind != "still" and all(_felt(r, log.names[i]) for i in yielding) for r in log.recordings)
+        by_name = {log.names[i]: (self.size[i], self.mean[i], enough) for i in yielding}
+        return log.with_recordings(*(r.changed(_stiff, by_name) for r in log.recordings))
 
     def widened(self, spread: Spread, grasps: Pose, reference: int) -> Spread:
         """Return the spread of the grasps (N,) with what is open of how far the mean load moves them."""
@@ -109,7 +106,7 @@ def stiffened(log: TeamLog, team: PoseTeam, of: Callable[[TeamLog], PoseTeam]) -
         corrected = found.corrected(log)
         try:
             known, stiff, fit = found, corrected, of(corrected)
-        except (BadValue, CannotAnswer, *BREAKDOWNS):
+        except FAILURES:
             break
     # A payload that is not rigid, or poses that are misread, may go with what robots push, too.
     if team.rough and float(np.log(team.fit.noise / fit.fit.noise).mean()) < np.log(BETTER):
@@ -218,11 +215,12 @@ def _felt(recording: TeamRecording, name: str) -> bool:
     return name in recording.tracks and recording.tracks[name].has("force")
 
 
-def _stiff(track: Track, size: Array, mean: Array, enough: bool) -> Track:
+def _stiff(track: Track, by: tuple[Array, Array, bool]) -> Track:
     """Return the track with poses of the grasp as it is without a load, and wrenches there.
 
-    enough  whether poses without a wrench are to be left out
+    by  how far it yields (6,), the mean wrench (6,), and whether poses without a wrench are to be left out
     """
+    size, mean, enough = by
     felt = track.mask("force")
     off = size * (np.where(felt[:, None], track.wrench(), mean) if felt.any() else mean[None].repeat(len(track), 0))
     turn, channels, valid = Rotation.exp(off[:, :3]), dict(track.channels), dict(track.valid)

@@ -16,7 +16,7 @@ from scipy.special import gammainccinv
 from steelyard.check import BREAKDOWNS, Array
 from steelyard.errors import CannotAnswer
 from steelyard.team.adjoint import adjoint_inverse, log
-from steelyard.team.changes.slips import Slip, SlipAt
+from steelyard.team.changes.slips import Slip, SlipAt, clearest
 from steelyard.team.changes.slips_between import CHANCE, as_large_as_slips
 from steelyard.team.twists.fit import TwistFit
 from steelyard.team.twists.rows import TwistStretch
@@ -33,7 +33,7 @@ def slip_between(
     fitted  makes the joint fit of some recordings
     """
     moving = [number for number, part in enumerate(parts) if part.rows.kind != "still"]
-    best: SlipAt | None = None
+    slips = list[SlipAt | None]()
     for last, first in pairwise(moving):
         sides = [[parts[k] for k in moving if (k < first) == before] for before in (True, False)]
         try:
@@ -41,9 +41,8 @@ def slip_between(
         except (CannotAnswer, *BREAKDOWNS):
             continue
         found = _step(before, after, reference, CHANCE / (parts[0].seen.shape[1] * (len(moving) - 1)))
-        if found is not None and (best is None or found[0].score > best.slip.score):
-            best = SlipAt(first, -np.inf, *found, since=last)
-    return best
+        slips.append(None if found is None else SlipAt(first, -np.inf, *found, since=last))
+    return clearest(slips)
 
 
 def _step(before: TwistFit, after: TwistFit, reference: int, chance: float) -> tuple[Slip, Array] | None:

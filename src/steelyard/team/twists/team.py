@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -10,15 +10,15 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.changes.found import Edit, without_changes
-from steelyard.team.changes.slips import SlipAt, alone, find_slip, noise_alone
-from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
+from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.motion_fit import MotionFit
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
 from steelyard.team.split import Split, smoothed, split_of
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
@@ -37,18 +37,11 @@ LOUD = 0.1
 
 
 @dataclass(frozen=True, eq=False)
-class TwistTeam:
-    """Recordings with their clocks right, the joint fit of twists, and how late each clock is [s].
-
-    clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
-    reference    number of the robot in whose grasp the answer is given
-    """
+class TwistTeam(MotionFit):
+    """The joint fit of twists; `reference` is the number of the robot in whose grasp the answer is given."""
 
     parts: tuple[TwistStretch, ...]
     fit: TwistFit
-    late: Mapping[str, float]
-    findings: tuple[Finding, ...] = ()
-    clocks_left: ClockErrors = NOTHING
     reference: int = 0
 
     @classmethod
@@ -95,16 +88,13 @@ class TwistTeam:
         """Return the clearest slip, within a recording or else between two; none where a hinge is the cause."""
         if self.split is not None and self.split.sure:
             return None
-        J, W, best = self.fit.J, self.fit.W, None
-        noise = noise_alone(J, W)
-        for number, part in enumerate(self.parts):
-            apart = np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate
-            slip = find_slip(apart, part.seen, part.rows.rate, noise, drifts=True)
-            if slip is not None and (best is None or slip.score > best.slip.score):
-                best = SlipAt(number, float(part.rows.time[slip.row]), slip)
-        if best is not None:
-            return best
-        return slip_between(self.parts, log.names.index(log.reference), lambda parts: _joint_fit(parts, log))
+        J, W = self.fit.J, self.fit.W
+        every = (np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate for part in self.parts)
+        each, noise = enumerate(zip(self.parts, every, strict=True)), noise_alone(J, W)
+        within = clearest(slip_within(k, p.rows, apart, p.seen, noise, drifts=True) for k, (p, apart) in each)
+        if within is not None:
+            return within
+        return slip_between(self.parts, self.reference, lambda parts: _joint_fit(parts, log))
 
     def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
         """Return the slip with its time and step renewed against the others' motion."""

@@ -1,0 +1,53 @@
+"""MotionFit: the joint fit of what moves, of poses where bases stand or of twists where they move."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, TypeVar
+
+from steelyard.check import Array
+from steelyard.findings import Finding
+from steelyard.logs.team_log import TeamLog
+from steelyard.team.changes.slips import SlipAt
+from steelyard.team.clocks.errors import NOTHING, ClockErrors
+
+
+@dataclass(frozen=True, eq=False)
+class MotionFit(ABC):
+    """Recordings with their clocks right, the optimum, with its noise (N, 2), and how late each clock is [s].
+
+    findings     what was found on the way
+    clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
+    """
+
+    parts: tuple[Any, ...]
+    fit: Any
+    late: Mapping[str, float]
+    findings: tuple[Finding, ...] = ()
+    clocks_left: ClockErrors = NOTHING
+
+    @property
+    @abstractmethod
+    def rough(self) -> bool:
+        """Whether robots disagree by a good part of what the payload moves, as they do where it is not rigid."""
+
+    @abstractmethod
+    def clock_errors(self, log: TeamLog) -> ClockErrors:
+        """Return what clocks seem to be off by in single recordings."""
+
+    @abstractmethod
+    def off(self, log: TeamLog) -> list[Array]:
+        """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
+
+    @abstractmethod
+    def slip(self, log: TeamLog) -> SlipAt | None:
+        """Return the clearest slip, within a recording or else between two."""
+
+    @abstractmethod
+    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
+        """Return a slip with time and step by this fit, which was made without what follows it."""
+
+
+F = TypeVar("F", bound=MotionFit)
