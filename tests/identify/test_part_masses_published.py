@@ -7,7 +7,7 @@ import pytest
 
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.evaluate import riemannian
-from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior, uniform_body
+from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior
 from steelyard.identify.part_masses_published import PublishedPartMasses
 from steelyard.identify.point_masses import PointMasses
 from steelyard.inertia import InertialParameters, solids
@@ -109,12 +109,12 @@ def test_point_masses_need_a_shape():
 
 def test_geo_with_the_shape_is_nearly_exact_for_one_density():
     parts = boxes(4)
-    body = uniform_body(parts, 1.1)
+    body = parts.uniform(1.1)
     log = handling_log(body, "paper", "high")
     for mass, weighted in ((None, False), (1.1, False), (None, True)):
-        found = ShapeGeodesic(uniform_body(parts), mass, weighted=weighted).identify(log)
+        found = ShapeGeodesic(parts.uniform(), mass, weighted=weighted).identify(log)
         assert riemannian(found.parameters, body) < 0.25
-    assert uniform_body(parts, 1.1).mass == pytest.approx(1.1)
+    assert parts.uniform(1.1).mass == pytest.approx(1.1)
 
 
 def test_published_prior_has_the_parallel_axis_term_twice():

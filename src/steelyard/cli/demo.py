@@ -129,7 +129,7 @@ def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, 
     GEO knows no bias: it gets the rows tared by what OLS found, and one density over the scanned shape.
     """
     from steelyard import api
-    from steelyard.identify.geodesic_shape import ShapeGeodesic, uniform_body
+    from steelyard.identify.geodesic_shape import ShapeGeodesic
     from steelyard.identify.least_squares import LeastSquares
 
     ordinary = LeastSquares("ordinary").identify(rows)
@@ -138,7 +138,7 @@ def _answers(log: Path, shape: Shape, rows: MotionLog, X_SW: Pose) -> dict[str, 
         "with the scan": api.identify(log, scan=shape),
         "without the scan": api.identify(log),
         "OLS": ordinary,
-        "GEO, uniform shape": ShapeGeodesic(uniform_body(shape.parts.in_frame(X_SW))).identify(tared),
+        "GEO, uniform shape": ShapeGeodesic(shape.parts.in_frame(X_SW).uniform()).identify(tared),
     }
 
 

@@ -18,14 +18,13 @@ from steelyard.identify.geodesic import Geodesic
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters, forms
-from steelyard.parts.parts import Parts
 
 
 @dataclass(frozen=True, eq=False)
 class ShapeGeodesic(Estimator):
     """Options of GEO with the object's shape as prior; the sensor is taken to be tared.
 
-    shape     the prior in S up to its mass: `uniform_body` of the parts, or `published_prior`
+    shape     the prior in S up to its mass: `uniform` of the parts, or `published_prior`
     mass      the mass of the prior [kg]; None = what least squares finds
     alpha     strength, see `Geodesic`
     weighted  rows weighted by the wrench noise; as published N and N m count alike, and the pull is then far weaker
@@ -49,11 +48,6 @@ class ShapeGeodesic(Estimator):
             )
         prior = InertialParameters(self.shape.vector * (mass / self.shape.mass))
         return Geodesic(prior, alpha=self.alpha, bias="none")._fit(problem)
-
-
-def uniform_body(parts: Parts, mass: float = 1.0) -> InertialParameters:
-    """Return the body of one density with the shape of `parts` and the given mass [kg], in their frame."""
-    return parts.whole(parts.volume * (mass / parts.volume.sum()))
 
 
 def published_prior(points: ArrayLike, mass: float = 1.0) -> InertialParameters:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
+from steelyard.logs.recording import Stream
 
 # A channel is clipped when its extreme value comes up this often and at least five times as often as its neighbours.
 CLIPPED_ROWS, CLIPPED_SHARE, CLIPPED_RATIO = 10, 0.003, 5
@@ -39,6 +40,13 @@ def clipped_rows(column: Array, extreme: float, begins: Integers = ONE_PIECE) ->
     quantum = float(steps[steps > 0].min())
     # A coarse channel at rest creeps into its plateau by one quantum; a clipped one runs into its stop.
     return at if enters.any() and float(np.median(steps[enters])) > 3 * quantum else none
+
+
+def left_out(stream: Stream, rows: Mask) -> tuple[Stream, str]:
+    """Return the stream without `rows` (N,), or all of it where they are too many, and what was done in words."""
+    if rows.mean() > MOST_LEFT_OUT:
+        return stream, TOO_MANY
+    return stream.rows(~rows) if rows.any() else stream, LEFT_OUT
 
 
 def with_neighbours(rows: Mask) -> Mask:

@@ -18,7 +18,7 @@ import numpy as np
 from steelyard.check import Array, Integers
 from steelyard.logs.delays import Question, features
 from steelyard.logs.kinematics import Delays
-from steelyard.logs.noise import robust_std
+from steelyard.logs.noise import FAR, block_sums, huber, robust_std
 
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
 # one delay leaves.
@@ -33,7 +33,6 @@ _STEPS = 4
 _LATE = 0.1
 _STEP = 1e-3  # [s] for differences
 _SETTLED = 0.5  # standard deviations
-_FAR = 2.0  # standard deviations from which on a row counts less
 
 
 @dataclass(frozen=True)
@@ -118,11 +117,6 @@ class Linear:
         return np.asarray((early - late) / (2 * _STEP))
 
 
-def weights(scaled: Array) -> Array:
-    """Return how much (N,) each row of a residual (N, C) over its spread counts."""
-    return np.asarray(np.minimum(1.0, _FAR / np.maximum(np.sqrt((scaled**2).mean(1)), 1e-12)))
-
-
 def settled(question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]) -> dict[str, Clock]:
     """Return the clocks after Gauss-Newton steps from `found`, softly held at `start`."""
     clocks = dict(found)
@@ -157,14 +151,13 @@ def _step(
         slopes += [slope, fit.unexplained(slope * clock.course(question.time)[:, None])]
     A = np.stack(slopes, -1) / fit.spread[:, None]
     r = fit.residual / fit.spread
-    weighted = A * weights(r)[:, None, None]
+    weighted = A * huber(r)[:, None, None]
     known = np.ravel([[1 / _LATE**2, 1 / clock.WIDTH**2] for clock in clocks.values()])
     off = np.ravel([[c.late - start[n].late, c.more - start[n].more] for n, c in clocks.items()])
     H = np.einsum("nck,ncl->kl", weighted, A) + np.diag(known)
     step = np.linalg.solve(H, np.einsum("nck,nc->k", weighted, r) - known * off)
     scores = np.einsum("nck,nc->nk", weighted, r - A @ step)
-    block = np.minimum(np.arange(len(r)) * _BLOCKS // len(r), _BLOCKS - 1)
-    sums = np.stack([np.bincount(block, column, _BLOCKS) for column in scores.T], 1)
+    sums = block_sums(scores, _BLOCKS)
     back = np.linalg.inv(H)
     covariance = back @ (sums.T @ sums * _BLOCKS / (_BLOCKS - 1) + np.diag(known)) @ back
     return step.reshape(-1, 2), np.sqrt(np.diag(covariance)).reshape(-1, 2)
@@ -174,5 +167,5 @@ def share_left(question: Question, before: Mapping[str, ClockCourse], after: Map
     """Return what clocks leave of the wrench beside what those before leave (squares); rows far off count as far."""
     fit = Linear.of(question, after)
     rivals = Linear.of(question, before).residual / fit.spread, fit.residual / fit.spread
-    sizes = [np.minimum((r**2).mean(1), _FAR**2).mean() for r in rivals]
+    sizes = [np.minimum((r**2).mean(1), FAR**2).mean() for r in rivals]
     return float(sizes[1] / sizes[0])

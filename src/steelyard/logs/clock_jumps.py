@@ -27,10 +27,10 @@ from steelyard.logs.clock_fit import (
     seen,
     settled,
     share_left,
-    weights,
 )
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Question
+from steelyard.logs.noise import huber
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import picked
 
@@ -83,7 +83,7 @@ def _worth_a_search(question: Question, start: Mapping[str, ClockJump]) -> bool:
     """Tell whether rows seem late by two amounts, or by more than noise makes of it."""
     fit = Linear.of(question, start)
     r = fit.residual / fit.spread
-    counts = weights(r)
+    counts = huber(r)
     for name in start:
         slope = fit.unexplained(fit.slope(question, start, name)) / fit.spread
         told = np.einsum("n,nc,nc->n", counts, slope, slope)

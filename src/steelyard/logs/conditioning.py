@@ -69,9 +69,9 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
     return np.asarray(sosfiltfilt(_butterworth(order, cutoff_hz / rate_hz), values, axis=0, padlen=pad))
 
 
-def lowpass_gain(frequency: Array, cutoff_hz: float, order: int = 4) -> Array:
-    """Return the share (K,) of an amplitude that `lowpass` leaves at frequencies (K,) [Hz]."""
-    return np.asarray(1 / (1 + (frequency / cutoff_hz) ** (2 * order)))
+def lowpass_gain(frequency: Array, cutoff_hz: float) -> Array:
+    """Return the share (K,) of an amplitude that a fourth-order `lowpass` leaves at frequencies (K,) [Hz]."""
+    return np.asarray(1 / (1 + (frequency / cutoff_hz) ** 8))
 
 
 @lru_cache(maxsize=64)

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.log import MotionLog
-from steelyard.logs.noise import robust_std
+from steelyard.logs.noise import block_sums, huber, robust_std
 from steelyard.spatial import Rotation, lever_acceleration
 
 _BLOCKS = 20
@@ -280,8 +280,8 @@ def _weights(residual: Array, sigma: Array, power: int) -> Array:
     scaled = residual / sigma
     out = np.empty_like(residual)
     for part in (slice(0, 6), slice(6, None)):
-        size = np.sqrt((scaled[:, part] ** 2).mean(1)) if scaled[:, part].size else np.zeros(len(scaled))
-        out[:, part] = (np.minimum(1.0, 2.0 / np.maximum(size, 1e-12)) ** power)[:, None] / sigma[part] ** 2
+        if out[:, part].size:
+            out[:, part] = (huber(scaled[:, part]) ** power)[:, None] / sigma[part] ** 2
     return out
 
 
@@ -290,8 +290,7 @@ def _block_std(question: Question, layout: _Layout, theta: Array, weights: Array
     r, J = _jacobian(question, layout, theta)
     prior = np.diag(1 / layout.width**2)
     H, scores = _normal(J, weights, r, 1 / layout.width**2)
-    block = np.minimum((np.arange(len(r)) * _BLOCKS) // max(len(r), 1), _BLOCKS - 1)
-    sums = np.stack([np.bincount(block, s, _BLOCKS) for s in scores.T], 1)
+    sums = block_sums(scores, _BLOCKS)
     back = np.linalg.inv(H)
     cov = back @ (sums.T @ sums) @ back * _BLOCKS / (_BLOCKS - 1) + back @ prior @ back
     return np.sqrt(np.maximum(np.diag(cov), 0))

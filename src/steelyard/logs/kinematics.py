@@ -3,7 +3,7 @@ are."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -18,6 +18,12 @@ from steelyard.spatial import Rotation, lever_acceleration
 
 # How late each stream's stamps are [s]: throughout, or at each of the times asked for.
 Delays = Mapping[str, float | Array]
+# What is used; velocities are smoothed where the accelerations beside them are not given.
+_QUANTITIES = (
+    "rotation", "angular_acceleration", "linear_acceleration", "gravity", "position", "angular_velocity",
+    "linear_velocity",
+)  # fmt: skip
+_BETTER = {"angular_velocity": "angular_acceleration", "linear_velocity": "linear_acceleration"}
 _UNKNOWN_LEVER = 0.5  # [m] how far from a turning axis S may be when nothing measures its acceleration
 
 
@@ -203,24 +209,11 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
     for stream in streams:
         for quantity, values in stream.channels.items():
             found.setdefault(quantity, (stream, values))
-    makers: dict[str, Callable[[Stream, Array], Channel]] = {
-        "rotation": lambda s, v: _rotation_channel(s, v, cutoff_hz),
-        "angular_acceleration": lambda s, v: _plain_channel(s, v, "angular_acceleration", cutoff_hz),
-        "linear_acceleration": lambda s, v: _plain_channel(s, v, "linear_acceleration", cutoff_hz),
-        "gravity": lambda s, v: _plain_channel(s, v, "gravity", cutoff_hz),
-        # Beside a given acceleration a position still tells the velocity, and with it what is at rest.
-        "position": lambda s, v: _smooth_channel(s, v, "position", cutoff_hz),
-    }
-    for quantity, better in (("angular_velocity", "angular_acceleration"), ("linear_velocity", "linear_acceleration")):
-        known = better in found
-        makers[quantity] = (
-            (lambda s, v, q=quantity: _plain_channel(s, v, q, cutoff_hz))  # type: ignore[misc]
-            if known
-            else (lambda s, v, q=quantity: _smooth_channel(s, v, q, cutoff_hz))  # type: ignore[misc]
-        )
-    channels = {q: makers[q](*found[q]) for q in makers if q in found}
+    # Beside a given acceleration a position still tells the velocity, and with it what is at rest.
+    smoothed = {"position", *(velocity for velocity, better in _BETTER.items() if better not in found)}
+    channels = {q: _channel(*found[q], q, q in smoothed, cutoff_hz) for q in _QUANTITIES if q in found}
     for quantity, channel in channels.items():
-        if channel.world and "rotation" not in channels and quantity not in ("position",):
+        if channel.world and "rotation" not in channels and quantity != "position":
             raise BadDescription(
                 f"{quantity} of '{channel.stream}' is given in W, but no stream gives the rotation of S in W."
             )
@@ -240,24 +233,17 @@ def _ends(curve: Signal | Smooth | SmoothRotation, start: float, end: float) -> 
     return float(smoothed.time[0]), float(smoothed.time[-1])
 
 
-def _rotation_channel(stream: Stream, values: Array, cutoff_hz: float | None) -> Channel:
-    return Channel(stream.name, smooth_rotations(stamps_of(stream), Rotation.nearest(values), cutoff_hz), False)
-
-
-def _plain_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
-    curve = signal(stamps_of(stream), values, cutoff_hz)
+def _channel(stream: Stream, values: Array, quantity: str, smoothed: bool, cutoff_hz: float | None) -> Channel:
+    """Return one quantity of a timed stream as a curve, smoothed or low-passed alone."""
+    time = stamps_of(stream)
+    if quantity == "rotation":
+        return Channel(stream.name, smooth_rotations(time, Rotation.nearest(values), cutoff_hz), False)
+    world = quantity == "position" or stream.frames.get(quantity, "S") == "W"
+    if smoothed:
+        return Channel(stream.name, smooth(time, values, cutoff_hz=cutoff_hz), world)
+    curve = signal(time, values, cutoff_hz)
     share = min(1.0, 2 * cutoff_hz / curve.rate) if cutoff_hz is not None else 1.0
-    variance = float((noise_std(values) ** 2).mean()) * share
-    return Channel(stream.name, curve, _world(stream, quantity), variance)
-
-
-def _smooth_channel(stream: Stream, values: Array, quantity: str, cutoff_hz: float | None) -> Channel:
-    curve = smooth(stamps_of(stream), values, cutoff_hz=cutoff_hz)
-    return Channel(stream.name, curve, _world(stream, quantity))
-
-
-def _world(stream: Stream, quantity: str) -> bool:
-    return quantity == "position" or stream.frames.get(quantity, "S") == "W"
+    return Channel(stream.name, curve, world, float((noise_std(values) ** 2).mean()) * share)
 
 
 def _into_sensor(values: Array, channel: Channel, turn: Rotation | None) -> Array:

@@ -12,6 +12,8 @@ from steelyard.logs.log import Noise
 from steelyard.spatial import cross_matrix
 
 _FEWEST_ROWS = 30
+# Standard deviations from which on a row counts less.
+FAR = 2.0
 # Finer steps than this are never the largest error.
 _MOST_DECIMALS = 6
 
@@ -19,6 +21,17 @@ _MOST_DECIMALS = 6
 def robust_std(values: Array) -> Array:
     """Return the standard deviation (k,) of normal values (N, k) about zero, from the median of their sizes."""
     return np.asarray(1.4826 * np.median(np.abs(values), axis=0))
+
+
+def huber(scaled: Array) -> Array:
+    """Return how much (N,) each row of residuals (N, k) over their spread counts: less from an rms of FAR on."""
+    return np.asarray(np.minimum(1.0, FAR / np.maximum(np.sqrt((scaled**2).mean(1)), 1e-12)))
+
+
+def block_sums(scores: Array, blocks: int) -> Array:
+    """Return the sums (blocks, P) of scores (N, P) over as many even stretches of rows."""
+    block = np.minimum(np.arange(len(scores)) * blocks // max(len(scores), 1), blocks - 1)
+    return np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
 
 
 def rounding(wrench: Array) -> Array:

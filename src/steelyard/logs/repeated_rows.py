@@ -8,9 +8,10 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.logs.recording import Stream
-from steelyard.logs.row_values import NOISY, columns_of, run_lengths
-from steelyard.logs.runs import runs
+from steelyard.logs.runs import lasting, runs
 
+# What noise shows in, even at rest.
+NOISY = ("force", "torque", "specific_force")
 # Repeats beyond three times what the quantum of the channels explains, and at least this share of the rows.
 REPEATED_SHARE, CHANCE = 0.02, 3.0
 # A longer run of equal rows is rest or a frozen driver, not a row logged again.
@@ -33,7 +34,7 @@ def repeats(stream: Stream) -> tuple[Mask, int]:
     # A row without numbers repeats one like it only with its stamp: else both may be lost.
     alike = (equal | (np.isnan(values[1:]) & np.isnan(values[:-1]))).all(1)
     stamped = alike & (np.diff(stream.time) == 0)
-    again = repeat & (run_lengths(repeat) <= _longest(repeat)) | stamped
+    again = repeat & ~lasting(repeat, _longest(repeat) + 1) | stamped
     if not _more_than_chance(equal, again, _moving(stream, values)):
         again = stamped
     if int(again.sum()) <= max(10, REPEATED_SHARE * len(stream)) and not _many(stamped):
@@ -51,6 +52,12 @@ def rising(stream: Stream) -> Stream:
     gap = np.minimum(gap, 2 * np.median(gap))
     place = np.arange(len(stream.time)) - np.repeat(first, counts)
     return replace(stream, time=stream.time + np.repeat(gap / counts, counts) * place)
+
+
+def columns_of(stream: Stream) -> Array:
+    """Return all channels side by side (N, K), without those that never change."""
+    values = np.concatenate([v.reshape(len(v), -1) for v in stream.channels.values()], 1)
+    return np.asarray(values[:, (values != values[0]).any(0)])
 
 
 def _moving(stream: Stream, values: Array) -> Mask:

@@ -13,6 +13,13 @@ def runs(mask: Mask) -> Integers:
     return np.asarray(edges.reshape(-1, 2), np.int64)
 
 
+def lasting(mask: Mask, least: float) -> Mask:
+    """Return a mask (N,) without runs of fewer than `least` rows."""
+    lengths, out = np.ptp(runs(mask), axis=1), mask.copy()
+    out[mask] = np.repeat(lengths >= least, lengths)
+    return out
+
+
 def picked(rows: int, most: int) -> Integers:
     """Return the numbers (k,) of at most `most` rows, spread evenly over all from the first to the last."""
     return np.unique(np.linspace(0, rows - 1, min(rows, most)).astype(np.int64))

@@ -88,6 +88,10 @@ class Parts:
         """Return the object whose parts have `masses` (..., P) [kg]."""
         return InertialParameters(np.asarray(masses) @ self.per_mass.T)
 
+    def uniform(self, mass: float = 1.0) -> InertialParameters:
+        """Return the object of `mass` [kg] whose parts have one density."""
+        return self.whole(self.volume * (mass / self.volume.sum()))
+
     def in_frame(self, X_AB: Pose) -> Parts:
         """Return the same parts, given in B, seen from frame A."""
         interior = None if self.interior is None else self.interior.in_frame(X_AB)

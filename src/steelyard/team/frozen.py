@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
 from steelyard.logs.clipping import LEFT_OUT, MOST_LEFT_OUT, TOO_MANY
-from steelyard.logs.row_values import run_lengths
+from steelyard.logs.runs import lasting
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.team.clipped import WRENCH, without_wrench
@@ -51,7 +51,7 @@ def _frozen(track: Track) -> Mask:
     if not same.any():
         return none
     rate = (len(track) - 1) / max(float(track.time[-1] - track.time[0]), 1e-9)
-    long = same & (run_lengths(same) >= max(ROWS, SECONDS * rate))
+    long = lasting(same, max(ROWS, SECONDS * rate))
     if not long.any() or long.all() or same[~long].mean() > ELSEWHERE:
         return none
     return np.asarray(np.concatenate([[False], long]) | np.concatenate([long, [False]]))

@@ -9,7 +9,6 @@ from itertools import pairwise
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
 from steelyard.logs.clock import median_step
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -171,18 +170,3 @@ def row_slices(parts: Sequence[Sized]) -> list[slice]:
 
 def _rate(time: Array) -> float:
     return 1 / median_step(time) if len(time) > 1 else 1.0
-
-
-def all_poses(parts: tuple[Stretch, ...]) -> tuple[Pose, Mask]:
-    """Return the poses (T, N) of all recordings one after the other, and where they were measured.
-
-    Rows that one robot alone saw say nothing of grasps and are kept: the motion is still theirs. Raises CannotAnswer
-    where nobody's poses were measured.
-    """
-    seen = np.concatenate([p.seen for p in parts])
-    if not seen.any():
-        raise CannotAnswer("the joint fit from poses needs the pose of every grasp in its robot's home; there is none.")
-    if len(parts) == 1:
-        return parts[0].poses, seen
-    place = np.concatenate([p.poses.position for p in parts])
-    return Pose(Rotation.joined([p.poses.rotation for p in parts]), place), seen

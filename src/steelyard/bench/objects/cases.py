@@ -14,7 +14,7 @@ from steelyard.bench.objects.cuts import interior_points, slabs
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior, uniform_body
+from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.identify.part_cuts import PartCuts
 from steelyard.identify.part_masses import PartMasses
@@ -209,7 +209,7 @@ def methods_for(case: Case, names: tuple[str, ...]) -> list[Method]:
     estimators: dict[str, Callable[[], PartMasses | PartCuts | ShapeGeodesic | LeastSquares | PointMasses]] = {
         "ours": lambda: _ours(case),
         "ours-still": lambda: _ours(case),
-        "geo": lambda: ShapeGeodesic(uniform_body(case.true_parts)),
+        "geo": lambda: ShapeGeodesic(case.true_parts.uniform()),
         "geo-published-prior": lambda: ShapeGeodesic(published_prior(_inside(case)), float(case.known.truth.mass)),
         "ols": lambda: LeastSquares("ordinary", bias="none"),
         "point-mass": lambda: PointMasses(_inside(case)),

@@ -30,7 +30,6 @@ from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.solver import Solver
 from steelyard.team.poses.statistic import OWN
 from steelyard.team.poses.team import PoseTeam
-from steelyard.team.stacked import all_poses
 
 FIRST_SEED = 9000
 HIGHEST_HZ = 4.0
@@ -41,7 +40,7 @@ SCENE = TeamScene(WHITE, 3, "poses", kinds=("motion",), motion_samples=2000)
 def bound(noise: TeamNoise, exact: TeamTrial) -> dict[str, Array]:
     """Return the least standard deviations by kind for noise that is white, from the noise-free trial."""
     standing = PoseTeam.of(exact.log, False)
-    data = TeamMotion(*all_poses(standing.parts))
+    data = TeamMotion.of(standing.parts)
     team, count = standing.fit.team, len(exact.log.names)
     size = np.tile([noise.pose_rad, noise.pose_m], (count, 1))
     unknown = np.concatenate([OWN * i + np.arange(OWN - 1) for i in range(1, count)])

@@ -116,7 +116,7 @@ def consistent(parts: Parts, body: InertialParameters) -> InertialParameters:
     """Return the body if it is one, else one density of the same mass: the size of a shape error needs a body."""
     if body.validity().consistent:
         return body
-    return parts.whole(parts.volume * (abs(float(body.mass)) / parts.volume.sum()))
+    return parts.uniform(abs(float(body.mass)))
 
 
 def refused(parts: Parts, data: Effective) -> NoMasses:

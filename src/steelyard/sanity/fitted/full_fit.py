@@ -6,6 +6,7 @@ Extra columns (a drift, a tilt of gravity) are judged by how much they explain a
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -82,6 +83,13 @@ class Rows:
 
         drift  whether six more columns let the bias grow with time
         """
+        made = _MADE.setdefault(log, {})
+        if drift not in made:
+            made[drift] = cls._made(log, drift)
+        return made[drift]
+
+    @classmethod
+    def _made(cls, log: MotionLog, drift: bool) -> tuple[Rows, Integers]:
         pick = picked(len(log), _MOST_ROWS)
         thin = log.rows(pick)
         rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
@@ -154,6 +162,10 @@ class Rows:
         time = self.log.time
         run = (time - time.mean()) / max(float(time[-1] - time[0]), _SMALLEST)
         return np.asarray(run[:, None, None] * np.eye(6))
+
+
+# Many rooms ask for the same rows of a log.
+_MADE: WeakKeyDictionary[MotionLog, dict[bool, tuple[Rows, Integers]]] = WeakKeyDictionary()
 
 
 def force_left(log: MotionLog) -> float:

@@ -6,9 +6,8 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, noise_shares, with_neighbours
+from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_shares, with_neighbours
 from steelyard.logs.recording import Recording, Stream
-from steelyard.logs.row_values import left_out
 
 # Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
 SAME_PULL = 1e-6

@@ -6,10 +6,10 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.clipping import NOISE_SHARE, noise_shares
+from steelyard.logs.clipping import NOISE_SHARE, left_out, noise_shares
 from steelyard.logs.recording import Recording, Stream
-from steelyard.logs.row_values import NOISY, columns_of, left_out, run_lengths
-from steelyard.logs.runs import runs
+from steelyard.logs.repeated_rows import NOISY, columns_of
+from steelyard.logs.runs import lasting, runs
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.
@@ -72,8 +72,7 @@ def _hung_rows(stream: Stream) -> Mask:
     if not set(NOISY) & set(stream.channels) or stream.time is None or not values.shape[1]:
         return none
     same = (values[1:] == values[:-1]).all(1)
-    length = run_lengths(same)
-    long = length >= _rows_needed(stream.time)
+    long = lasting(same, _rows_needed(stream.time))
     held = runs(long)
     if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
         return none
@@ -88,8 +87,7 @@ def _hung_rows(stream: Stream) -> Mask:
 def _frozen_rows(column: Array, time: Array) -> Mask:
     """Return rows (N,) of runs of one value that are long, in a channel that moves on everywhere else."""
     same = column[1:] == column[:-1]
-    length = run_lengths(same)
-    long = length >= _rows_needed(time)
+    long = lasting(same, _rows_needed(time))
     if not long.any():
         return np.zeros(len(column), bool)
     elsewhere = same[~long]

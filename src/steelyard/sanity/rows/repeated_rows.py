@@ -8,8 +8,7 @@ import numpy as np
 
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
-from steelyard.logs.repeated_rows import repeats
-from steelyard.logs.row_values import columns_of
+from steelyard.logs.repeated_rows import columns_of, repeats
 
 
 def without_repeats(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:

@@ -16,7 +16,7 @@ from scipy.ndimage import uniform_filter1d
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
-from steelyard.logs.runs import runs
+from steelyard.logs.runs import lasting, runs
 from steelyard.team.stacked import Stretch
 
 # A push below this share of the robot's usual one is idle where it stays so for IDLE_S [s]; forces are averaged over
@@ -43,7 +43,7 @@ def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
     out = []
     for size, part in zip(sizes, parts, strict=True):
         small = (size < share * usual) & part.felt & part.carries
-        out.append(np.stack([_long(small[:, i], IDLE_S * part.rate) for i in range(count)], axis=1))
+        out.append(np.stack([lasting(small[:, i], IDLE_S * part.rate) for i in range(count)], axis=1))
     return out
 
 
@@ -52,15 +52,6 @@ def _smoothed(part: Stretch) -> Array:
     width = max(1, round(MEAN_S * part.rate))
     mean = uniform_filter1d(part.wrench[..., 3:], width, axis=0, mode="nearest")
     return np.asarray(np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2))
-
-
-def _long(rows: Mask, least: float) -> Mask:
-    """Return the runs of rows that last at least so many."""
-    out = np.zeros_like(rows)
-    for start, stop in runs(rows):
-        if stop - start >= least:
-            out[start:stop] = True
-    return out
 
 
 def as_long(values: Any, rows: int) -> Any:
@@ -133,7 +124,7 @@ def presence_findings(before: Sequence[Stretch], after: Sequence[Stretch], names
     for was, now in zip(before, after, strict=True):
         for i, name in enumerate(names):
             gone = was.seen[:, i] & ~now.seen[:, i] & now.carries[:, i] & ~now.felt[:, i]
-            for start, stop in runs(_long(gone, IDLE_S * was.rate)):
+            for start, stop in runs(lasting(gone, IDLE_S * was.rate)):
                 text = _with_gripper(name, was, was.wrench[:, i, 3:], start, stop)
                 out.append(Finding.of("robot-left", text))
             for start, stop in runs(was.carries[:, i] & ~now.carries[:, i]):

@@ -37,7 +37,7 @@ from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.statistic import OWN
 from steelyard.team.poses.team import CLOCK_ROUNDS, FEW_ROWS, PUNCTUAL, mean_gravity
 from steelyard.team.split import Split
-from steelyard.team.stacked import Stretch, all_poses, row_slices, stretches
+from steelyard.team.stacked import Stretch, row_slices, stretches
 
 # Rows that are enough to come near the optimum.
 ROUGH_ROWS = 200
@@ -54,7 +54,7 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
         raise CannotAnswer("what is between the two bodies is no hinge.")
     reference, late = log.names.index(log.reference), dict.fromkeys(log.names, 0.0)
     parts = stretches(log, late)
-    data = TeamMotion(*all_poses(parts))
+    data = TeamMotion.of(parts)
     team = first_hinged(data, split.twist, reference, split.groups[1], split.hinge[:2])
     few, some = (slice(None, None, max(1, len(data.valid) // rows)) for rows in (ROUGH_ROWS, FEW_ROWS))
     team = followed(data, team, GUESS, FOLLOWED)
@@ -68,7 +68,7 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
         if not clocks or np.abs(step).max() < PUNCTUAL:
             break
         before, parts = parts, stretches(log, late)
-        data, team = TeamMotion(*all_poses(parts)), team.rows(_places(before, parts))
+        data, team = TeamMotion.of(parts), team.rows(_places(before, parts))
         fit = replace(fit, team=replace(fit.team, delays=np.zeros(len(step))))
     if fit.lost:
         raise CannotAnswer("the motion does not show where the hinge is and where the robots hold.")

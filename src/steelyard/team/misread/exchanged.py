@@ -11,14 +11,12 @@ from itertools import combinations
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
-from steelyard.team.poses.fit import ROUGHLY, fit_poses
-from steelyard.team.poses.measured import TeamMotion, in_words
-from steelyard.team.poses.start import first_team
-from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.misread.poses import Judge
+from steelyard.team.poses.measured import in_words
+from steelyard.team.stacked import Stretch, stretches
 
 # Rows of a recording that are enough to tell; exchanges that are tried at most.
 ROWS, MOST = 100, 120
@@ -34,22 +32,22 @@ def require_own_files(log: TeamLog) -> None:
     names, reference = log.names, log.names.index(log.reference)
     parts = stretches(log, {})
     few = tuple(part.thinned(ROWS) for part in parts)
-    as_given = _noise(few, names, reference)
-    tried = list(_exchanges(few))
-    if as_given is None or len(tried) > MOST:
+    judge = Judge(names, reference)
+    as_given, tried = judge(few, True), list(_exchanges(few))
+    if not as_given.fits or len(tried) > MOST:
         return
-    best, noise = None, as_given
+    best, noise = None, as_given.noise
     for number, pair in tried:
-        found = _noise((*few[:number], _exchanged(few[number], *pair), *few[number + 1 :]), names, reference)
-        if found is not None and found.prod() < noise.prod():
-            best, noise = (number, pair), found
-    if best is None or float(np.log(as_given / noise).mean()) < np.log(CLOSES):
+        found = judge((*few[:number], _exchanged(few[number], *pair), *few[number + 1 :]), True)
+        if found.fits and found.noise.prod() < noise.prod():
+            best, noise = (number, pair), found.noise
+    if best is None or float(np.log(as_given.noise / noise).mean()) < np.log(CLOSES):
         return
     number, (i, j) = best
     where = " or ".join(f"'{part.name}'" for part in (parts if len(parts) == 2 else parts[number : number + 1]))
     raise BadValue(
         f"the files of '{names[i]}' and '{names[j]}' look exchanged in {where}: with each in the other's place, "
-        f"what robots say of their poses differs by {in_words(noise)}, as given by {in_words(as_given)}. "
+        f"what robots say of their poses differs by {in_words(noise)}, as given by {in_words(as_given.noise)}. "
         'Exchange their "path" there.'
     )
 
@@ -71,12 +69,3 @@ def _exchanged(part: Stretch, i: int, j: int) -> Stretch:
     return replace(
         part, poses=Pose(part.poses.rotation[:, order], part.poses.position[:, order]), seen=part.seen[:, order]
     )
-
-
-def _noise(parts: tuple[Stretch, ...], names: tuple[str, ...], reference: int) -> Array | None:
-    """Return the noise (N, 2) [rad, m] of a rough fit; None where there is none."""
-    data = TeamMotion(*all_poses(parts))
-    try:
-        return fit_poses(data, first_team(data, reference, names), reference, close=ROUGHLY).noise
-    except FAILURES:
-        return None

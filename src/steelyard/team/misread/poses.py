@@ -21,7 +21,7 @@ from steelyard.team.clocks.search import far_lags
 from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
 from steelyard.team.poses.measured import TeamMotion, in_words
 from steelyard.team.poses.start import first_team
-from steelyard.team.stacked import Stretch, all_poses, stretches
+from steelyard.team.stacked import Stretch, stretches
 from steelyard.team.turns import turns_between
 
 # Rows of a recording that are enough to tell; readings that are fitted at most.
@@ -105,7 +105,7 @@ def require_well_read(log: TeamLog) -> None:
         parts = tuple(part.thinned(ROWS) for part in stretches(far_lags(log).corrected(log), {}))
     except BadValue:
         return
-    judge = _Judge(names, reference)
+    judge = Judge(names, reference)
     # A fit may end beside the optimum: then its start is the better of the two.
     given = min((judge(parts, exact) for exact in (True, False)), key=lambda judged: judged.cost)
     turns = judge.turns(parts)
@@ -121,7 +121,7 @@ def require_well_read(log: TeamLog) -> None:
             raise BadValue(_words(best, names, [part.name for part in parts], given))
 
 
-def _best(tried: Sequence[Try], given: _Judged, judge: _Judge) -> list[tuple[Try, _Judged]]:
+def _best(tried: Sequence[Try], given: Judged, judge: Judge) -> list[tuple[Try, Judged]]:
     """Return the readings that make poses fit, best first: several where one is as good as another."""
     first = [judge(one.parts, False) for one in tried]
     order = sorted(range(len(tried)), key=lambda k: first[k].cost)[:MOST]
@@ -133,7 +133,7 @@ def _best(tried: Sequence[Try], given: _Judged, judge: _Judge) -> list[tuple[Try
     return [pair for pair in able if pair[1].cost < able[0][1].cost + np.log(AS_GOOD)]
 
 
-def _suspects(parts: tuple[Stretch, ...], judge: _Judge, given: _Judged) -> list[int]:
+def _suspects(parts: tuple[Stretch, ...], judge: Judge, given: Judged) -> list[int]:
     """Return the robots that may be misread: those without whom the others' poses fit better, or not at all."""
     count = len(judge.names)
     if count < MANY:
@@ -169,7 +169,7 @@ def _of_all(parts: tuple[Stretch, ...], count: int, readings: Sequence[Reading])
 
 
 def _in_one(
-    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading], judge: _Judge, given: _Judged
+    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading], judge: Judge, given: Judged
 ) -> Iterator[Try]:
     """Yield readings of one robot in one recording, where poses fit better without them, or not at all."""
     for k, part in enumerate(parts if len(parts) > 1 else ()):
@@ -199,7 +199,7 @@ def _read(part: Stretch, i: int, reading: Reading) -> Stretch | None:
 
 
 @dataclass(frozen=True, eq=False)
-class _Judged:
+class Judged:
     """Noise (N, 2) [rad, m] of poses, and which share of what each robot turns and moves it is; all if nothing fits."""
 
     noise: Array
@@ -216,37 +216,37 @@ class _Judged:
         """The largest share."""
         return float(self.share.max())
 
-    def beats(self, given: _Judged, factor: float) -> bool:
+    def beats(self, given: Judged, factor: float) -> bool:
         """Whether shares are smaller by a factor: all of them (rms), or the largest, as others are noisy either way."""
         return self.cost < given.cost - np.log(factor) or self.worst < given.worst / factor
 
 
 @dataclass(frozen=True)
-class _Judge:
+class Judge:
     """How well poses fit, for a team of these names."""
 
     names: tuple[str, ...]
     reference: int
 
-    def __call__(self, parts: tuple[Stretch, ...], exact: bool) -> _Judged:
+    def __call__(self, parts: tuple[Stretch, ...], exact: bool) -> Judged:
         """Return the noise of a rough fit, or only of where it would start."""
-        data = TeamMotion(*all_poses(parts))
+        data = TeamMotion.of(parts)
         size = _size(data)
         try:
             noise = self._noise(data, exact)
         except FAILURES:
             noise = np.full_like(size, np.nan)
         fits = bool(np.isfinite(noise).all())
-        return _Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)
+        return Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)
 
-    def without(self, robot: int) -> _Judge:
+    def without(self, robot: int) -> Judge:
         """Return the same for the other robots, whose first is the reference where it was the one left out."""
         reference = 0 if robot == self.reference else self.reference - (robot < self.reference)
-        return _Judge(self.names[:robot] + self.names[robot + 1 :], reference)
+        return Judge(self.names[:robot] + self.names[robot + 1 :], reference)
 
     def turns(self, parts: tuple[Stretch, ...]) -> bool:
         """Return whether the payload turns, so that misread rotations show."""
-        return bool(_size(TeamMotion(*all_poses(parts)))[:, 0].max() > STILL)
+        return bool(_size(TeamMotion.of(parts))[:, 0].max() > STILL)
 
     def _noise(self, data: TeamMotion, exact: bool) -> Array:
         start = first_team(data, self.reference, self.names)
@@ -269,7 +269,7 @@ def _size(data: TeamMotion) -> Array:
     return np.maximum(out, [STILL, 1e-12])
 
 
-def _words(best: list[tuple[Try, _Judged]], names: tuple[str, ...], recordings: Sequence[str], given: _Judged) -> str:
+def _words(best: list[tuple[Try, Judged]], names: tuple[str, ...], recordings: Sequence[str], given: Judged) -> str:
     """Return what is wrong, or may be, and what to do."""
     said = []
     for one, _ in best:

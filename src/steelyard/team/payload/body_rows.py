@@ -7,7 +7,7 @@ comes from positions over a baseline of a metre. Rows are cut into runs without 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -28,8 +28,6 @@ PATH_FILTER = 2.0
 # Cycles of the highest frequency that a run must last, so that rows between bursts of lost ones count, and that are
 # left out at its ends.
 LEAST_CYCLES, END_CYCLES = 4.0, 1.0
-
-
 # Share of the grasps' own axes in those of the balance frame.
 ALIKE = 1e-3
 
@@ -96,20 +94,43 @@ def from_poses(part: Stretch, path: Pose, known: Mask, gravity: Array, highest_h
 
     gravity  (3,) [m/s^2] in H     highest_hz  of the band that is used
     """
-    good, still = part.complete & known, part.kind == "still"
-    pushed = (part.wrench * part.carries[..., None]).reshape(len(part), -1)
-    runs = []
-    for rows in _runs(good, part, still, highest_hz):
+
+    def made(rows: slice) -> tuple[Array, Array]:
         place, turn = path.position[rows], path.rotation[rows]
         room = turn.matrix.reshape(-1, 9)
-        if still:
-            down = turn.inverse().apply(gravity)
-            motion = np.zeros((len(down), 12))
-            motion[:, 3:6] = -down
-            runs.append(Run(motion, pushed[rows], room, rows, part.rate))
-            continue
-        motion = _moving(turn, place, gravity, part.rate, PATH_FILTER * highest_hz)
-        inside = _inside(rows, part.rate, highest_hz)
+        if part.kind == "still":
+            return _resting(-turn.inverse().apply(gravity)), room
+        return _moving(turn, place, gravity, part.rate, PATH_FILTER * highest_hz), room
+
+    return _made(part, known, highest_hz, made)
+
+
+def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, highest_hz: float) -> BodyRows:
+    """Return the rows from twists (T, 6) in B and acceleration less gravity (T, 3) of a robot whose base moves.
+
+    `supported` is NaN where nobody can tell gravity; the derivative of the velocity is added here.
+    """
+
+    def made(rows: slice) -> tuple[Array, Array]:
+        lifted, smooth = supported[rows], twist[rows]
+        if part.kind == "still":
+            return _resting(lifted), unit_vectors(lifted)
+        if PATH_FILTER * highest_hz < 0.45 * part.rate:
+            smooth = lowpass(smooth, PATH_FILTER * highest_hz, part.rate)
+        rise = slope(smooth, part.rate)
+        motion = features(smooth[:, :3], rise[:, :3], classical_acceleration(rise, smooth) + lifted)
+        return motion, unit_vectors(lifted)
+
+    return _made(part, known, highest_hz, made)
+
+
+def _made(part: Stretch, known: Mask, highest_hz: float, made: Callable[[slice], tuple[Array, Array]]) -> BodyRows:
+    """Return the runs of a recording where the payload is `known` (T,), with motion and room `made` of their rows."""
+    still, runs = part.kind == "still", []
+    pushed = (part.wrench * part.carries[..., None]).reshape(len(part), -1)
+    for rows in _runs(part.complete & known, part, still, highest_hz):
+        motion, room = made(rows)
+        inside = rows if still else _inside(rows, part.rate, highest_hz)
         kept = slice(inside.start - rows.start, inside.stop - rows.start)
         runs.append(Run(motion[kept], pushed[inside], room[kept], inside, part.rate))
     return BodyRows(part.name, still, tuple(runs))
@@ -133,6 +154,13 @@ def _inside(rows: slice, rate: float, highest_hz: float) -> slice:
     cut = int(np.ceil(END_CYCLES * rate / highest_hz / PATH_FILTER)) + 4
     length = prev_fast_len(rows.stop - rows.start - 2 * cut, real=True)
     return slice(rows.start + cut, rows.start + cut + length)
+
+
+def _resting(supported: Array) -> Array:
+    """Return the motion (T, 12) at rest of an acceleration less gravity (T, 3)."""
+    out = np.zeros((len(supported), 12))
+    out[:, 3:6] = supported
+    return out
 
 
 def _moving(turn: Rotation, place: Array, gravity: Array, rate: float, cutoff_hz: float) -> Array:
@@ -162,32 +190,6 @@ def features(omega: Array, alpha: Array, supported: Array) -> Array:
     """Return (T, 12) of angular velocity, its derivative and acceleration less gravity (T, 3) each."""
     x, y, z = omega.T
     return np.concatenate([alpha, supported, np.stack([x * x, x * y, x * z, y * y, y * z, z * z], 1)], axis=1)
-
-
-def from_twists(part: Stretch, twist: Array, supported: Array, known: Mask, highest_hz: float) -> BodyRows:
-    """Return the rows from twists (T, 6) in B and acceleration less gravity (T, 3) of a robot whose base moves.
-
-    `supported` is NaN where nobody can tell gravity; the derivative of the velocity is added here.
-    """
-    good, still = part.complete & known, part.kind == "still"
-    pushed = (part.wrench * part.carries[..., None]).reshape(len(part), -1)
-    runs = []
-    for rows in _runs(good, part, still, highest_hz):
-        if still:
-            motion = np.zeros((rows.stop - rows.start, 12))
-            motion[:, 3:6] = supported[rows]
-            runs.append(Run(motion, pushed[rows], unit_vectors(supported[rows]), rows, part.rate))
-            continue
-        smooth = twist[rows]
-        if PATH_FILTER * highest_hz < 0.45 * part.rate:
-            smooth = lowpass(smooth, PATH_FILTER * highest_hz, part.rate)
-        rise = slope(smooth, part.rate)
-        lifted = classical_acceleration(rise, smooth) + supported[rows]
-        motion = features(smooth[:, :3], rise[:, :3], lifted)
-        inside = _inside(rows, part.rate, highest_hz)
-        kept = slice(inside.start - rows.start, inside.stop - rows.start)
-        runs.append(Run(motion[kept], pushed[inside], unit_vectors(supported[inside]), inside, part.rate))
-    return BodyRows(part.name, still, tuple(runs))
 
 
 def require_runs(kinds: Sequence[object]) -> None:

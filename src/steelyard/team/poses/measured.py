@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
@@ -9,9 +10,11 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Integers, Mask
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, Rotation
 from steelyard.team.poses.statistic import scatter
+from steelyard.team.stacked import Stretch
 from steelyard.team.turns import moved
 
 
@@ -35,6 +38,23 @@ class TeamMotion:
         object.__setattr__(self, "valid", np.ascontiguousarray(self.valid))
         if self.twist is not None:
             object.__setattr__(self, "twist", np.ascontiguousarray(self.twist))
+
+    @classmethod
+    def of(cls, parts: Sequence[Stretch]) -> TeamMotion:
+        """Return the poses of all recordings one after the other.
+
+        Rows that one robot alone saw say nothing of grasps and are kept: the motion is still theirs. Raises
+        CannotAnswer where nobody's poses were measured.
+        """
+        seen = np.concatenate([p.seen for p in parts])
+        if not seen.any():
+            raise CannotAnswer(
+                "the joint fit from poses needs the pose of every grasp in its robot's home; there is none."
+            )
+        if len(parts) == 1:
+            return cls(parts[0].poses, seen)
+        place = np.concatenate([p.poses.position for p in parts])
+        return cls(Pose(Rotation.joined([p.poses.rotation for p in parts]), place), seen)
 
     def rows(self, chosen: Any) -> TeamMotion:
         """Return some of the rows."""

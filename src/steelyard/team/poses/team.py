@@ -25,7 +25,7 @@ from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.poses.measured import Team, TeamMotion
 from steelyard.team.poses.rest import shares_at_rest
 from steelyard.team.poses.start import ENOUGH, first_team
-from steelyard.team.stacked import Stretch, all_poses, row_slices, stretches
+from steelyard.team.stacked import Stretch, row_slices, stretches
 from steelyard.team.turns import turns_between, twists_between
 
 # Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
@@ -73,7 +73,7 @@ class PoseTeam(MotionFit):
         reference = log.names.index(log.reference)
         late = dict.fromkeys(log.names, 0.0)
         parts = edit(parts)
-        data = TeamMotion(*all_poses(parts))
+        data = TeamMotion.of(parts)
         start = first_team(data, reference, log.names, _down(log))
         enough = min(FEW_ROWS, max(ENOUGH, FEW_POSES // data.count))
         few = slice(None, None, max(1, len(data.valid) // enough))
@@ -96,7 +96,7 @@ class PoseTeam(MotionFit):
             known = fit.known if step.max() < UNCHANGED else None
             late = _later(late, fit)
             parts = edit(stretches(log, late))
-            data = TeamMotion(*all_poses(parts))
+            data = TeamMotion.of(parts)
         share = shares_at_rest(parts, fit)
         if share is None:
             fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
