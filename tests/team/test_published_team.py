@@ -161,7 +161,7 @@ def test_loop_closure_ends_where_the_slope_is_zero() -> None:
         for i, first in enumerate(log.names):
             for j, second in enumerate(log.names):
                 rows = measured[i] & measured[j]
-                seen = (grasps.between(second, first) @ Twist.from_array(twists[i, rows])).array()
+                seen = (grasps[second].inverse() @ grasps[first] @ Twist.from_array(twists[i, rows])).array()
                 total += float((weight * (twists[j, rows] - seen) ** 2).sum())
         return total
 

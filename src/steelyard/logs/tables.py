@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from dataclasses import replace
 
 import numpy as np
@@ -15,6 +15,9 @@ from steelyard.logs.imu import first_mount
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Rotation
+
+# Quantity -> the first stream that has it, and its values.
+Found = Mapping[str, tuple[Stream, Array]]
 
 
 def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tuple[Finding, ...], str]:
@@ -36,11 +39,11 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     force, torque = found["force"][0], found["torque"][0]
     merged = force if force is torque else Stream(force.name, {**force.channels, "torque": found["torque"][1]})
     wrench = Felt.of(merged, recording.wrench_sign).in_sensor(rotation)
-    gravity = _gravity(recording, rotation, wrench)
+    gravity = _gravity(recording.gravity, found, rotation, wrench)
     dead = np.array(recording.dead)
     if all(s.poses for s in streams):
         return replace(MotionLog.of_poses(wrench, gravity), dead=dead), rotation, (), "none"
-    log = replace(_log_of_rows(recording, wrench, gravity, rotation), dead=dead)
+    log = replace(_log_of_rows(found, wrench, gravity, rotation), dead=dead)
     names = ", ".join(f"'{s.name}'" for s in streams)
     given = [q for q in ("linear_acceleration", "angular_acceleration") if q in found]
     what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"
@@ -48,45 +51,35 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     return log, rotation, (finding,), "linear_acceleration" if "linear_acceleration" in found else "none"
 
 
-def _gravity(recording: Recording, rotation: Rotation | None, wrench: Array) -> Array:
+def _gravity(gravity: Array, found: Found, rotation: Rotation | None, wrench: Array) -> Array:
     """Return gravity in S (N, 3) from the rotation, else the gravity channel, else an accelerometer at
     rest."""
     if rotation is not None:
-        return np.asarray(rotation.inverse().matrix @ recording.gravity)
-    for stream, values in _with("gravity", recording):
-        return _turned(stream, values)
-    for stream, values in _with("specific_force", recording):
+        return np.asarray(rotation.inverse().matrix @ gravity)
+    if "gravity" in found:
+        stream, values = found["gravity"]
+        return values if stream.turn is None else stream.turn.apply(values)
+    if "specific_force" in found:
+        stream, values = found["specific_force"]
         return -(stream.turn or first_mount(values, None, wrench[:, 3:])).apply(values)
     raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
 
 
-def _with(quantity: str, recording: Recording) -> Iterator[tuple[Stream, Array]]:
-    for stream in recording.streams:
-        if quantity in stream.channels:
-            yield stream, stream.channels[quantity]
-
-
-def _turned(stream: Stream, values: Array) -> Array:
-    return values if stream.turn is None else stream.turn.apply(values)
-
-
-def _log_of_rows(recording: Recording, wrench: Array, gravity: Array, rotation: Rotation | None) -> MotionLog:
+def _log_of_rows(found: Found, wrench: Array, gravity: Array, rotation: Rotation | None) -> MotionLog:
     zero = np.zeros_like(gravity)
     motion = {}
     for quantity in ("linear_acceleration", "angular_velocity", "angular_acceleration"):
         motion[quantity] = zero
-        for stream, values in _with(quantity, recording):
+        if quantity in found:
+            stream, motion[quantity] = found[quantity]
             if stream.frames.get(quantity, "S") == "W":
                 if rotation is None:
                     raise BadDescription(f"{quantity} of '{stream.name}' is given in W, but there is no rotation.")
-                values = rotation.inverse().apply(values)
-            motion[quantity] = values
-            break
-    if motion["linear_acceleration"] is zero:
-        for stream, values in _with("specific_force", recording):
-            if rotation is not None and stream.turn is not None:
-                motion["linear_acceleration"] = stream.turn.apply(values) + gravity
-            break
+                motion[quantity] = rotation.inverse().apply(motion[quantity])
+    if motion["linear_acceleration"] is zero and "specific_force" in found:
+        stream, values = found["specific_force"]
+        if rotation is not None and stream.turn is not None:
+            motion["linear_acceleration"] = stream.turn.apply(values) + gravity
     still = np.full(len(wrench), not any(m is not zero for m in motion.values()))
     return MotionLog(
         wrench, gravity, motion["linear_acceleration"], motion["angular_velocity"],

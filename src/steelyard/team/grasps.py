@@ -34,10 +34,6 @@ class Grasps:
     def __getitem__(self, name: str) -> Pose:
         return self.poses[self.names.index(name)]
 
-    def between(self, first: str, second: str) -> Pose:
-        """Return X_{first second}: the second grasp seen from the first."""
-        return self[first].inverse() @ self[second]
-
     def total_wrench(self, wrench: Array) -> Array:
         """Return the sum (T, 6) [N m, N] over the team of wrenches (N, T, 6) given at the grasps, at R's origin."""
         turn, place = self.poses.rotation.matrix, self.poses.position

@@ -29,7 +29,7 @@ from steelyard.team.misread.torques import with_torque_sign
 from steelyard.team.payload.balance import require_balance
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
-from steelyard.team.payload.fit import PayloadFit, fit_payload
+from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
 from steelyard.team.payload.model import Group, unit_bias, units_of_body
@@ -109,13 +109,13 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     known = spread.turn(size) < COMPARABLE
     six_axis = np.array([not log.force_only(name) for name in log.names])
 
-    def fitted(rows: list[tuple[BodyRows, Array]]) -> _Fitted:
+    def fitted(rows: list[tuple[BodyRows, Array]]) -> Weighing:
         groups = _groups(rows, seen.path, highest_hz, seen.order)
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
         given = _summing_given(summing(placed), log.names, taken)
-        return _Fitted(groups, D, given, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
+        return Weighing(groups, D, given, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
 
     unpropped, propped = _unpropped(seen.rows, fitted, summing(placed), highest_hz)
     rows, begun, late = with_timely_forces(unpropped, fitted(unpropped), fitted, highest_hz)
@@ -161,25 +161,9 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    """The payload of some rows, with the matrices that it was fitted with, and how forces were read.
-
-    D, given  (6, 6 N) sum the pushes at B as they were read, and as rows have them
-    """
-
-    groups: tuple[Group, ...]
-    D: Array
-    given: Array
-    C: Array
-    read: tuple[Finding, ...]
-    taken: Mapping[str, Array]
-    payload: PayloadFit
-
-
 def _unpropped(
     rows: list[tuple[BodyRows, Array]],
-    fitted: Callable[[list[tuple[BodyRows, Array]]], _Fitted],
+    fitted: Callable[[list[tuple[BodyRows, Array]]], Weighing],
     D: Array,
     highest_hz: float,
 ) -> tuple[list[tuple[BodyRows, Array]], tuple[Finding, ...]]:
@@ -189,7 +173,7 @@ def _unpropped(
         return rows, ()
     kept = list(rows)
     for one in asked:
-        kept[one.number] = (one.without(rows[one.number][0], highest_hz), rows[one.number][1])
+        kept[one.number] = (rows[one.number][0].without(one.rows, highest_hz), rows[one.number][1])
     try:
         fit = fitted(kept)
     except CannotAnswer:
@@ -206,11 +190,11 @@ def _unpropped(
 
 def _untouched(
     rows: list[tuple[BodyRows, Array]],
-    fit: _Fitted,
-    fitted: Callable[[list[tuple[BodyRows, Array]]], _Fitted],
+    fit: Weighing,
+    fitted: Callable[[list[tuple[BodyRows, Array]]], Weighing],
     size: float,
     highest_hz: float,
-) -> tuple[_Fitted, tuple[Touched, ...]]:
+) -> tuple[Weighing, tuple[Touched, ...]]:
     """Return the fit of rows without those in which something touched the payload, and what was found of that.
 
     Touches that bend the first fit are seen better by the next. Where forces are misread nothing is asked, and nothing

@@ -8,17 +8,17 @@ tared under load read next to nothing as well: whether weight is missing, the fi
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, uniform_filter1d
+from scipy.ndimage import uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.regressor import motion_map
 from steelyard.logs.log import Mask
 from steelyard.spatial import unit_vectors
-from steelyard.team.changes.touched import MARGIN_S, MEAN_S, pieces
+from steelyard.team.changes.touched import MEAN_S, around
 from steelyard.team.payload.body_rows import BodyRows, Run
 from steelyard.team.payload.model import weight
 
@@ -34,11 +34,6 @@ class Propped:
     number: int
     rows: tuple[Mask, ...]
 
-    def without(self, body: BodyRows, highest_hz: float) -> BodyRows:
-        """Return the recording without these rows, in runs that are long enough for the band up to `highest_hz`."""
-        each = zip(body.runs, self.rows, strict=True)
-        return replace(body, runs=tuple(piece for run, rows in each for piece in pieces(run, ~rows, highest_hz)))
-
     def missing(self, body: BodyRows, phi: Array, D: Array) -> float:
         """Return how much less [N] robots bear in these rows than in the others, beside what a payload phi needs."""
         less = np.concatenate([_borne(run, D) - _needed(run, phi) for run in body.runs])
@@ -47,11 +42,10 @@ class Propped:
 
     def finding(self, body: BodyRows, missing: float) -> Finding:
         """Return what is said of it."""
-        seconds = sum(float(rows.sum()) / run.rate for rows, run in zip(self.rows, body.runs, strict=True))
         return Finding.of(
             "contact",
-            f"For {seconds:.1f} s of '{body.name}' robots bear {missing:.3g} N less than the payload weighs, as where "
-            "it stands on something; its wrenches were left out meanwhile.",
+            f"For {body.seconds(self.rows):.1f} s of '{body.name}' robots bear {missing:.3g} N less than the payload "
+            "weighs, as where it stands on something; its wrenches were left out meanwhile.",
         )
 
 
@@ -66,7 +60,7 @@ def maybe_propped(rows: Sequence[BodyRows], D: Array) -> list[Propped]:
             continue
         borne = [_averaged(_borne(run, D), run.rate) for run in body.runs]
         least = LITTLE * float(np.quantile(np.concatenate(borne), USUAL))
-        little = tuple(_around(each < least, run.rate) for each, run in zip(borne, body.runs, strict=True))
+        little = tuple(around(each < least, run.rate) for each, run in zip(borne, body.runs, strict=True))
         if least > 0 and any(each.any() for each in little) and not all(each.all() for each in little):
             out.append(Propped(number, little))
     return out
@@ -93,8 +87,3 @@ def _along_weight(force: Array, run: Run) -> Array:
 
 def _averaged(values: Array, rate: float) -> Array:
     return np.asarray(uniform_filter1d(values, max(1, round(MEAN_S * rate)), mode="nearest"))
-
-
-def _around(rows: Mask, rate: float) -> Mask:
-    """Return rows (T,) with those within MARGIN_S."""
-    return np.asarray(binary_dilation(rows, iterations=max(1, round(MARGIN_S * rate)))) if rows.any() else rows

@@ -7,7 +7,7 @@ goes leaves many times as much while it is there. The motion is measured all the
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from scipy.ndimage import binary_dilation, uniform_filter1d
@@ -16,8 +16,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.identify.regressor import motion_map
 from steelyard.logs.log import Mask
-from steelyard.logs.runs import runs
-from steelyard.team.payload.body_rows import LEAST_CYCLES, BodyRows, Run
+from steelyard.team.payload.body_rows import BodyRows, Run
 from steelyard.team.payload.model import weight
 
 # What is left is averaged over MEAN_S. It counts where it is so many times the usual (median) and this share of the
@@ -64,7 +63,7 @@ def without_touched(
         others = min(usual[:k] + usual[k + 1 :], default=np.inf)
         least = max(TIMES * min(usual[k], UNLIKE * others), SHARE * weight(phi))
         touched = [
-            _around(np.linalg.norm(push, axis=1) > least, run.rate)
+            around(_inner(np.linalg.norm(push, axis=1) > least, run.rate), run.rate)
             for push, run in zip(pushes[k], body.runs, strict=True)
         ]
         share = float(np.concatenate(touched).mean())
@@ -72,13 +71,9 @@ def without_touched(
             continue
         if share > MOST:
             touched = [np.ones_like(each) for each in touched]
-        kept = tuple(
-            piece for run, hit in zip(body.runs, touched, strict=True) for piece in pieces(run, ~hit, highest_hz)
-        )
-        out[k] = (replace(body, runs=kept), left)
-        seconds = sum(float(hit.sum()) / run.rate for hit, run in zip(touched, body.runs, strict=True))
+        out[k] = (body.without(touched, highest_hz), left)
         newtons = max(float(np.linalg.norm(push[:, 3:], axis=1).max()) for push in pushes[k])
-        found.append(Touched(body.name, seconds, newtons))
+        found.append(Touched(body.name, body.seconds(touched), newtons))
     return out, tuple(found)
 
 
@@ -98,21 +93,13 @@ def _unneeded(run: Run, phi: Array, D: Array, size: float) -> Array:
     return np.asarray(smooth - np.median(smooth, axis=0))
 
 
-def _around(rows: Mask, rate: float) -> Mask:
-    """Return rows (T,) with those within MARGIN_S; ends, whose accelerations are told from one side, say nothing."""
-    edge = round(MEAN_S * rate)
-    rows = rows.copy()
-    rows[:edge] = rows[len(rows) - edge :] = False
+def _inner(rows: Mask, rate: float) -> Mask:
+    """Return rows (T,) but for those at the ends, whose accelerations are told from one side: these say nothing."""
+    edge, inner = round(MEAN_S * rate), rows.copy()
+    inner[:edge] = inner[len(rows) - edge :] = False
+    return inner
+
+
+def around(rows: Mask, rate: float) -> Mask:
+    """Return rows (T,) with those within MARGIN_S."""
     return np.asarray(binary_dilation(rows, iterations=max(1, round(MARGIN_S * rate)))) if rows.any() else rows
-
-
-def pieces(run: Run, kept: Mask, highest_hz: float) -> list[Run]:
-    """Return the stretches of a run that are kept (T,) and long enough for the band up to `highest_hz`."""
-    least = LEAST_CYCLES * run.rate / highest_hz
-    return [
-        Run(
-            run.motion[a:b], run.pushed[a:b], run.room[a:b], slice(run.rows.start + a, run.rows.start + b), run.rate
-        )
-        for a, b in runs(kept)
-        if b - a >= least
-    ]  # fmt: skip

@@ -113,7 +113,7 @@ def require_well_read(log: TeamLog) -> None:
     suspects = _suspects(parts, judge, given)
     for tried in (
         _everywhere(parts, suspects, readings),
-        _of_all(parts, len(names), TURNS if turns else ()),
+        _everywhere(parts, [None], TURNS if turns else ()),
         _in_one(parts, suspects, readings, judge, given),
     ):
         best = _best(tuple(tried), given, judge)
@@ -148,24 +148,17 @@ def _left_out(parts: tuple[Stretch, ...], robot: int) -> tuple[Stretch, ...]:
     return tuple(replace(part, poses=part.poses[:, others], seen=part.seen[:, others]) for part in parts)
 
 
-def _everywhere(parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading]) -> Iterator[Try]:
-    for i in robots:
+def _everywhere(parts: tuple[Stretch, ...], whose: Sequence[int | None], readings: Sequence[Reading]) -> Iterator[Try]:
+    """Yield readings in all recordings, of one robot or, for None, of all at once."""
+    for robot in whose:
+        robots = range(parts[0].seen.shape[1]) if robot is None else [robot]
         for reading in readings:
-            read = [_read(part, i, reading) for part in parts]
+            read: tuple[Stretch | None, ...] = parts
+            for i in robots:
+                read = tuple(None if part is None else _read(part, i, reading) for part in read)
             made = tuple(part for part in read if part is not None)
             if len(made) == len(parts):
-                yield Try(i, reading, None, made)
-
-
-def _of_all(parts: tuple[Stretch, ...], count: int, readings: Sequence[Reading]) -> Iterator[Try]:
-    """Yield readings of the poses of all robots at once."""
-    for reading in readings:
-        read: tuple[Stretch | None, ...] = parts
-        for i in range(count):
-            read = tuple(None if part is None else _read(part, i, reading) for part in read)
-        made = tuple(part for part in read if part is not None)
-        if len(made) == len(parts):
-            yield Try(None, reading, None, made)
+                yield Try(robot, reading, None, made)
 
 
 def _in_one(

@@ -8,7 +8,7 @@ comes from positions over a baseline of a metre. Rows are cut into runs without 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -48,6 +48,11 @@ class Run:
     rows: slice
     rate: float
 
+    def part(self, first: int, stop: int) -> Run:
+        """Return the rows from `first` to before `stop` of the run."""
+        motion, pushed, room = (x[first:stop] for x in (self.motion, self.pushed, self.room))
+        return Run(motion, pushed, room, slice(self.rows.start + first, self.rows.start + stop), self.rate)
+
 
 @dataclass(frozen=True, eq=False)
 class BodyRows:
@@ -56,6 +61,18 @@ class BodyRows:
     name: str
     still: bool
     runs: tuple[Run, ...]
+
+    def without(self, gone: Sequence[Mask], highest_hz: float) -> BodyRows:
+        """Return the recording without rows `gone` (T,) of each run, in runs that last long enough for the band."""
+        kept = []
+        for run, rows in zip(self.runs, gone, strict=True):
+            least = LEAST_CYCLES * run.rate / highest_hz
+            kept += [run.part(a, b) for a, b in runs(~rows) if b - a >= least]
+        return replace(self, runs=tuple(kept))
+
+    def seconds(self, rows: Sequence[Mask]) -> float:
+        """Return how long rows (T,) of each run last in all [s]."""
+        return sum(float(some.sum()) / run.rate for some, run in zip(rows, self.runs, strict=True))
 
 
 def balance_frame(grasps: Pose) -> Pose:

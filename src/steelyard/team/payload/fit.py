@@ -8,11 +8,13 @@ Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, ce
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.findings import Finding
 from steelyard.identify.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
 from steelyard.team.payload.gain_sight import of_force
@@ -67,6 +69,23 @@ class PayloadFit:
     chi2: float
     unsure: float = 1.0
     levers: Array = field(default_factory=lambda: np.zeros((0, 6, 0)))
+
+
+@dataclass(frozen=True, eq=False)
+class Weighing:
+    """The payload of some rows, with the matrices that it was fitted with, and how forces were read.
+
+    D, given  (6, 6 N) sum the pushes at B as they were read, and as rows have them     C  (6, 6) as of `fit_payload`
+    read      why they were read so     taken  by robot, as of `misread.taken.maps_of`
+    """
+
+    groups: tuple[Group, ...]
+    D: Array
+    given: Array
+    C: Array
+    read: tuple[Finding, ...]
+    taken: Mapping[str, Array]
+    payload: PayloadFit
 
 
 def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with_gain: bool = True) -> PayloadFit:

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Protocol, TypeVar
 
 import numpy as np
 
@@ -21,7 +20,7 @@ from steelyard.logs.filtered import SHARE, taken
 from steelyard.logs.team_rows import between
 from steelyard.team.payload.body_rows import BodyRows, Run, slope
 from steelyard.team.payload.doubt import moved_by_pushes
-from steelyard.team.payload.fit import PayloadFit
+from steelyard.team.payload.fit import PayloadFit, Weighing
 from steelyard.team.payload.spectra import Spectra, band_edges, gathered
 
 # Forces are late from so much [s] and so many standard deviations, and no later than this: beyond, clocks are apart.
@@ -32,21 +31,6 @@ USUAL_S = 0.05
 SETTLED, ROUNDS = 1.0, 12
 
 Rows = list[tuple[BodyRows, Array]]
-
-
-class Fitted(Protocol):
-    """A fit of some rows, and the matrix (6, 6 N) that sums their pushes as given."""
-
-    @property
-    def given(self) -> Array:
-        """(6, 6 N), from moment and force of every robot as its rows have them to the sum at B."""
-
-    @property
-    def payload(self) -> PayloadFit:
-        """The fit."""
-
-
-F = TypeVar("F", bound=Fitted)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,8 +99,8 @@ class LateForces:
 
 
 def with_timely_forces(
-    rows: Rows, fit: F, fitted: Callable[[Rows], F], highest_hz: float
-) -> tuple[Rows, F, LateForces | None]:
+    rows: Rows, fit: Weighing, fitted: Callable[[Rows], Weighing], highest_hz: float
+) -> tuple[Rows, Weighing, LateForces | None]:
     """Return rows and their fit with forces that are late moved to when they were; None where none are."""
     late = _asked(fit, rows, highest_hz)
     if late is None or not late.sure:
@@ -138,7 +122,7 @@ def with_timely_forces(
     return rows, fit, None
 
 
-def _asked(fit: Fitted, rows: Rows, highest_hz: float) -> LateForces | None:
+def _asked(fit: Weighing, rows: Rows, highest_hz: float) -> LateForces | None:
     """Return how late forces are beside those of these rows; None where nothing moves."""
     D, count = fit.given, fit.given.shape[1] // 6
     moving = [body for body, _ in rows if body.runs and not body.still]
@@ -187,8 +171,4 @@ def _moved(run: Run, late: Array) -> Run:
     begin, end = max(0.0, -late.min()), time[-1] - max(0.0, late.max())
     kept = slice(int(np.ceil(begin * run.rate)), int(np.floor(end * run.rate)) + 1)
     each = (between(time, own, time[kept] + late[i]) for i, own in enumerate(np.split(run.pushed, len(late), axis=1)))
-    first = run.rows.start + kept.start
-    rows = slice(first, first + len(time[kept]))
-    return replace(
-        run, motion=run.motion[kept], pushed=np.concatenate(list(each), axis=1), room=run.room[kept], rows=rows
-    )
+    return replace(run.part(kept.start, kept.start + len(time[kept])), pushed=np.concatenate(list(each), axis=1))
