@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steelyard.logs.runs import runs
+from steelyard.logs.runs import lasting, runs
 
 
 @pytest.mark.parametrize(
@@ -29,3 +29,10 @@ def test_runs_are_the_mask_and_do_not_touch(mask: list[bool]) -> None:
     rows = [k for start, stop in found for k in range(start, stop)]
     assert rows == [k for k, held in enumerate(mask) if held]
     assert (found[1:, 0] > found[:-1, 1]).all()
+
+
+@given(st.lists(st.booleans(), max_size=40), st.integers(0, 5))
+def test_what_lasts_are_the_runs_of_so_many_rows(mask: list[bool], least: int) -> None:
+    given_ = np.array(mask, bool)
+    kept = lasting(given_, least)
+    assert runs(kept).tolist() == [run for run in runs(given_).tolist() if run[1] - run[0] >= least]

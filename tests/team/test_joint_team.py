@@ -131,7 +131,8 @@ def test_the_statistic_of_twists_adds_over_time() -> None:
     size = 6 * 3
     rows = whole[0].twist.reshape(-1, size)
     np.testing.assert_allclose(statistic.merged().scatter[0][:size, :size], rows.T @ rows, rtol=1e-12, atol=1e-12)
-    both = fit_twists(statistic + statistic, 0, made.log.names)
+    twice = TwistScatter.of((*whole, *whole))
+    both = fit_twists(twice, 0, made.log.names)
     once = fit_twists(statistic, 0, made.log.names)
     np.testing.assert_allclose(both.grasps.position, once.grasps.position, atol=1e-5)
     np.testing.assert_allclose(both.spread.full[6:12, 6:12], once.spread.full[6:12, 6:12] / 2, rtol=0.5, atol=1e-9)

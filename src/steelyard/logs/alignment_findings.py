@@ -8,7 +8,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.logs.clock_jumps import UNSURE_S, Placed
+from steelyard.logs.clock import UNSURE_S
+from steelyard.logs.clock_jumps import Placed
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Clocks
 from steelyard.logs.holes import holes

@@ -10,6 +10,8 @@ from steelyard.logs.recording import Stream
 
 # A gap of the stamps is a jump's where it is as long to within so much and so near to where delays change [s].
 SAME_S, NEAR_S = 0.05, 1.0
+# [s] to either side of a jump that leaves no gap, in which rows are left out.
+UNSURE_S = 0.3
 
 
 def stamps_of(stream: Stream) -> Array:

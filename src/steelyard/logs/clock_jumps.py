@@ -15,7 +15,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock import NEAR_S, SAME_S, jump_gap, stamps_of
+from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap, stamps_of
 from steelyard.logs.clock_fit import (
     HOLDS,
     ROWS,
@@ -42,8 +42,6 @@ _APART, _LOUD, _STRETCHES, _ENDS = 10.0, 8.0, 60, 4
 # Delays that it tries reach so far [s], and over so much of the log, in steps [s]; by rows, in bins, of which each side
 # has a share.
 _FAR_S, _FAR, _LAG_S, _FEW_ROWS, _BINS, _SIDE = 1.2, 0.1, 0.02, 1500, 40, 0.15
-# [s] to either side of a jump that leaves no gap, in which rows are left out.
-UNSURE_S = 0.3
 # A jump is first good to so much of itself: what smooths the motion goes across it.
 _SAME = 0.15
 # Standard deviations beyond which a row counts as so far off.

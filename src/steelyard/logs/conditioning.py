@@ -16,6 +16,9 @@ from steelyard.logs.clock import sampling_rate
 _NOISE_BLOCK = 64
 _QUIETEST = 0.84  # 0.1 quantile of the noise level over blocks of that length
 
+# A filter is behind none to all of a delay, all shares alike likely: the mean square of what it takes away.
+FILTERED = 1 / 3
+
 
 @dataclass(frozen=True, eq=False)
 class Signal:
@@ -72,6 +75,16 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
 def lowpass_gain(frequency: Array, cutoff_hz: float) -> Array:
     """Return the share (K,) of an amplitude that a fourth-order `lowpass` leaves at frequencies (K,) [Hz]."""
     return np.asarray(1 / (1 + (frequency / cutoff_hz) ** 8))
+
+
+def taken_by_filter(frequency: Array, late: float | Array) -> Array:
+    """Return what a filter of first order that is `late` [s] takes at `frequency` [Hz], as a share of what it leaves.
+
+    It leaves 1 / sqrt(1 + (2 pi f late)^2) of a frequency f, a mean over the last samples about as much, a slow bus all
+    of it. A delay is put right, but not what was taken, and no log tells them apart by much: the noise of
+    accelerations, which grows with f, lowers what seems to follow, too. Shapes broadcast.
+    """
+    return np.asarray(np.sqrt(1 + (2 * np.pi * frequency * late) ** 2) - 1)
 
 
 @lru_cache(maxsize=64)

@@ -13,7 +13,6 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import lowpass
 from steelyard.logs.runs import runs
 from steelyard.logs.team_log import TeamLog, TeamRecording
@@ -45,24 +44,13 @@ def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 
     parts = ("twist", "twist_rate", "gravity", "wrench")
     stacked: dict[str, Any] = {part: np.stack([getattr(c, part) for c in columns]) for part in parts}
     masks: dict[str, Any] = {f"has_{part}": np.stack([c.has[part] for c in columns]) for part in _MEASURED}
-    carries = np.stack([_carries(recording, name, time) for name in names])
+    carries = np.stack([recording.carries(name, time) for name in names])
     return TeamRows(names=names, time=time, carries=carries, **stacked, **masks)
 
 
 def all_conditioned(log: TeamLog, recordings: Sequence[TeamRecording], cutoff_hz: float | None) -> tuple[TeamRows, ...]:
     """Return every recording conditioned alike."""
     return tuple(condition(log, recording, cutoff_hz) for recording in recordings)
-
-
-def _carries(recording: TeamRecording, name: str, time: Array) -> Mask:
-    """Return the rows (T,) in which a robot holds the payload, or may."""
-    if name in recording.away:
-        return np.zeros(len(time), np.bool_)
-    track = recording.tracks.get(name)
-    if track is None or track.carrying is None:
-        return np.ones(len(time), np.bool_)
-    nearest = np.clip(np.searchsorted(track.time, time - 0.5 * median_step(track.time)), 0, len(track) - 1)
-    return track.carrying[nearest]
 
 
 @dataclass(frozen=True, eq=False)

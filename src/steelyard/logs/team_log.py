@@ -16,6 +16,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
+from steelyard.logs.clock import median_step
 from steelyard.logs.team_clock_units import require_one_clock_unit
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose
@@ -69,6 +70,14 @@ class TeamRecording:
         """Whether all tracks have the same stamps, to a microsecond."""
         first, *others = self.tracks.values()
         return all(first.stamped_at(track.time) for track in others)
+
+    def carries(self, name: str, time: Array) -> Mask:
+        """Return whether a robot holds the payload, or may, at `time` (M,): what its nearest sample says."""
+        track = self.tracks.get(name)
+        if track is None or track.carrying is None or name in self.away:
+            return np.full(len(time), name not in self.away)
+        half = 0.5 * median_step(track.time) if len(track) > 1 else 0.5
+        return track.carrying[np.clip(np.searchsorted(track.time, time - half), 0, len(track) - 1)]
 
     def changed(self, change: Callable[[Track, T], Track], by: Mapping[str, T]) -> TeamRecording:
         """Return the recording with the tracks of the robots in `by` as `change` makes them of what stands there."""

@@ -13,6 +13,12 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.slips import SlipAt
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 
+# A level sensor, or a base that is said to be level, is so to within this [rad].
+LEVEL = 0.02
+# Clocks are moved where they are off by more than this [s] and so many (white) standard deviations: less may be noise,
+# and a fit has allowed for it to first order. They are moved at most so often.
+PUNCTUAL, DOUBTED, CLOCK_ROUNDS = 2e-4, 4.0, 10
+
 
 @dataclass(frozen=True, eq=False)
 class MotionFit(ABC):

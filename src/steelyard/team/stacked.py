@@ -82,13 +82,10 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
     seen, felt = np.zeros((rows, count), np.bool_), np.zeros((rows, count), np.bool_)
     carries = np.ones((rows, count), np.bool_)
     for i, name in enumerate(log.names):
-        carries[:, i] = name not in recording.away
+        carries[:, i] = recording.carries(name, time)
         track = recording.tracks.get(name)
         if track is None:
             continue
-        if track.carrying is not None:
-            nearest = np.clip(np.searchsorted(track.time, time - 0.5 / max(_rate(track.time), 1e-9)), 0, len(track) - 1)
-            carries[:, i] &= track.carrying[nearest]
         if _between(track, time):
             turns[i], place[:, i], wrench[:, i], near = _together(track, time)
             seen[:, i] = felt[:, i] = bridged(near, time)
@@ -166,7 +163,3 @@ def row_slices(parts: Sequence[Sized]) -> list[slice]:
     """Return which rows each part has where all stand one after the other."""
     ends = np.cumsum([0, *(len(part) for part in parts)]).tolist()
     return [slice(a, b) for a, b in pairwise(ends)]
-
-
-def _rate(time: Array) -> float:
-    return 1 / median_step(time) if len(time) > 1 else 1.0

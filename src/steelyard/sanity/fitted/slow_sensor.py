@@ -10,8 +10,7 @@ from steelyard.check import Array
 from steelyard.findings import about
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.clock import median_step
-from steelyard.logs.conditioning import signal
-from steelyard.logs.filtered import SHARE, taken
+from steelyard.logs.conditioning import FILTERED, signal, taken_by_filter
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.seen_motion import moves
@@ -26,7 +25,7 @@ def allow_filter(log: MotionLog, estimate: Estimate, late: float) -> Estimate:
         return estimate
     rows, pick = Rows.of(log)
     lost = taken_away(log.time, log.predicted(rows.solve().phi), late)
-    moved = np.sqrt(SHARE) * replace(rows, values=lost[pick]).solve().phi
+    moved = np.sqrt(FILTERED) * replace(rows, values=lost[pick]).solve().phi
     wider = estimate.allowing(moved)
     known = estimate.identified
     if not (wider.std[known] > np.hypot(1, WORTH_SAYING) * estimate.std[known]).any():
@@ -45,5 +44,5 @@ def taken_away(time: Array, wrench: Array, late: float) -> Array:
     # There and back, so that the ends meet.
     loop = np.concatenate([values, values[::-1]])
     frequency = np.asarray(np.fft.rfftfreq(len(loop), step)[:, None], np.float64)
-    lost = taken(frequency, late)
+    lost = taken_by_filter(frequency, late)
     return signal(even, np.fft.irfft(lost * np.fft.rfft(loop, axis=0), len(loop), axis=0)[: len(even)]).at(time)

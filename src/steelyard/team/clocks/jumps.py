@@ -18,12 +18,12 @@ from numba import njit
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.logs.clock import NEAR_S, SAME_S, jump_gap
+from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors
 from steelyard.team.clocks.steps import Step
-from steelyard.team.turning_speed import turning_speed
+from steelyard.team.turns import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps, and jumps by so much about the
 # one that fits best throughout; speeds are those over OVER_S.
@@ -39,8 +39,8 @@ JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
 # bins.
 DRIFTS_S, FASTEST, ROUGH, DRIFTING, FEW_BINS = 0.04, 0.015, 0.002, 1.3, 200
 _WIDTH = round(BIN_S / STEP_S)
-# [s] to either side of a jump that leaves no gap, which are left out; and jumps of one recording.
-UNSURE_S, MOST = 0.3, 3
+# Jumps of one recording.
+MOST = 3
 NONE = ClockError()
 
 

@@ -28,6 +28,7 @@ from steelyard.team.hinge.rows import COUNT, WHOLE, Bands, Sums, bodies_of, gath
 from steelyard.team.hinge.signs import robot_of_other_sign
 from steelyard.team.hinge.start import first_hinged
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
+from steelyard.team.motion_fit import CLOCK_ROUNDS, PUNCTUAL
 from steelyard.team.payload.body_rows import BodyRows, reach, require_runs
 from steelyard.team.payload.doubt import turned_by_step
 from steelyard.team.payload.gain_sight import of_force
@@ -35,7 +36,7 @@ from steelyard.team.payload.motion_noise import shares_of, tilt_noise
 from steelyard.team.payload.spectra import band_edges
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.statistic import OWN
-from steelyard.team.poses.team import CLOCK_ROUNDS, FEW_ROWS, PUNCTUAL, mean_gravity
+from steelyard.team.poses.team import FEW_ROWS, mean_gravity
 from steelyard.team.split import Split
 from steelyard.team.stacked import Stretch, row_slices, stretches
 

@@ -6,7 +6,7 @@ import numpy as np
 
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording
-from steelyard.team.turning_speed import turning_speed
+from steelyard.team.turns import turning_speed
 
 # Turning so many times as fast as the others, to within this factor, is degrees beside radians.
 DEGREES, WITHIN = 180 / np.pi, 2.0

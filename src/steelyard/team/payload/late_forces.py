@@ -16,7 +16,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, with_bar
 from steelyard.identify.regressor import motion_map
-from steelyard.logs.filtered import SHARE, taken
+from steelyard.logs.conditioning import FILTERED, taken_by_filter
 from steelyard.logs.team_rows import between
 from steelyard.team.payload.body_rows import BodyRows, Run, slope
 from steelyard.team.payload.doubt import moved_by_pushes
@@ -70,13 +70,13 @@ class LateForces:
 
         def lost(part: Spectra) -> Spectra:
             scatter, room = part.scatter.copy(), part.room.copy()
-            share = taken(part.hz[:, None, None], late)
+            share = taken_by_filter(part.hz[:, None, None], late)
             scatter[:, :, 12 : 12 + count] *= share
             room[:, :, 12 : 12 + count] *= share
             return replace(part, scatter=scatter, room=room)
 
         moved = moved_by_pushes(_in_motion(fit, lost), D)
-        filters = 0.5 * SHARE * (moved @ moved.T + np.outer(moved.sum(1), moved.sum(1)))
+        filters = 0.5 * FILTERED * (moved @ moved.T + np.outer(moved.sum(1), moved.sum(1)))
         return np.asarray(filters + self.moved @ self.covariance @ self.moved.T)
 
     def findings(self, names: Sequence[str]) -> tuple[Finding, ...]:

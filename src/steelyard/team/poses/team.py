@@ -18,7 +18,7 @@ from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, s
 from steelyard.team.changes.slips_between import slip_between, step_between
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.motion_fit import MotionFit
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.poses import rows as pose_rows
 from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
@@ -28,14 +28,9 @@ from steelyard.team.poses.start import ENOUGH, first_team
 from steelyard.team.stacked import Stretch, row_slices, stretches
 from steelyard.team.turns import turns_between, twists_between
 
-# Clocks are put right until they move by less than this [s]; the joint fit has allowed for the rest to first order.
-PUNCTUAL = 2e-4
-# A step of so many (white) standard deviations may be noise: the wrench is not moved for it.
-DOUBTED = 4.0
 # Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
 # is the reference, and by where noisy rows are then read the answer does in its sixth digit.
 STILL = 1e-8
-CLOCK_ROUNDS = 10
 # Clocks that move by less [s] leave what the rows say as it is: nobody turns a payload far in that time.
 UNCHANGED = 0.02
 # Rows that are enough to come near the optimum; all rows then finish. A row of many robots says more of the motion, so
@@ -43,8 +38,6 @@ UNCHANGED = 0.02
 FEW_ROWS, FEW_POSES = 1500, 4500
 # Sweeps over a row with which the motion follows grasps and homes from wherever it was.
 FOLLOWED = 2
-# Bases that are said to be level are so to within this [rad].
-LEVEL = 0.02
 # Noise above this share of the motion asks whether the payload is rigid.
 LOUD = 0.05
 # From this share on nobody can say that the payload turned at all.
@@ -78,14 +71,11 @@ class PoseTeam(MotionFit):
         enough = min(FEW_ROWS, max(ENOUGH, FEW_POSES // data.count))
         few = slice(None, None, max(1, len(data.valid) // enough))
         fit = fit_poses(data.rows(few), replace(start, motion=start.motion[few]), reference, close=ROUGHLY)
+        timed = data
         if not clocks:
             fit = fit_poses(data, _followed(data, fit), reference, fit.noise)
-            share = shares_at_rest(parts, fit)
-            if share is not None:
-                fit = fit_poses(replace(data, share=share), fit.team, reference, fit.noise)
-            return cls(parts, fit, late)
         known = None
-        for left in reversed(range(CLOCK_ROUNDS)):
+        for left in reversed(range(CLOCK_ROUNDS if clocks else 0)):
             team = _followed(data, fit)
             timed = replace(data, twist=_twists(parts, team))
             fit = fit_poses(timed, replace(team, delays=np.zeros(data.count)), reference, fit.noise, NEARLY, known)
@@ -98,10 +88,10 @@ class PoseTeam(MotionFit):
             parts = edit(stretches(log, late))
             data = TeamMotion.of(parts)
         share = shares_at_rest(parts, fit)
-        if share is None:
-            fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
-        else:
+        if share is not None:
             fit = fit_poses(replace(timed, share=share), fit.team, reference, fit.noise)
+        elif clocks:
+            fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
         return cls(parts, fit, _later(late, fit))
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:

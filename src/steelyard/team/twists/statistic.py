@@ -61,14 +61,6 @@ class TwistScatter:
         scatter, count, spoke, window = zip(*found, strict=True)
         return cls(np.stack(scatter), np.array(count, float), np.stack(spoke), np.array(window))
 
-    def __add__(self, other: TwistScatter) -> TwistScatter:
-        """Return the statistic of both stretches of time."""
-        later = other.window + (int(self.window.max()) + 1 if len(self.window) else 0)
-        return TwistScatter(
-            np.concatenate([self.scatter, other.scatter]), np.concatenate([self.rows, other.rows]),
-            np.concatenate([self.spoke, other.spoke]), np.concatenate([self.window, later]),
-        )  # fmt: skip
-
     @property
     def count(self) -> int:
         """Number of robots."""

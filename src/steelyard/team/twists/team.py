@@ -18,7 +18,7 @@ from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.motion_fit import MotionFit
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
 from steelyard.team.split import Split, smoothed, split_of
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
@@ -26,12 +26,8 @@ from steelyard.team.twists.rows import TwistStretch, twist_stretches
 from steelyard.team.twists.slips_between import slip_between
 from steelyard.team.twists.statistic import TwistScatter, rates_of_change
 
-# Clocks are moved where they are off by more than this [s] and so many standard deviations, and then until the last
-# step is below the shares of both.
-PUNCTUAL, DOUBTED, SETTLED = 2e-4, 4.0, 0.05
-CLOCK_ROUNDS = 10
-# A level sensor, or a base that is said to be level, is so to within this [rad].
-LEVEL = 0.02
+# Clocks that were moved are moved until the last step is below this share of what is moved for.
+SETTLED = 0.05
 # Noise above this share of the motion: robots disagree.
 LOUD = 0.1
 
