@@ -69,29 +69,25 @@ class _Columns:
     """One robot's rows while they are made."""
 
     def __init__(self, rows: int) -> None:
-        self.rotation: Array = np.broadcast_to(np.eye(3), (rows, 3, 3))
-        self.position: Array = np.zeros((rows, 3))
         self.twist: Array = np.zeros((rows, 6))
         self.twist_rate: Array = np.zeros((rows, 6))
         self.gravity: Array = np.zeros((rows, 3))
         self.wrench: Array = np.zeros((rows, 6))
-        self.has: dict[str, Mask] = {part: np.zeros(rows, np.bool_) for part in ("pose", *_MEASURED)}
+        self.has: dict[str, Mask] = {part: np.zeros(rows, np.bool_) for part in _MEASURED}
 
 
 def _columns(log: TeamLog, name: str, time: Array, smooth: _Channels) -> _Columns:
-    robot, out = log.robot(name), _Columns(len(time))
+    robot, out, posed = log.robot(name), _Columns(len(time)), np.zeros(len(time), np.bool_)
     if "rotation" in smooth:
-        vectors, turned = smooth["rotation"].values, smooth["rotation"].good
-        rotation = smooth["rotation"].middle @ Rotation.exp(vectors)
-        out.rotation = rotation.matrix
+        rotation, turned = smooth["rotation"].middle @ Rotation.exp(smooth["rotation"].values), smooth["rotation"].good
         if robot.gravity is not None:
             out.gravity, out.has["gravity"] = rotation.inverse().apply(robot.gravity), turned
         if "position" in smooth:
-            out.position, out.has["pose"] = smooth["position"].values, turned & smooth["position"].good
+            posed = turned & smooth["position"].good
     if "gravity" in smooth:
         out.gravity, out.has["gravity"] = smooth["gravity"].values, smooth["gravity"].good
-    if out.has["pose"].any() and robot.base == "still":
-        _difference_poses(out, time)
+    if posed.any() and robot.base == "still":
+        _difference_poses(out, time, Pose(rotation, smooth["position"].values), posed)
     elif {"angular_velocity", "linear_velocity"} <= smooth.keys():
         _measured_motion(out, time, smooth)
     if "force" in smooth:
@@ -101,13 +97,13 @@ def _columns(log: TeamLog, name: str, time: Array, smooth: _Channels) -> _Column
     return out
 
 
-def _difference_poses(out: _Columns, time: Array) -> None:
+def _difference_poses(out: _Columns, time: Array, path: Pose, posed: Mask) -> None:
     """Set twist and its derivative: the screw of two steps, T(t-1)^-1 T(t+1), over their time, and its difference."""
-    back = np.swapaxes(out.rotation[:-2], 1, 2)
-    moved = np.einsum("tij,tj->ti", back, out.position[2:] - out.position[:-2])
-    step = Pose(Rotation(back @ out.rotation[2:]), moved)
+    turn, place = path.rotation.matrix, path.position
+    back = np.swapaxes(turn[:-2], 1, 2)
+    step = Pose(Rotation(back @ turn[2:]), np.einsum("tij,tj->ti", back, place[2:] - place[:-2]))
     out.twist[1:-1] = log_pose(step) / (time[2:] - time[:-2])[:, None]
-    out.has["twist"] = _inner(out.has["pose"])
+    out.has["twist"] = _inner(posed)
     _difference_twists(out, time)
 
 

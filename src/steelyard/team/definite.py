@@ -47,13 +47,9 @@ def logarithms_by_pivots(stack: Array) -> Array:
     return out
 
 
-@numba.njit(cache=True, error_model="numpy")
 def definite(stack: Array) -> Mask:
     """Return which of symmetric matrices (L, n, n) are positive definite, by the signs of their pivots."""
-    out, root = np.empty(len(stack), np.bool_), np.empty(stack.shape[1:])
-    for k in range(len(stack)):
-        out[k] = _factor(stack[k], root)
-    return out
+    return ~np.isnan(logarithms_by_pivots(stack))
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -80,9 +80,8 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
     turns, place = [Rotation.identity(rows, 1)] * count, np.zeros((rows, count, 3))
     wrench = np.zeros((rows, count, 6))
     seen, felt = np.zeros((rows, count), np.bool_), np.zeros((rows, count), np.bool_)
-    carries = np.ones((rows, count), np.bool_)
+    carries = np.stack([recording.carries(name, time) for name in log.names], axis=1)
     for i, name in enumerate(log.names):
-        carries[:, i] = recording.carries(name, time)
         track = recording.tracks.get(name)
         if track is None:
             continue

@@ -240,7 +240,7 @@ def fit_hinged(data: TeamMotion, start: Hinged, reference: int, noise: Array, sp
     for _ in range(STEPS):
         now = _Normal.of(data, team, noise, speed)
         H, pull = now.H[np.ix_(unknown, unknown)], now.scores[:, unknown].sum(0)
-        inverse, null = _inverse(H)
+        inverse, lost = _inverse(H, speed is not None)
         step = np.zeros(OWN * count + 6)
         step[unknown] = inverse @ pull
         team = team.moved(step, now.inside - now.carried @ step)
@@ -251,8 +251,7 @@ def fit_hinged(data: TeamMotion, start: Hinged, reference: int, noise: Array, sp
             break
     team, spread = _centred(team, unknown, now.carried[:, 6].mean(0))
     inflated = _inflation(now.scores[:, unknown], H) * inverse
-    lost = null - FREE - int(speed is not None)
-    return HingedFit(team, spread @ inflated @ spread.T, now.left, noise, now.path(data), max(lost, 0))
+    return HingedFit(team, spread @ inflated @ spread.T, now.left, noise, now.path(data), lost)
 
 
 def finished(data: TeamMotion, fit: HingedFit, reference: int, speed: Array | None) -> HingedFit:
@@ -270,13 +269,12 @@ def finished(data: TeamMotion, fit: HingedFit, reference: int, speed: Array | No
         scores.append(now.scores[:, unknown])
         answer += now.carried[:, 6].sum(0) / rows
     every, H = np.concatenate(scores), H[np.ix_(unknown, unknown)]
-    inverse, null = _inverse(H)
+    inverse, lost = _inverse(H, speed is not None)
     step = np.zeros(OWN * count + 6)
     step[unknown] = inverse @ every.sum(0)
     team = followed(data, fit.team.moved(step, np.zeros((rows, 7))), fit.noise, 1)
     team, spread = _centred(team, unknown, answer)
     inflated = _inflation(every, H) * inverse
-    lost = max(null - FREE - int(speed is not None), 0)
     return HingedFit(team, spread @ inflated @ spread.T, residuals(data, team), fit.noise, fit.path, lost)
 
 
@@ -286,13 +284,16 @@ def _unknown(count: int, reference: int, timed: bool) -> Integers:
     return np.setdiff1d(np.arange(OWN * count + 6), known)
 
 
-def _inverse(H: Array) -> tuple[Array, int]:
-    """Return the inverse of H along what is shown, and how many directions are not."""
+def _inverse(H: Array, timed: bool) -> tuple[Array, int]:
+    """Return the inverse of H along what is shown, and how many directions are not, beyond those that nothing can show.
+
+    timed  whether clocks are among the unknown: what they have in common shows in nothing
+    """
     scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
     values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
     good = values > NULL * values[-1]
     root = scale[:, None] * vectors[:, good]
-    return (root / values[good]) @ root.T, int((~good).sum())
+    return (root / values[good]) @ root.T, max(int((~good).sum()) - FREE - timed, 0)
 
 
 def _inflation(scores: Array, H: Array) -> float:

@@ -9,6 +9,7 @@ Source: own; Lynch and Park for ad.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numba
@@ -220,14 +221,20 @@ def _shown(H: Array, floor: Array, unknown: Array) -> tuple[Array, Array]:
 def _inflation(data: TwistScatter, grasps: Pose, noise: Array, H: Array, unknown: Array) -> Array:
     """Return how much larger than for white noise the scores of whole windows scatter, for rotation and position."""
     size = 6 * data.count
-    windows = np.zeros((int(data.window.max()) + 1, size))
-    for S, spoke, window in zip(data.scatter, data.spoke, data.window, strict=True):
-        windows[window] += _Split.of(spoke, grasps, noise).scores(S[:size, :size])
+    windows = _by_window(data, grasps, noise, lambda split, S: split.scores(S[:size, :size]))
     if len(windows) < 4:
         return np.ones(2)
     ratio = (windows**2).sum(0)[unknown] / np.maximum(np.diag(H)[unknown], 1e-300)
     kind = (unknown % 6) // 3
     return np.array([max(float(ratio[kind == k].mean()), 1.0) for k in range(2)])
+
+
+def _by_window(data: TwistScatter, grasps: Pose, noise: Array, scores: Callable[[_Split, Array], Array]) -> Array:
+    """Return the sums of scores over every window (B, P)."""
+    each = [scores(_Split.of(s, grasps, noise), S) for S, s in zip(data.scatter, data.spoke, strict=True)]
+    windows = np.zeros((int(data.window.max()) + 1, len(each[0])))
+    np.add.at(windows, data.window, each)
+    return windows
 
 
 def _delays(merged: TwistScatter, grasps: Pose, noise: Array, reference: int) -> tuple[Array, Array, float]:
@@ -257,7 +264,5 @@ def _late_scores(split: _Split, S: Array) -> Array:
 
 def _late_inflation(data: TwistScatter, grasps: Pose, noise: Array, white: float) -> float:
     """Return how much larger than for `white` noise the scores of the clocks scatter over windows."""
-    windows = np.zeros((int(data.window.max()) + 1, data.count))
-    for S, spoke, window in zip(data.scatter, data.spoke, data.window, strict=True):
-        windows[window] += _late_scores(_Split.of(spoke, grasps, noise), S)
+    windows = _by_window(data, grasps, noise, _late_scores)
     return max(float((windows**2).sum()) / max(white, 1e-300), 1.0) if len(windows) >= 4 else 1.0
