@@ -13,7 +13,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.log import Mask
+from steelyard.logs.log import Integers, Mask
 from steelyard.team.twists.rows import TwistStretch, slope_shares
 
 # Windows that a log is cut into, so that correlated noise is noticed; fewer where their scatters have more numbers.
@@ -31,7 +31,7 @@ class TwistScatter:
     scatter: Array
     rows: Array
     spoke: Mask
-    window: Array
+    window: Integers
 
     @classmethod
     def of(cls, parts: tuple[TwistStretch, ...]) -> TwistScatter:
