@@ -12,7 +12,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.team.joint import JointTeam
-from steelyard.team.misread.twists import UNITS, require_one_velocity_unit
+from steelyard.team.misread.twists import UNITS, require_twists_well_read
 from steelyard.team.twists.team import TwistTeam
 
 NOISE = TeamNoise(rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.1, torque_white_Nm=0.01)
@@ -49,10 +49,10 @@ def test_a_velocity_in_another_unit_is_named(unit: str, robots: int) -> None:
 def test_good_logs_pass(robots: int) -> None:
     for seed, late in ((100, 0.0), (101, 0.02), (102, 0.5)):
         log = made(robots, seed, late)
-        require_one_velocity_unit(log, TwistTeam.of(log, late < 0.1))
+        require_twists_well_read(log, TwistTeam.of(log, late < 0.1))
 
 
 def test_velocities_that_are_all_zero_are_no_unit() -> None:
     log = scaled(made(3, 100), "robot1", 0.0)
     with np.errstate(all="raise"):
-        require_one_velocity_unit(log, TwistTeam.of(log, False))
+        require_twists_well_read(log, TwistTeam.of(log, False))

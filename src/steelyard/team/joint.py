@@ -25,7 +25,7 @@ from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.poses import require_well_read
-from steelyard.team.misread.twists import require_one_velocity_unit
+from steelyard.team.misread.twists import require_twists_well_read
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import Yields, stiffened
@@ -35,7 +35,6 @@ from steelyard.team.team_findings import (
     gains,
     late_clocks,
     open_parameters,
-    tilted_bases,
     vertical,
 )
 from steelyard.team.twists.team import TwistTeam
@@ -80,8 +79,9 @@ class JointTeam:
     def _from_twists(self, log: TeamLog) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
         log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=self.slipped or ()))
-        if moving.rough:
-            require_one_velocity_unit(log, moving)
+        tilt, slipped = moving.tilt(log.names), any(one.code == "grasp-slipped" for one in moving.findings)
+        if moving.rough or tilt is not None or slipped:
+            require_twists_well_read(log, moving)
         apart = rigidity_findings(moving.split, log.names, UNPLACED)
         if moving.split is not None and moving.split.sure:
             raise CannotAnswer(" ".join(finding.message for finding in apart))
@@ -89,10 +89,13 @@ class JointTeam:
         spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
         turning = TurningGains.of(moving.parts, grasps, noise)
         spread = turning.widened(spread, grasps)
+        found = [*moving.findings, *apart, *turning.findings(log.names)]
+        if tilt is not None:
+            found.append(tilt.finding)
+            moving = moving if tilt.odd is None else moving.without_level(tilt.odd)
         made, path = moving.rows(self.highest_hz)
-        found = (*moving.findings, *apart, *turning.findings(log.names))
         return Seen(
-            log, grasps, spread, noise, moving.late, begun, moving.fit.left, found, made, path, 1, moving.down()
+            log, grasps, spread, noise, moving.late, begun, moving.fit.left, tuple(found), made, path, 1, moving.down()
         )
 
     def _from_poses(self, log: TeamLog) -> Seen | TeamEstimate:
@@ -110,8 +113,10 @@ class JointTeam:
             require_well_read(log)
             require_own_files(log)
         found = [*standing.findings, *yields.findings(log), *rigidity_findings(split, log.names)]
-        if not spread.blind.size:
-            found += tilted_bases(log, standing.fit.team.homes)
+        tilt = standing.tilt(log, spread)
+        if tilt is not None:
+            found.append(tilt.finding)
+            log = log if tilt.odd is None else log.without_gravity(log.names[tilt.odd])
         made, path = standing.rows(log, self.highest_hz)
         down = vertical(standing.gravity(log), standing.fit.team.motion)
         left = standing.fit.left
