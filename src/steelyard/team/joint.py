@@ -23,6 +23,7 @@ from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge.bodies import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
+from steelyard.team.level import Tilted
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.twists import require_twists_well_read
@@ -40,6 +41,9 @@ from steelyard.team.team_findings import (
 from steelyard.team.twists.team import TwistTeam
 from steelyard.team.twists.turning_gains import TurningGains
 from steelyard.team.weighed import Seen, clocked, weighed
+
+# What is found of robots that then no longer disagree: poses that are misread may pass for it.
+CHANGES = {"grasp-slipped", "robot-left", "robot-joined"}
 
 
 @dataclass(frozen=True)
@@ -79,8 +83,8 @@ class JointTeam:
     def _from_twists(self, log: TeamLog) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
         log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=self.slipped or ()))
-        tilt, slipped = moving.tilt(log.names), any(one.code == "grasp-slipped" for one in moving.findings)
-        if moving.rough or tilt is not None or slipped:
+        tilt = moving.tilt(log.names)
+        if _doubtful(moving, tilt):
             require_twists_well_read(log, moving)
         apart = rigidity_findings(moving.split, log.names, UNPLACED)
         if moving.split is not None and moving.split.sure:
@@ -109,11 +113,12 @@ class JointTeam:
         jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
         if jointed is not None:
             return jointed
-        if standing.rough:
+        tilt = standing.tilt(log, spread)
+        if _doubtful(standing, tilt):
             require_well_read(log)
+        if standing.rough:
             require_own_files(log)
         found = [*standing.findings, *yields.findings(log), *rigidity_findings(split, log.names)]
-        tilt = standing.tilt(log, spread)
         if tilt is not None:
             found.append(tilt.finding)
             log = log if tilt.odd is None else log.without_gravity(log.names[tilt.odd])
@@ -181,6 +186,13 @@ class JointTeam:
             raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
         for name, mass in self.wrists.items():
             check.not_negative(f"the mass of the wrist of '{name}'", mass)
+
+
+def _doubtful(team: PoseTeam | TwistTeam, tilt: Tilted | None) -> bool:
+    """Return whether motion may be misread: robots disagree, on where gravity points, too, or did until rows were left
+    out in which one of them slipped or let go.
+    """
+    return team.rough or tilt is not None or any(one.code in CHANGES for one in team.findings)
 
 
 def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:
