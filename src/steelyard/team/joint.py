@@ -83,17 +83,17 @@ class JointTeam:
     def _from_twists(self, log: TeamLog) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
         log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=self.slipped or ()))
-        tilt = moving.tilt(log.names)
-        if _doubtful(moving, tilt):
+        turning = TurningGains.of(moving.parts, moving.fit.grasps, moving.fit.noise)
+        tilt, differ = moving.tilt(log.names), tuple(turning.findings(log.names))
+        if differ or _doubtful(moving, tilt):
             require_twists_well_read(log, moving)
         apart = rigidity_findings(moving.split, log.names, UNPLACED)
         if moving.split is not None and moving.split.sure:
             raise CannotAnswer(" ".join(finding.message for finding in apart))
         grasps, noise = moving.fit.grasps, moving.fit.noise
         spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
-        turning = TurningGains.of(moving.parts, grasps, noise)
         spread = turning.widened(spread, grasps)
-        found = [*moving.findings, *apart, *turning.findings(log.names)]
+        found = [*moving.findings, *apart, *differ]
         if tilt is not None:
             found.append(tilt.finding)
             moving = moving if tilt.odd is None else moving.without_level(tilt.odd)

@@ -16,8 +16,6 @@ MANY = 100.0
 NOISE = 3.0
 # Nobody carries a payload by grasps so far apart [m].
 FARTHEST = 50.0
-# One is far from all others where these are nearer to one another by this factor.
-ALONE = 10.0
 
 
 def require_one_length_unit(log: TeamLog) -> None:
@@ -48,7 +46,7 @@ def require_metres(names: tuple[str, ...], grasps: Pose) -> None:
         return
     odd = int(np.median(apart, axis=1).argmax())
     others = np.delete(np.delete(apart, odd, 0), odd, 1)
-    if len(names) > 2 and ALONE * others.max() < apart[odd].max():
+    if len(names) > 2 and others.max() < FARTHEST:
         who, whose = f"the grasp of '{names[odd]}' comes out {apart[odd].max():.3g} m from the others", "its"
     else:
         who = f"the grasps of '{names[first]}' and '{names[far]}' come out {apart[first, far]:.3g} m apart"
