@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, with_bar
 from steelyard.logs.log import Mask
-from steelyard.spatial import unit_vectors
+from steelyard.spatial import Pose, unit_vectors
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 # A clock is called late from so much [s] and so many standard deviations.
