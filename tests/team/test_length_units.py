@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
@@ -11,7 +12,8 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
-from steelyard.team.misread.length_units import require_one_length_unit
+from steelyard.spatial import Pose, Rotation
+from steelyard.team.misread.length_units import require_metres, require_one_length_unit
 
 
 def made(case: str, seed: int) -> TeamLog:
@@ -52,3 +54,11 @@ def test_sound_logs_pass(case: str) -> None:
 
 def test_robots_without_positions_pass() -> None:
     require_one_length_unit(simulate_team(TeamScene(TeamNoise(), sensing="twists", motion_samples=400), 0).log)
+
+
+def test_one_robot_whose_lengths_are_off_is_named() -> None:
+    places = np.array([[0.0, 0.0, 0.0], [0.5, 0.0, 0.0], [700.0, 100.0, 0.0]])
+    for order in ([0, 1, 2], [2, 0, 1]):
+        names = tuple(f"robot{i}" for i in order)
+        with pytest.raises(BadValue, match=r"the grasp of 'robot2' comes out 707 m from the others"):
+            require_metres(names, Pose(Rotation.identity(3), places[order]))

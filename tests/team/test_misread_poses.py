@@ -15,7 +15,7 @@ from steelyard.errors import BadValue
 from steelyard.logs.misread import rolled
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
-from steelyard.simulate.team_cases import CASES, Slip, TeamNoise
+from steelyard.simulate.team_cases import CASES, Presence, Slip, TeamNoise
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.joint import JointTeam
@@ -188,3 +188,10 @@ def test_a_large_noisy_team_is_judged_robot_by_robot(monkeypatch: pytest.MonkeyP
     require_well_read(made(12, noise=replace(NOISY, pose_rad=8e-3, pose_m=4e-3)))
     assert judged == list(range(12))
     assert set(tried) == {way.words for way in misread_poses.TURNS}
+
+
+def test_a_misreading_is_named_beside_a_robot_that_lets_go() -> None:
+    """Rows in which it holds nothing fit no reading; what fits without them may be called robots that let go."""
+    log = made(5, kinds=("motion",), motion_samples=2500, presence=(Presence(3, leaves=12.0),))
+    with pytest.raises(BadValue, match=r"if those of 'robot0' are misread \(.*w last where it is first"):
+        JointTeam().identify(spoiled(log, "robot0", SPOILED["w first"][0]))

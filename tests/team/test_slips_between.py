@@ -40,6 +40,17 @@ def test_a_slip_before_a_recording_is_named_and_put_right(case: str, robot: int)
     assert max(off(found, made)) < max(1.5 * max(off(JointTeam().identify(trial(case, 100).log), made)), 2.5)
 
 
+def test_a_slip_that_is_far_beyond_noise_is_one_among_many_robots() -> None:
+    """One robot in four disagrees, and no other is better off without what it says."""
+    slip = Slip(1, np.array([0.001, -0.006, 0.004]), -1.0)
+    scene = TeamScene(CASES["A"], 4, slip=slip, kinds=("grasp", "motion"), motion_samples=2000)
+    made = simulate_team(scene, 6561)
+    found = JointTeam().identify(made.log)
+    assert "grasp-slipped" in found.codes()
+    assert "robot-excluded" not in found.codes()
+    assert off(found, made)[0] < 2.5
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_noise_is_no_slip(case: str) -> None:
     for seed in range(40, 44):

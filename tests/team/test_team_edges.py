@@ -116,6 +116,22 @@ def test_bases_that_do_not_agree_on_gravity_are_named(robots: int, said: str) ->
     assert said in found.message
 
 
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+def test_a_base_that_is_tilted_alone_is_left_out(sensing: str) -> None:
+    made = trial(sensing=sensing)
+    turn = Rotation.exp(np.deg2rad([0.0, 6.0, 0.0]))
+    bases = tuple(
+        replace(r, gravity=turn.apply(r.gravity)) if r.name == "robot1" and r.gravity is not None else r
+        for r in made.log.robots
+    )
+    found, good = identify_team(replace(made.log, robots=bases)), identify_team(made.log)
+    (said,) = (f.message for f in found.findings if f.code == "base-tilted")
+    assert said.startswith("Gravity of 'robot1' points 6.0 deg")
+    assert "It was left out" in said
+    np.testing.assert_allclose(found.com, good.com, atol=1e-4)
+    assert found.mass == pytest.approx(good.mass, rel=1e-4)
+
+
 @pytest.mark.parametrize("case", CASES)
 def test_level_bases_agree(case: str) -> None:
     made = simulate_team(TeamScene(CASES[case], motion_samples=1200), 8)

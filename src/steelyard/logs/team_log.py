@@ -210,6 +210,11 @@ class TeamLog:
         """Return the same log, to be answered in another robot's grasp frame."""
         return replace(self, reference=reference)
 
+    def without_gravity(self, name: str) -> TeamLog:
+        """Return the same log, in which this robot does not know where gravity points."""
+        robots = tuple(replace(robot, gravity=None) if robot.name == name else robot for robot in self.robots)
+        return replace(self, robots=robots)
+
     def with_recordings(self, *recordings: TeamRecording) -> TeamLog:
         """Return the same team with other recordings."""
         return replace(self, recordings=recordings)

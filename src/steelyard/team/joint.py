@@ -23,10 +23,11 @@ from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge.bodies import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
+from steelyard.team.level import Tilted
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.poses import require_well_read
-from steelyard.team.misread.twists import require_one_velocity_unit
-from steelyard.team.motion_fit import F
+from steelyard.team.misread.twists import require_twists_well_read
+from steelyard.team.motion_fit import F, MotionFit
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import Yields, stiffened
@@ -36,12 +37,14 @@ from steelyard.team.team_findings import (
     gains,
     late_clocks,
     open_parameters,
-    tilted_bases,
     vertical,
 )
 from steelyard.team.twists.team import TwistTeam
 from steelyard.team.twists.turning_gains import TurningGains
 from steelyard.team.weighed import Seen, clocked, weighed
+
+# What is found of robots that then no longer disagree: poses that are misread may pass for it.
+CHANGES = {"grasp-slipped", "robot-left", "robot-joined"}
 
 
 @dataclass(frozen=True)
@@ -81,19 +84,23 @@ class JointTeam:
     def _from_twists(self, log: TeamLog) -> Seen:
         """Return what twists show; raises CannotAnswer where two bodies with a hinge move on bases that move."""
         log, moving, begun = self._fitted(log, partial(TwistTeam.of, other=self.slipped or ()))
-        if moving.rough:
-            require_one_velocity_unit(log, moving)
+        turning = TurningGains.of(moving.parts, moving.fit.grasps, moving.fit.noise)
+        tilt, differ = moving.tilt(log.names), tuple(turning.findings(log.names))
+        if differ or _doubtful(moving, tilt):
+            require_twists_well_read(log, moving)
         apart = rigidity_findings(moving.split, log.names, UNPLACED)
         if moving.split is not None and moving.split.sure:
             raise CannotAnswer(" ".join(finding.message for finding in apart))
         grasps, noise = moving.fit.grasps, moving.fit.noise
         spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
-        turning = TurningGains.of(moving.parts, grasps, noise)
         spread = turning.widened(spread, grasps)
+        found = [*moving.findings, *apart, *differ]
+        if tilt is not None:
+            found.append(tilt.finding)
+            moving = moving if tilt.odd is None else moving.without_level(tilt.odd)
         made, path = moving.rows(self.highest_hz)
-        found = (*moving.findings, *apart, *turning.findings(log.names))
         return Seen(
-            log, grasps, spread, noise, moving.late, begun, moving.fit.left, found, made, path, 1, moving.down()
+            log, grasps, spread, noise, moving.late, begun, moving.fit.left, tuple(found), made, path, 1, moving.down()
         )
 
     def _from_poses(self, log: TeamLog) -> Seen | TeamEstimate:
@@ -107,12 +114,15 @@ class JointTeam:
         jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
         if jointed is not None:
             return jointed
-        if standing.rough:
+        tilt = standing.tilt(log, spread)
+        if _doubtful(standing, tilt):
             require_well_read(log)
+        if standing.rough:
             require_own_files(log)
         found = [*standing.findings, *yields.findings(log), *rigidity_findings(split, log.names)]
-        if not spread.blind.size:
-            found += tilted_bases(log, standing.fit.team.homes)
+        if tilt is not None:
+            found.append(tilt.finding)
+            log = log if tilt.odd is None else log.without_gravity(log.names[tilt.odd])
         made, path = standing.rows(log, self.highest_hz)
         down = vertical(standing.gravity(log), standing.fit.team.motion)
         left = standing.fit.left
@@ -177,6 +187,13 @@ class JointTeam:
             raise BadValue(f"a mass is given for the wrist of '{unknown[0]}', who is not in the team.")
         for name, mass in self.wrists.items():
             check.not_negative(f"the mass of the wrist of '{name}'", mass)
+
+
+def _doubtful(team: MotionFit, tilt: Tilted | None) -> bool:
+    """Return whether motion may be misread: robots disagree, on where gravity points, too, or did until rows were left
+    out in which one of them slipped or let go.
+    """
+    return team.rough or tilt is not None or any(one.code in CHANGES for one in team.findings)
 
 
 def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:

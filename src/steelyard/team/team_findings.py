@@ -9,7 +9,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, with_bar
 from steelyard.logs.log import Mask
-from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, unit_vectors
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
@@ -21,8 +20,6 @@ BAD = 20.0
 GAIN = 3e-3
 # And only where so little of the evidence is left for gains without error: a chance draw is no sign of one.
 GAINLESS = 0.1
-# Bases that are said to be level, or told where gravity points, are so to within this [rad]; apart by more, one is not.
-TILTED = 0.03
 # What force sensors are good to.
 USUAL_GAIN = 0.01
 # A direction is called by an axis where it is within this cosine of it.
@@ -122,31 +119,6 @@ def bad_robots(names: Sequence[str], noise: Array) -> Iterator[Finding]:
                 f"What '{name}' says of its motion disagrees with the others {times:.0f} times more than theirs do; "
                 "it counts for next to nothing.",
             )
-
-
-def tilted_bases(log: TeamLog, homes: Pose) -> Iterator[Finding]:
-    """Yield base-tilted where robots whose homes (N,) poses tell do not agree on where gravity points."""
-    told = [(r.name, homes[i].rotation.apply(r.gravity)) for i, r in enumerate(log.robots) if r.gravity is not None]
-    if len(told) < 2:
-        return
-    down = unit_vectors(np.array([each for _, each in told]))
-    apart = np.arccos(np.clip(down @ down.T, -1.0, 1.0))
-    if apart.max() < TILTED:
-        return
-    # The one who is farthest from the others, where those agree far better.
-    odd = int(np.argmax(np.median(apart, axis=1)))
-    others = np.delete(np.delete(apart, odd, 0), odd, 1)
-    degrees = np.rad2deg(float(np.median(np.delete(apart[odd], odd))))
-    if len(told) > 2 and others.max() < apart.max() / 3:
-        who = f"Gravity of '{told[odd][0]}' points {degrees:.1f} deg from where that of the others does"
-    else:
-        i, j = (int(k) for k in np.unravel_index(np.argmax(apart), apart.shape))
-        who = f"Gravity of '{told[i][0]}' and of '{told[j][0]}' points {np.rad2deg(apart.max()):.1f} deg apart"
-    yield Finding.of(
-        "base-tilted",
-        f"{who}, though poses tell how their homes are turned: a base is tilted, or its gravity is not what was said. "
-        "The mean was taken; mass and centre of mass may be off by more than their bars.",
-    )
 
 
 def gains(gain: float, gainless: float) -> Iterator[Finding]:

@@ -22,7 +22,8 @@ from steelyard.team.motion_fit import F
 from steelyard.team.stacked import Stretch
 
 MOST_SLIPS = 3
-# Noise of a rough fit must fall by this factor on average where a slip between recordings is to explain it.
+# Noise of a rough fit that stays so must fall by this factor on average where a slip between recordings is to explain
+# it.
 BETTER = 3.0
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
@@ -107,7 +108,8 @@ def _without_slips(
         except FAILURES:
             break
         # Recordings that differ for another reason than a slip still do.
-        if before.rough and found.between and float(np.log(before.fit.noise / team.fit.noise).mean()) < np.log(BETTER):
+        fallen = float(np.log(before.fit.noise / team.fit.noise).mean())
+        if before.rough and team.rough and found.between and fallen < np.log(BETTER):
             break
         measured = team.measured(log, found.beside(slips))
         # What bends the first fit looks larger in it.

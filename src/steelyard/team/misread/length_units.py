@@ -39,14 +39,22 @@ def require_one_length_unit(log: TeamLog) -> None:
 
 
 def require_metres(names: tuple[str, ...], grasps: Pose) -> None:
-    """Raise BadValue where grasps (N,) lie farther from the first than a payload is long."""
-    apart = np.linalg.norm(grasps.position - grasps.position[0], axis=1)
-    far = int(apart.argmax())
-    if apart[far] > FARTHEST:
-        raise BadValue(
-            f"the grasps of '{names[0]}' and '{names[far]}' come out {apart[far]:.3g} m apart: lengths are not in the "
-            'unit that was said. Set the unit ("mm" or "mm/s", say) that each robot\'s "position" or velocity has.'
-        )
+    """Raise BadValue where grasps (N,) lie farther apart than a payload is long; names the one that is far from all."""
+    apart = np.linalg.norm(grasps.position[:, None] - grasps.position, axis=2)
+    first, far = (int(i) for i in np.unravel_index(apart.argmax(), apart.shape))
+    if apart[first, far] < FARTHEST:
+        return
+    odd = int(np.median(apart, axis=1).argmax())
+    others = np.delete(np.delete(apart, odd, 0), odd, 1)
+    if len(names) > 2 and others.max() < FARTHEST:
+        who, whose = f"the grasp of '{names[odd]}' comes out {apart[odd].max():.3g} m from the others", "its"
+    else:
+        who = f"the grasps of '{names[first]}' and '{names[far]}' come out {apart[first, far]:.3g} m apart"
+        whose = "each robot's"
+    raise BadValue(
+        f"{who}: lengths are not in the unit that was said. Set the unit "
+        f'("mm" or "mm/s", say) that {whose} "position" or velocity has.'
+    )
 
 
 def _size(track: Track) -> tuple[float, float]:

@@ -17,6 +17,8 @@ from steelyard.errors import BadValue
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.changes.presence import SHARE as IDLE
+from steelyard.team.changes.presence import idle
 from steelyard.team.clocks.search import far_lags
 from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
 from steelyard.team.poses.measured import TeamMotion, in_words
@@ -98,13 +100,16 @@ READINGS = (*SCALES, *TURNS)
 def require_well_read(log: TeamLog) -> None:
     """Raise BadValue where poses that do not fit do so once one robot's, or all, are read in another way.
 
-    Clocks are taken as they are, but for those far off: how fast a grasp turns is the same in all these readings.
+    Clocks are taken as they are, but for those far off: how fast a grasp turns is the same in all these readings. Who
+    pushes with next to nothing may hold nothing.
     """
     names, reference = log.names, log.names.index(log.reference)
     try:
-        parts = tuple(part.thinned(ROWS) for part in stretches(far_lags(log).corrected(log), {}))
+        parts = stretches(far_lags(log).corrected(log), {})
     except BadValue:
         return
+    held = zip(parts, idle(parts, IDLE), strict=True)
+    parts = tuple(replace(part, seen=part.seen & ~rows).thinned(ROWS) for part, rows in held)
     judge = Judge(names, reference)
     # A fit may end beside the optimum: then its start is the better of the two.
     given = min((judge(parts, exact) for exact in (True, False)), key=lambda judged: judged.cost)

@@ -18,9 +18,11 @@ from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, s
 from steelyard.team.changes.slips_between import slip_between, step_between
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.level import Tilted, tilted
 from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.poses import rows as pose_rows
+from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
 from steelyard.team.poses.measured import Team, TeamMotion
 from steelyard.team.poses.rest import shares_at_rest
@@ -140,6 +142,10 @@ class PoseTeam(MotionFit):
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""
         return mean_gravity(log, self.fit.team.homes)
+
+    def tilt(self, log: TeamLog, spread: Spread) -> Tilted | None:
+        """Return who disagrees on where gravity points, for homes turned as well as grasps are known to be."""
+        return tilted(log.names, np.einsum("nij,nj->ni", self.fit.team.homes.rotation.matrix, _down(log)), spread)
 
     def level(self, log: TeamLog) -> Array:
         """Return the direction of gravity over how well it is known (N, 3), as in `Spread`."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numpy as np
@@ -18,6 +18,7 @@ from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
+from steelyard.team.level import Tilted, tilted
 from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
 from steelyard.team.split import Split, smoothed, split_of
@@ -133,6 +134,18 @@ class TwistTeam(MotionFit):
             return None
         mean = rows.mean(0)
         return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
+
+    def tilt(self, names: tuple[str, ...]) -> Tilted | None:
+        """Return who disagrees on where gravity points, in rows in which all say so who ever do; None if nobody."""
+        told = np.any([part.level.any(0) for part in self.parts], axis=0)
+        every = [part.down[part.level[:, told].all(1)].sum(0) for part in self.parts]
+        down = np.einsum("nij,nj->ni", self.fit.grasps.rotation.matrix, np.sum(every, axis=0))
+        return tilted(names, np.where(told[:, None], down, 0.0), self.fit.spread)
+
+    def without_level(self, robot: int) -> TwistTeam:
+        """Return the same without what one robot calls down."""
+        others = np.arange(len(self.fit.noise)) != robot
+        return replace(self, parts=tuple(replace(part, level=part.level & others) for part in self.parts))
 
     def level(self, reference: int) -> Array:
         """Return the line of gravity over how well it is known (N, 3), as in `Spread`."""
