@@ -26,7 +26,7 @@ from steelyard.sanity.readings.rivals import (
     as_read,
     best_rival,
     reading_of,
-    rival_finding,
+    rival_findings,
     sign_of,
 )
 from steelyard.sanity.readings.static_fit import StaticFit
@@ -73,7 +73,7 @@ def _judged(recording: Recording, view: Glance) -> tuple[Recording, tuple[Findin
     reading = reading_of(view, "", recording.gravity, view.rotation)
     best = best_rival(recording, view, reading)
     if best is not None:
-        return as_read(recording, best), (rival_finding(best, reading),)
+        return as_read(recording, best), rival_findings(best, reading)
     named = examine_both_masses(view, recording.gravity, reading.rotation)
     # What a controller leaves of a weight may have either sign.
     left_over = any(finding.code == "weight-compensated" for finding in named)
@@ -112,7 +112,7 @@ def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
     best = best_rival(paused, view, given)
     if best is None or best.misread is None:
         return paused, ()
-    return examine_leaps(as_read(recording, best)), (rival_finding(best, given),)
+    return examine_leaps(as_read(recording, best)), rival_findings(best, given)
 
 
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
