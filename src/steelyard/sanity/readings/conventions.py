@@ -29,7 +29,6 @@ from steelyard.sanity.readings.rivals import (
     rival_findings,
     sign_of,
 )
-from steelyard.sanity.readings.static_fit import StaticFit
 from steelyard.sanity.readings.swapped import examine_swapped
 from steelyard.sanity.readings.tilt import blind_axis
 from steelyard.sanity.readings.torques import examine_torques

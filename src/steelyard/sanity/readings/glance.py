@@ -78,7 +78,7 @@ class Glance:
         return replace(self, acceleration=None)
 
     def smooth(self, values: Array) -> Array:
-        """Return values (N, k) through the common low-pass in the rows that are fitted (M, k); a table's as they are."""
+        """Return values (N, k) through the common low-pass, in the rows to fit (M, k); a table's as they are."""
         if self.rate is None:
             return values
         slow = lowpass(values, CUTOFF_HZ, self.rate, order=2)
