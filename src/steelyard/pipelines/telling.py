@@ -14,7 +14,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
-from steelyard.pipelines.load import Load
+from steelyard.pipelines.load import WITH_BIAS, Load
 from steelyard.pipelines.rows import FitRows
 from steelyard.sanity.coverage import coverage
 
@@ -61,8 +61,8 @@ def beside(findings: tuple[Finding, ...], gravity: Array) -> Iterator[None]:
     try:
         yield
     except CannotAnswer as error:
-        lost, more, _ = str(error).partition(ADD_POSES)
-        if more and not coverage(gravity):
+        lost, more, rest = str(error).partition(ADD_POSES)
+        if more and not rest.endswith(WITH_BIAS) and not coverage(gravity):
             error = CannotAnswer(f"{lost}{FOLLOWS_NOT}")
         if not findings:
             raise error from None
