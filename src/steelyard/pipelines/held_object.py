@@ -52,7 +52,7 @@ def identify(
     before = noticed_before(before, recording, rows)
     shape = placed(parts, recording.object_pose, recording.object_pose_std)
     load = Load(rows.log, Bias(options.bias, drift=options.drift), options, shape, known)
-    with beside(before):
+    with beside(before, rows.log.gravity):
         load, estimate = load.followed()
     load, estimate, late = looked_back(load, estimate, rows, recording, before)
     estimate = load.without_tool(estimate).noted(*rows.notes, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift)

@@ -26,6 +26,8 @@ from steelyard.spatial import Pose
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
 
+# What helps a refusal where the sensor is not tared.
+WITH_BIAS = "With a bias estimated the data answer: leave out --bias none."
 # [m] No robot holds a part that fills a cube of this edge; one of a centimetre in millimetres does.
 LARGEST = 2.0
 # [m], [rad] What a place in the sensor may err by, per axis, where nobody says: not at all, as in a fixture; as camera
@@ -80,7 +82,7 @@ class Load:
         except CannotAnswer as error:
             if self.freed() is None:
                 raise
-            raise CannotAnswer(f"{error} With a bias estimated the data answer: leave out --bias none.") from None
+            raise CannotAnswer(f"{error} {WITH_BIAS}") from None
 
     def _unless_elsewhere(self, estimate: Estimate) -> tuple[Load, Estimate]:
         """Return load and estimate, both of the log alone where that shows the shape to lie elsewhere beyond doubt."""

@@ -7,18 +7,26 @@ from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
+from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import AT_REST, BARE, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES
 from steelyard.logs.recording import Recording
 from steelyard.parts.parts import Parts
-from steelyard.pipelines.load import Load
+from steelyard.pipelines.load import WITH_BIAS, Load
 from steelyard.pipelines.rows import FitRows
+from steelyard.sanity.coverage import coverage
 
 if TYPE_CHECKING:
     from steelyard.pipelines.shape_in_parts import Shape
 
+# Said of a refusal where the poses would do.
+FOLLOWS_NOT = (
+    "Gravity takes enough directions of the sensor for that, as the log was read, but the forces do not turn with it. "
+    "Check form, order, unit and sense of the rotation, the frame and the mount of the wrench, stuck channels, and "
+    "whether the clocks are of one run; or a controller takes the weight away, or it is lost in noise."
+)
 # Findings after which motion or wrench are no body's.
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Findings of what a load and a bias share: a tared sensor has no bias.
@@ -45,18 +53,23 @@ def noticed_before(found: tuple[Finding, ...], recording: Recording, rows: FitRo
 
 
 @contextmanager
-def beside(findings: tuple[Finding, ...]) -> Iterator[None]:
-    """Say with a refusal what was noticed before: it is the likely cause."""
+def beside(findings: tuple[Finding, ...], gravity: Array) -> Iterator[None]:
+    """Say with a refusal what was noticed before: it is the likely cause.
+
+    gravity  (N, 3) [m/s^2] in S at the rows: where it takes enough directions, more of them would not help
+    """
     try:
         yield
     except CannotAnswer as error:
+        lost, more, rest = str(error).partition(ADD_POSES)
+        if more and not rest.endswith(WITH_BIAS) and not coverage(gravity):
+            error = CannotAnswer(f"{lost}{FOLLOWS_NOT}")
         if not findings:
-            raise
+            raise error from None
         said = " ".join(f"{f.message} {f.remedy}" for f in findings)
         if any(f.left_in for f in findings):
             # More poses would be as wrong: what was noticed says what to do.
-            lost = str(error).partition(ADD_POSES)[0].rstrip()
-            raise CannotAnswer(f"Noticed before the fit: {said} As the log was read: {lost}") from None
+            raise CannotAnswer(f"Noticed before the fit: {said} As the log was read: {lost.rstrip()}") from None
         raise CannotAnswer(f"{error} Noticed before the fit: {said}") from None
 
 

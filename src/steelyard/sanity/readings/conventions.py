@@ -26,10 +26,9 @@ from steelyard.sanity.readings.rivals import (
     as_read,
     best_rival,
     reading_of,
-    rival_finding,
+    rival_findings,
     sign_of,
 )
-from steelyard.sanity.readings.static_fit import StaticFit
 from steelyard.sanity.readings.swapped import examine_swapped
 from steelyard.sanity.readings.tilt import blind_axis
 from steelyard.sanity.readings.torques import examine_torques
@@ -37,6 +36,8 @@ from steelyard.sanity.readings.units import scaled
 from steelyard.sanity.readings.weightless import require_weight
 from steelyard.sanity.rows.leaps import examine_leaps
 
+# So many mistakes of one description are put right.
+MOST_MISTAKES = 4
 # No hand holds a mass this far from its sensor [m].
 FURTHEST_ARM = 2.0
 
@@ -44,43 +45,57 @@ FURTHEST_ARM = 2.0
 def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording in the conventions that explain it, and a finding for each that was not as said.
 
+    One mistake hides another: once one is put right, all is judged anew. What is only named is that of the log as it is
+    read in the end.
+
     Raises CannotAnswer where the force shows no weight in any.
     """
-    view = glance(recording)
-    if view is None:
-        return recording, ()
-    recording, view, swapped = examine_swapped(recording, view)
-    found = list(swapped)
+    found: list[Finding] = []
+    named: tuple[Finding, ...] = ()
+    for _ in range(MOST_MISTAKES):
+        view = glance(recording)
+        if view is None:
+            break
+        read, findings = _judged(recording, view)
+        if read is recording:
+            named = findings
+            break
+        recording, found = read, [*found, *findings]
+    return recording, (*found, *named)
+
+
+def _judged(recording: Recording, view: Glance) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with its plainest mistake put right, and what is said of it; else all that is only named."""
+    read, findings = examine_swapped(recording, view)
+    if findings:
+        return read, findings
     reading = reading_of(view, "", recording.gravity, view.rotation)
     best = best_rival(recording, view, reading)
     if best is not None:
-        found.append(rival_finding(best, reading))
-        recording, reading, view = as_read(recording, best), best, best.view or view
-        if best.misread is not None and best.misread.whole:
-            view = glance(recording) or view
-    found.extend(masses := examine_both_masses(view, recording.gravity, reading.rotation))
+        return as_read(recording, best), rival_findings(best, reading)
+    named = examine_both_masses(view, recording.gravity, reading.rotation)
     # What a controller leaves of a weight may have either sign.
-    left_over = any(finding.code == "weight-compensated" for finding in masses)
-    flipped, findings = (recording, ()) if left_over else _signs(recording, view, reading)
+    left_over = any(finding.code == "weight-compensated" for finding in named)
+    read, findings = (recording, ()) if left_over else _signs(recording, view, reading)
     if findings:
-        view = view if view.mirrored is None else glance(flipped) or view
-        reading = reading_of(view, "", flipped.gravity, reading.rotation)
-    recording = flipped
-    found.extend(findings)
-    if not found:
-        recording, findings = examine_torques(recording, view, reading)
-    if found or not findings:
-        recording, findings = _lengths(recording, reading.fit)
-    found.extend(findings)
-    if best is None and reading.rotation is not None:
-        recording, findings = examine_level(recording, view, reading)
-        found.extend(findings)
-        blind = None if findings else blind_axis(view, reading.rotation)
-        if blind is not None and not found:
-            found.extend(blind_tilt(view, recording.gravity, blind))
-    if not found:
+        return read, findings
+    for step in (_lengths if named else _units_of, examine_level):
+        read, findings = step(recording, view, reading)
+        if read is not recording:
+            return read, findings
+        named = (*named, *findings)
+    blind = None if reading.rotation is None else blind_axis(view, reading.rotation)
+    if blind is not None and not named:
+        named = blind_tilt(view, recording.gravity, blind)
+    if not named:
         require_weight(view, recording.gravity, reading.rotation, reading.fit)
-    return recording, tuple(found)
+    return recording, named
+
+
+def _units_of(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with torques that belong to the forces, and what is said of those that do not."""
+    read, findings = examine_torques(recording, view, reading)
+    return (read, findings) if findings else _lengths(recording, view, reading)
 
 
 def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -96,7 +111,7 @@ def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
     best = best_rival(paused, view, given)
     if best is None or best.misread is None:
         return paused, ()
-    return examine_leaps(as_read(recording, best)), (rival_finding(best, given),)
+    return examine_leaps(as_read(recording, best)), rival_findings(best, given)
 
 
 def _signs(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
@@ -174,8 +189,9 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
     return int(np.sign(masses[0])) if sure else 0
 
 
-def _lengths(recording: Recording, found: StaticFit) -> tuple[Recording, tuple[Finding, ...]]:
+def _lengths(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with torques in N m where the centre of mass lies metres away."""
+    found = reading.fit
     size, spread = float(np.linalg.norm(found.moment)), float(np.linalg.norm(found.moment_std))
     if not found.sign or found.arm < FURTHEST_ARM or size < 5 * spread or found.torque_share > 0.7:
         return recording, ()

@@ -2,6 +2,7 @@
 
 Clocks are taken as they are, the wrench is averaged over a sixtieth of a second, and everything is
 low-passed alike, so that a body at rest or in slow motion obeys f = m (a - g), tau = h x (a - g), each with a bias.
+Nothing is read out of holes in a stream, nor out of knocks: a line across either is no measurement.
 """
 
 from __future__ import annotations
@@ -11,10 +12,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.inertia import forms
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.holes import holes, unknown_motion
 from steelyard.logs.imu import first_mount
+from steelyard.logs.outliers import bursts, inside, merged
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import cross_matrix
 
@@ -23,6 +26,7 @@ _RATE_HZ = 60.0
 _MOST_ROWS = 20_000
 _FEWEST_ROWS = 60
 _BLOCKS = 12
+_SMEAR_S = 0.3  # so far the low-pass carries what stands in a hole
 _PARTS = ("torque", "force")
 
 OnRows = Callable[[Stream, Array], Array]  # a channel (M, ..) as it is at the rows of a glance (N, ..)
@@ -36,7 +40,7 @@ class Glance:
     rotation      (N, 3, 3) S to W, averaged over a row; None without
     pull          (N, 3) [m/s^2] gravity in S from a channel, where there is no rotation
     acceleration  (N, 3) [m/s^2] of the S origin in W, without gravity; None where no channel tells it
-    block         (N,) number of the stretch (or the pose) a row belongs to, for the jackknife
+    block         (M,) number of the stretch (or the pose) that a row which is fitted belongs to, for the jackknife
     rate          [Hz] of the rows; None for a table
     world         which of "torque" and "force" are in W axes
     accelerometer (N, 3) [m/s^2] what an accelerometer shows in its own axes, where there are rotations, too
@@ -44,6 +48,7 @@ class Glance:
                   accelerometer sits; else None
     dead          channels [tau, f] of S that do not measure; their wrench is zero
     position      (N, 3) [m] of the S origin in W; None where no channel tells it
+    kept          (N,) the M rows that are fitted, which lie in no hole; None where all are
     """
 
     wrench: Array
@@ -57,6 +62,7 @@ class Glance:
     accelerometer: Array | None = None
     dead: tuple[bool, ...] = (False,) * 6
     position: Array | None = None
+    kept: Mask | None = None
 
     def __len__(self) -> int:
         return len(self.wrench)
@@ -72,8 +78,11 @@ class Glance:
         return replace(self, acceleration=None)
 
     def smooth(self, values: Array) -> Array:
-        """Return values (N, k) through the common low-pass; the rows of a table as they are."""
-        return values if self.rate is None else lowpass(values, CUTOFF_HZ, self.rate, order=2)
+        """Return values (N, k) through the common low-pass, in the rows to fit (M, k); a table's as they are."""
+        if self.rate is None:
+            return values
+        slow = lowpass(values, CUTOFF_HZ, self.rate, order=2)
+        return slow if self.kept is None else slow[self.kept]
 
     def seen(self, gravity: Array, rotation: Array | None) -> Seen:
         """Return wrench and motion in S, low-passed, for a gravity in W (3,) [m/s^2] and rotations (N, 3, 3)."""
@@ -99,7 +108,7 @@ class Glance:
 
 @dataclass(frozen=True, eq=False)
 class Seen:
-    """A glance in S under one set of conventions.
+    """The rows of a glance that are fitted, in S under one set of conventions.
 
     wrench  (N, 6) [tau, f] on-object
     pull    (N, 3) gravity less acceleration [m/s^2]
@@ -250,11 +259,11 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     grid = np.asarray(start + (np.arange(rows) + 0.5) / rate, dtype=np.float64)
 
     def on_grid(s: Stream, values: Array) -> Array:
-        clock = np.asarray(s.time) - (s.delay or 0.0)
-        return resampled(clock, values, grid)
+        return resampled(_stamps(s), values, grid)
 
     raw, world = _wrench(recording, stream)
-    wrench = np.where(recording.dead, 0.0, on_grid(stream, raw))
+    calm = ~inside(_stamps(stream), _knocks(stream))
+    wrench = np.where(recording.dead, 0.0, resampled(_stamps(stream)[calm], raw[calm], grid))
     seen = replace(recording, streams=tuple(used))
     rotation = next((on_grid(s, v) for s, _, v in channel(seen, "rotation")), None)
     pull, mirrored = (None, None) if rotation is not None else _pulls(seen, on_grid, wrench)
@@ -262,11 +271,32 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
         return None
     acceleration = _acceleration(recording, rotation, on_grid, rate)
     block = np.minimum(np.arange(rows) * _BLOCKS // rows, _BLOCKS - 1)
+    kept = ~inside(grid, _unseen(stream.rows(calm), [s for s in used if s is not stream]))
+    whole = bool(kept.all()) or int(kept.sum()) < _FEWEST_ROWS
     felt = None
     if rotation is not None:
         felt = next((on_grid(s, v) for s, _, v in channel(seen, "specific_force")), None)
     place = next((on_grid(s, v) for s, _, v in channel(seen, "position")), None)
-    return Glance(wrench, rotation, pull, acceleration, block, rate, world, mirrored, felt, recording.dead, place)
+    return Glance(
+        wrench, rotation, pull, acceleration, block if whole else block[kept], rate, world, mirrored, felt,
+        recording.dead, place, None if whole else kept,
+    )  # fmt: skip
+
+
+def _stamps(stream: Stream) -> Array:
+    """Return the stamps (N,) [s] of a stream with a clock, less a delay that was given."""
+    return np.asarray(stream.time) - (stream.delay or 0.0)
+
+
+def _knocks(stream: Stream) -> Array:
+    """Return the times (K, 2) [s] of knocks and stray readings in the wrench."""
+    return merged(*(bursts(_stamps(stream), stream.channels[part]) for part in _PARTS))
+
+
+def _unseen(felt: Stream, others: list[Stream]) -> Array:
+    """Return the times (K, 2) [s] in which no row of a stream is near: of the wrench, or of others in motion."""
+    missing = [holes(felt) - (felt.delay or 0.0), *(unknown_motion(s) - (s.delay or 0.0) for s in others)]
+    return merged(*(gaps + np.array([-_SMEAR_S, _SMEAR_S]) for gaps in missing))
 
 
 def _acceleration(recording: Recording, rotation: Array | None, on_grid: OnRows, rate: float) -> Array | None:

@@ -29,7 +29,7 @@ def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple
 
     Force columns in another order, and a sensor that is turned, are told of where they explain more; they are left in.
     """
-    if reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
+    if reading.rotation is None or reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
         return recording, ()
     tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
     turned = turned_sensor(view, reading.gravity, sign_of(view, reading))

@@ -12,7 +12,7 @@ read the rotations leaves a tenth of the torque variance, and half of what any o
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -84,17 +84,23 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
         return None
     free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
     bar = MUCH_BETTER * given.fit.force_share
-    able = [
-        r
-        for r in (*_rivals(recording, view, given.gravity), *_in_other_axes(recording, view, given))
-        if r.fit.force_share < min(bar, 0.5)
-        and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
-        and r.fit.sign != 0
-        and _varies(view, r)
-        and _beats_tilt(r, free)
-        and (r.view is None or r.fit.torque_share < TORQUES_TOO)
-    ]
-    best = min(able, key=_unlikely, default=None)
+
+    def able(rivals: Iterable[Reading], bar: float) -> list[Reading]:
+        return [
+            r
+            for r in rivals
+            if r.fit.force_share < min(bar, 0.5)
+            and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
+            and r.fit.sign != 0
+            and _varies(view, r)
+            and _beats_tilt(r, free)
+            and (r.view is None or r.fit.torque_share < TORQUES_TOO)
+        ]
+
+    one = able((*_rivals(recording, view, given.gravity), *_in_other_axes(recording, view, given)), bar)
+    # Of two mistakes each must leave much less than the other alone does.
+    both = () if one else able(_misread_in_other_axes(recording, given.gravity), MUCH_BETTER * bar)
+    best = min(one or both, key=_unlikely, default=None)
     return best if best is not None and not _outdone(best, view, given.gravity) else None
 
 
@@ -167,6 +173,15 @@ def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterat
     yield from (r for r in found[1:] if r.fit.torque_share < BESIDE * found[0].fit.torque_share)
 
 
+def _misread_in_other_axes(recording: Recording, gravity: Array) -> Iterator[Reading]:
+    """Yield the wrench in other axes beside rotations that are misread, too: neither alone explains such a log."""
+    for misread in (*MISREAD, INVERTED):
+        meant = glance(put) if (put := _put_right(recording, misread)) is not None else None
+        if put is not None and meant is not None and meant.rotation is not None:
+            for rival in _in_other_axes(put, meant, reading_of(meant, "", gravity, meant.rotation)):
+                yield replace(rival, words=f"{rival.words}, and {misread.words}", misread=misread)
+
+
 def _axes_in_words(world: frozenset[str]) -> str:
     if len(world) == 1:
         (turned,) = world
@@ -205,26 +220,28 @@ def _varies(view: Glance, reading: Reading) -> bool:
     return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
 
 
-def rival_finding(best: Reading, given: Reading) -> Finding:
+def rival_findings(best: Reading, given: Reading) -> tuple[Finding, ...]:
     """Return what is said of the rival that is taken instead of the reading as given."""
     part, instead = ("torque", given.fit.torque_share) if best.by_torque else ("force", given.fit.force_share)
     message = (
         f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.left)} of the {part} variance is "
         f"left unexplained instead of {percent(instead)}. The answer assumes this."
     )
-    if best.view is not None:
-        axes = [f'frame = "{"W" if part in best.view.world else "S"}" in its {part}' for part in ("force", "torque")]
-        return Finding("gravity-frame", message, f"Set {' and '.join(axes)} in the description of this stream.")
-    return Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message)
+    if best.view is None:
+        return (Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message),)
+    axes = [f'frame = "{"W" if part in best.view.world else "S"}" in its {part}' for part in ("force", "torque")]
+    remedy = f"Set {' and '.join(axes)} in the description of this stream."
+    misread = best.misread
+    beside = () if misread is None else (misread.finding(f"Beside the axes of the wrench, {misread.words}."),)
+    return (Finding("gravity-frame", message, remedy), *beside)
 
 
 def as_read(recording: Recording, best: Reading) -> Recording:
     """Return the recording with its rotations, gravity and axes of the wrench as the reading has them."""
-    if best.view is not None:
-        return in_axes(recording, best.view.world)
-    if best.misread is None:
+    if best.view is None and best.misread is None:
         return replace(recording, gravity=best.gravity)
-    return _put_right(recording, best.misread) or recording
+    put = recording if best.misread is None else _put_right(recording, best.misread) or recording
+    return put if best.view is None else in_axes(put, best.view.world)
 
 
 def _put_right(recording: Recording, misread: Misread) -> Recording | None:

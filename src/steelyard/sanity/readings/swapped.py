@@ -15,26 +15,26 @@ UNEXPLAINED, WELL, TORQUES_TOO = 0.5, 0.05, 0.3
 _OTHER = {"force": "torque", "torque": "force"}
 
 
-def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, Glance, tuple[Finding, ...]]:
-    """Return recording and glance with forces and torques exchanged where that explains both, and a finding."""
+def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with forces and torques exchanged where that explains both, and a finding."""
     if any(recording.dead) or view.mirrored is not None:
-        return recording, view, ()
+        return recording, ()
     given = fit(view.seen(recording.gravity, view.rotation), view.block)
     if given.force_share < UNEXPLAINED:
-        return recording, view, ()
+        return recording, ()
     other = replace(recording, streams=tuple(map(_exchanged, recording.streams)))
     seen = glance(other)
     if seen is None:
-        return recording, view, ()
+        return recording, ()
     found = fit(seen.seen(recording.gravity, seen.rotation), seen.block)
     if found.sign == 0 or found.force_share > WELL or found.torque_share > TORQUES_TOO:
-        return recording, view, ()
+        return recording, ()
     text = (
         f"Forces and torques are in each other's columns: exchanged, {percent(found.force_share)} of the force "
         f"variance is left unexplained instead of {percent(given.force_share)}. The answer assumes this."
     )
     remedy = "Exchange the columns of force and torque in the description."
-    return other, seen, (Finding("force-unit", text, remedy),)
+    return other, (Finding("force-unit", text, remedy),)
 
 
 def _exchanged(stream: Stream) -> Stream:
