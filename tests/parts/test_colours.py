@@ -189,6 +189,23 @@ def test_a_thin_rod_under_a_lamp_keeps_its_colour():
     assert agreement(modes.label, cloud.labels) > 0.97
 
 
+@pytest.mark.parametrize("measured", [False, True], ids=["noisy points", "noisy normals"])
+def test_a_lamp_is_taken_out_where_normals_are_noisy(measured):
+    """The light goes by true normals; those of a rough surface, or of a camera, scatter about them."""
+    rng = np.random.default_rng(2)
+    facing = rng.normal(size=(3000, 3))
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    xyz = facing * [0.02, 0.03, 0.05]
+    facing = facing / [0.02, 0.03, 0.05]
+    facing /= np.linalg.norm(facing, axis=1, keepdims=True)
+    skin = skin_of(enclose(Cloud(xyz + (0.0 if measured else 3e-4) * rng.normal(size=xyz.shape))).mesh)
+    rgb = noisy(np.array([190, 180, 40]) * (0.72 + 0.36 * facing @ [0.3, -0.5, 0.81])[:, None], 3)
+    told = facing + 0.15 * rng.normal(size=facing.shape)
+    modes = colour_modes(rgb, skin, told / np.linalg.norm(told, axis=1, keepdims=True) if measured else None)
+    assert modes.light.seen
+    assert len(modes.rgb) == 1
+
+
 def test_no_side_is_black_however_little_tells_of_it():
     """The fit knows the sides that are seen; on others harmonics may pass zero, and colours would burst."""
     light = Light(np.array([0.9, 0, 0, 0, 0, 0, -0.9, 0, 0, 0, 0.0]))

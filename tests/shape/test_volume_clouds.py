@@ -381,3 +381,23 @@ def test_one_point_far_away_makes_no_millimetres() -> None:
     solid = enclose(Cloud(np.concatenate([ball(4000), [[0.0, 0.0, 6.0]]])))
     assert solid.mesh.volume == pytest.approx(268e-6, rel=0.03)
     assert {f.code for f in solid.findings} == {"outliers"}
+
+
+@pytest.mark.parametrize("points", [4300, 5000, 8000])
+def test_points_that_hardly_need_thinning_are_no_strays(brick: Sheet, points: int) -> None:
+    """What thinned points keep is then much less than what lies between most."""
+    solid = enclose(Cloud(spread_evenly(brick.mesh, np.random.default_rng(3), points)[0]))
+    assert codes(solid) == {"cloud-thinned"}
+    assert len(solid.cloud) <= 1.05 * 4000
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_cup_of_uneven_points_somewhat_more_than_are_used_stays_open(seed: int) -> None:
+    rng = np.random.default_rng(seed)
+    made = sheet(rod(40, 0, 95) - rod(36, 5, 96))
+    xyz, normals, _ = spread_evenly(made.mesh, rng, 40_000)
+    weight = 0.25 + np.clip(normals @ np.array([0.6, 0.64, 0.48]), 0, 1)
+    weight *= np.exp(0.5 * np.sin(25 * xyz @ rng.normal(size=(3, 4)) + rng.uniform(0, 6, 4)).sum(1))
+    solid = enclose(Cloud(xyz[rng.choice(len(xyz), 6000, False, weight / weight.sum())]))
+    assert solid.mesh.volume == pytest.approx(made.volume, rel=0.15)
+    assert "outliers" not in codes(solid)

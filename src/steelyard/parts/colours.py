@@ -12,6 +12,7 @@ from steelyard.parts.light import Light, light_on
 from steelyard.parts.skin import OPPOSITE, Skin
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import Integers
+from steelyard.spatial import unit_vectors
 
 NEIGHBOURS = 8
 # Distances between colours 0..1 (black to white is 1.7). Steps of eight bits and of a compressed texture are below the
@@ -50,7 +51,7 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     """
     seen = np.ones(len(rgb), dtype=bool) if seen is None or not seen.any() else seen
     colour, near = np.asarray(rgb, dtype=np.float64) / 255, skin.near[:, :NEIGHBOURS]
-    facing = skin.normals if normals is None else normals
+    facing = _calm_sides(skin.normals if normals is None else normals, near)
     alike = np.einsum("id,ikd->ik", facing, facing[near])
     flatness = skin.flatness if normals is None else _flatness(alike)
     calm = _without_noise(colour, near, _step(colour, near, seen), alike > _ONE_SIDE)
@@ -70,6 +71,19 @@ def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: A
     label = _assigned(colour, near, sure, modes, reach)
     label, modes = _without_blends(label, modes, near, raw, max(FINEST, 2 * noise))
     return ColourModes(label, np.clip(255 * modes, 0, 255), light, noise, raw)
+
+
+def _calm_sides(normals: Array, near: Integers) -> Array:
+    """Return normals (V, 3) averaged over those neighbours (V, K) that look nearly the same way, twice.
+
+    How nearly is told by how far neighbours differ: noise of points and of normals goes, edges stay.
+    """
+    for _ in range(2):
+        gap = np.linalg.norm(normals[near] - normals[:, None], axis=2)
+        width = _STEPS * float(np.median(gap[:, :4]))
+        weight = (gap < np.sqrt(2)) * np.exp(-0.5 * (gap / max(width, 1e-9)) ** 2)
+        normals = unit_vectors(normals + (weight[:, :, None] * normals[near]).sum(1))
+    return normals
 
 
 def _flatness(alike: Array) -> Array:

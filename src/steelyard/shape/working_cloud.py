@@ -98,19 +98,19 @@ def _thinned(cloud: Cloud, most: int, settle: bool | None) -> WorkingCloud:
         return _settled(whole, float(np.median(cloud.near.spacing)), len(cloud), sheets=bool(settle))
     drawn = np.random.default_rng(0).permutation(len(cloud))[: _DRAWN * most]
     chosen = cloud.chosen(np.sort(drawn))
-    kept, apart = _spread(chosen, most)
+    kept, apart, third = _spread(chosen, most)
     # Thinning spares strays, which would be many of the points that are left.
-    alone = _alone(chosen.xyz, _APART * apart)
+    alone = third > _APART * apart
     findings = []
     if 0 < alone.sum() < _STRAY * len(chosen):
         findings = [_strays(int(alone.sum()), len(chosen))]
         chosen = chosen.chosen(~alone)
-        kept, apart = _spread(chosen, most)
+        kept, apart, _ = _spread(chosen, most)
     drawn_from = WorkingCloud(chosen, 0.0, ())
     if settle is not False:
         drawn_from = _settled(drawn_from, apart, _SETTLED * most)
         if drawn_from.noise:
-            kept, apart = _spread(drawn_from.cloud, most)
+            kept, apart, _ = _spread(drawn_from.cloud, most)
     text = f"Of {len(cloud)} points {len(kept)} were used, {apart * 1e3:.2g} mm apart."
     findings = [Finding.of("cloud-thinned", text), *drawn_from.findings, *findings]
     return drawn_from._replace(cloud=drawn_from.cloud.chosen(np.sort(kept)), findings=tuple(findings))
@@ -133,18 +133,18 @@ def _settled(used: WorkingCloud, apart: float, most: int, sheets: bool = True) -
     return WorkingCloud(replace(cloud.chosen(rows), xyz=found.xyz), found.noise, findings, along is not None)
 
 
-def _spread(cloud: Cloud, most: int) -> tuple[Integers, float]:
-    """Return about `most` well-spread points, and the distance they keep [m]."""
-    sides = np.tile([0.0, 0.0, 1.0], (len(cloud), 1)) if cloud.normals is None else cloud.normals
-    least = 0.1 * _middle_span(cloud) / np.sqrt(most)
-    return spread_to(cloud.xyz, sides, np.arange(len(cloud)), most, least)
+def _spread(cloud: Cloud, most: int) -> tuple[Integers, float, Array]:
+    """Return about `most` well-spread points, how far apart they lie [m], and each point's third neighbour (N,) [m].
 
-
-def _alone(xyz: Array, reach: float) -> Mask:
-    """Return which points (N,) have fewer than three others within reach [m]."""
+    They keep a distance, which is much less than what lies between most where few points had to go.
+    """
     from scipy.spatial import cKDTree
 
-    return np.asarray(cKDTree(xyz).query(xyz, k=4)[0][:, -1] > reach)
+    sides = np.tile([0.0, 0.0, 1.0], (len(cloud), 1)) if cloud.normals is None else cloud.normals
+    least = 0.1 * _middle_span(cloud) / np.sqrt(most)
+    kept, radius = spread_to(cloud.xyz, sides, np.arange(len(cloud)), most, least)
+    third = cKDTree(cloud.xyz).query(cloud.xyz, k=4)[0][:, -1]
+    return kept, max(radius, float(np.median(third))), third
 
 
 def _strays(some: int, of: int) -> Finding:

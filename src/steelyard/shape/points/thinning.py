@@ -10,7 +10,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 
-_ROUNDS = 6
+_ROUNDS = 12
+_LEAP = 2.0  # on a regular grid nothing goes at first, then half at once
 
 
 def spread(xyz: Array, normal: Array, order: Integers, radius: float) -> Integers:
@@ -27,10 +28,12 @@ def spread_to(xyz: Array, normal: Array, order: Integers, count: int, least: flo
     """Return about `count` well-spread points or fewer, and the distance they keep, at least `least` [m]."""
     kept, radius = spread(xyz, normal, order, least), least
     for _ in range(_ROUNDS):
-        # The number of points that a surface holds falls with the square of their distance.
         if len(kept) <= 1.04 * count:
             break
-        radius *= max(float(np.sqrt(len(kept) / count)), 1.01)
+        # The points that a surface holds fall with the square of their distance, and those that go while few must
+        # rise with it. Either falls short.
+        gone = (len(xyz) - count) / max(len(xyz) - len(kept), 1)
+        radius *= max(float(np.sqrt(max(len(kept) / count, min(gone, _LEAP)))), 1.01)
         kept = spread(xyz, normal, order, radius)
     return kept, radius
 
