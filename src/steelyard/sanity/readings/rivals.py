@@ -101,7 +101,7 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
     # Of two mistakes each must leave much less than the other alone does.
     both = () if one else able(_misread_in_other_axes(recording, given.gravity), MUCH_BETTER * bar)
     best = min(one or both, key=_unlikely, default=None)
-    return best if best is not None and not _outdone(best, view, given.gravity) else None
+    return best if best is not None and not outdone(best, view, given.gravity) else None
 
 
 def _unlikely(reading: Reading) -> tuple[float, float]:
@@ -189,7 +189,7 @@ def _axes_in_words(world: frozenset[str]) -> str:
     return f"the wrench is in the axes of {'W (the base), not of S' if world else 'S, not of W (the base)'}"
 
 
-def _outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
+def outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
     """Tell whether a turned sensor explains much more than the reading does, even with gravity tilted.
 
     In turns about one axis a turn of S is a tilt and a change of sign, too; then the reading holds.
@@ -202,7 +202,7 @@ def _outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
 
 def sign_of(view: Glance, reading: Reading) -> int:
     """Return the sign of the mass, 0 where it is not sure or a turn of S explains a negative one much better."""
-    return 0 if reading.fit.sign < 0 and _outdone(reading, view, reading.gravity) else reading.fit.sign
+    return 0 if reading.fit.sign < 0 and outdone(reading, view, reading.gravity) else reading.fit.sign
 
 
 def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
