@@ -10,7 +10,7 @@ from steelyard.bench.tables import block
 from steelyard.bench.teams.table import _SCALE
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.logs.cubic import cubic
+from steelyard.logs.curve import Curve
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
 from steelyard.team.adjoint import adjoint_inverse, exp
@@ -28,7 +28,7 @@ def test_the_cubic_is_that_of_scipy(rows: int) -> None:
     rng = np.random.default_rng(rows)
     known, values = np.cumsum(rng.uniform(0.5, 1.5, rows)), rng.normal(size=(rows, 4))
     time = rng.permutation(np.concatenate([known, rng.uniform(known[0], known[-1], 200)]))
-    np.testing.assert_allclose(cubic(known, values, time), CubicSpline(known, values)(time), atol=2e-14)
+    np.testing.assert_allclose(Curve.through(known, values).at(time), CubicSpline(known, values)(time), atol=2e-14)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-12, 1e-8, 1e-3, 0.02, 1.0, 3.0])

@@ -1,4 +1,4 @@
-"""Rows of a log: runs of those for which something holds, and a few picked evenly."""
+"""Rows of a log: runs of those for which something holds, which are alike, and a few picked evenly."""
 
 from __future__ import annotations
 
@@ -18,6 +18,17 @@ def lasting(mask: Mask, least: float) -> Mask:
     lengths, out = np.ptp(runs(mask), axis=1), mask.copy()
     out[mask] = np.repeat(lengths >= least, lengths)
     return out
+
+
+def distinct_rows(mask: Mask) -> tuple[Mask, Integers]:
+    """Return the different rows (C, M) of a mask (N, M), in order, and which of them each row (N,) is."""
+    changes = np.ones(len(mask), np.bool_)
+    changes[1:] = (mask[1:] != mask[:-1]).any(1)
+    if changes.sum() == 1:
+        return mask[:1], np.zeros(len(mask), np.int64)
+    # Rows are mostly like the one before: only the first of each run is sorted.
+    found, first = np.unique(mask[changes], axis=0, return_inverse=True)
+    return found, first.ravel()[np.cumsum(changes) - 1]
 
 
 def picked(rows: int, most: int) -> Integers:

@@ -10,13 +10,12 @@ import numpy as np
 from steelyard.check import Array, Mask, frozen
 from steelyard.errors import BadValue
 from steelyard.logs.clock import median_step
-from steelyard.logs.cubic import cubic
+from steelyard.logs.curve import BRIDGED, Curve
 from steelyard.logs.team_log import TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
 
 _EVEN = 0.01  # a step that differs from the median by less than this share is jitter of the stamps
-_BRIDGED = 2.5  # median steps: a value between two samples nearer than this is measured, farther it is missing
 
 
 @dataclass(frozen=True, eq=False)
@@ -106,7 +105,7 @@ def channel_at(track: Track, name: str, time: Array) -> tuple[Array, Mask]:
     if len(known) < 2:
         return np.zeros((len(time), 3)), np.zeros(len(time), np.bool_)
     step = median_step(track.time)
-    return between(known, values[good], time), good if same else near_samples(known, time, step)
+    return Curve.through(known, values[good]).at(time), good if same else near_samples(known, time, step)
 
 
 def _vectors(track: Track, name: str) -> Array:
@@ -115,23 +114,13 @@ def _vectors(track: Track, name: str) -> Array:
     return (mean_rotation(track).inverse() @ Rotation(track.channels["rotation"])).log()
 
 
-def between(known: Array, values: Array, time: Array) -> Array:
-    """Return values (N, ..) known at rising stamps `known` (N,) [s] at `time` (T,) [s], (T, ..).
-
-    Cubic where samples are near, monotone where they are not; beyond the ends those are held.
-    """
-    from scipy.interpolate import PchipInterpolator
-
-    inside = np.clip(time, known[0], known[-1])
-    steps = np.diff(known)
-    if len(known) > 3 and steps.max() <= _BRIDGED * np.median(steps):
-        return np.asarray(cubic(known, np.ascontiguousarray(values, dtype=np.float64), inside))
-    return np.asarray(PchipInterpolator(known, values)(inside))
-
-
 def near_samples(known: Array, time: Array, step: float) -> Mask:
     """Return which of `time` (N,) lie between two samples `known` (K,) that few of the usual `step` [s] part."""
     after = np.clip(np.searchsorted(known, time - 1e-6), 0, len(known) - 1)
     before = np.clip(np.searchsorted(known, time + 1e-6, "right") - 1, 0, len(known) - 1)
-    inside = (time >= known[0] - 1e-6) & (time <= known[-1] + 1e-6)
-    return np.asarray(inside & (known[after] - known[before] <= _BRIDGED * step))
+    return within(known, time) & (known[after] - known[before] <= BRIDGED * step)
+
+
+def within(known: Array, time: Array) -> Mask:
+    """Return which of `time` (N,) lie between the first and the last of samples `known` (K,)."""
+    return np.asarray((time >= known[0] - 1e-6) & (time <= known[-1] + 1e-6))

@@ -12,9 +12,10 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.logs.clock import median_step
+from steelyard.logs.curve import Curve
 from steelyard.logs.recording import Mount, Stream
 from steelyard.logs.repeated_rows import repeats, rising
-from steelyard.logs.team_rows import between, near_samples
+from steelyard.logs.team_rows import near_samples
 from steelyard.spatial import Rotation, cross
 
 # Whose clock is kept: what is differentiated is not to be interpolated.
@@ -99,7 +100,7 @@ def _values_at(own: Array, values: Array, time: Array) -> Array:
         return np.full((len(time), values.shape[1]), np.nan)
     step = median_step(own)
     many = round(median_step(time) / step) if len(time) > 1 and step > 0 else 1
-    found = between(known, _averaged(values, good, many)[good], time)
+    found = Curve.through(known, _averaged(values, good, many)[good]).at(time)
     found[~near_samples(known, time, step)] = np.nan
     return found
 

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
+import numba
 import numpy as np
 
 from steelyard.check import Array
@@ -35,16 +36,14 @@ class Scores:
         """
         # The sum over robots of J^T W J is what a row tells of the motion: L L^T is its inverse.
         root = np.linalg.cholesky(np.linalg.inv(np.einsum("nka,nk,nkb->ab", J, W, J)))
-        pushed = columns * W[robot]
-        taken = np.matmul(pushed.swapaxes(0, 1), (J @ root)[robot])
-        pull = np.einsum("tck,tck->tc", pushed, apart[:, robot])
-        pulls, informations = [], []
-        for rows in np.array_split(np.arange(len(apart)), stretches):
-            some, own = (_flat(x[rows].swapaxes(0, 1)) for x in (pushed, columns))
-            shared = _flat(taken[:, rows])
-            informations.append(np.where(robot[:, None] == robot, some @ own.T, 0.0) - shared @ shared.T)
-            pulls.append(pull[rows].sum(0))
-        return cls(np.array(pulls), np.array(informations))
+        rows, pairs = len(apart), np.argwhere(robot[:, None] == robot)
+        sizes = np.full(stretches, rows // stretches) + (np.arange(stretches) < rows % stretches)
+        first = np.concatenate([[0], np.cumsum(sizes)])
+        pull, information, taken = _gathered(apart, columns, robot, pairs, J @ root, W, first)
+        for k in range(stretches):
+            shared = taken[:, first[k] : first[k + 1]].reshape(len(robot), -1)
+            information[k] -= shared @ shared.T
+        return cls(pull, information)
 
     def solved(self, held: Array | None = None) -> tuple[Array, tuple[Array, Array]]:
         """Return parameters (C,) and their covariances (C, C) by the scatter of the scores and for white noise.
@@ -61,5 +60,32 @@ class Scores:
         return size, (inverse @ spread @ inverse, inverse)
 
 
-def _flat(parts: Array) -> Array:
-    return parts.reshape(len(parts), -1)
+@numba.njit(cache=True, error_model="numpy")
+def _gathered(
+    apart: Array, columns: Array, robot: Integers, pairs: Integers, lever: Array, W: Array, first: Integers
+) -> tuple[Array, Array, Array]:
+    """Return scores (B, C), their information (B, C, C) were the motion known, and what it takes up (C, T, 6).
+
+    pairs (P, 2) of columns of one robot    lever (N, 6, 6) of the motion in units of what a row tells of it
+    first (B + 1,) rows of the stretches
+    """
+    T, C = columns.shape[:2]
+    pull, information = np.zeros((len(first) - 1, C)), np.zeros((len(first) - 1, C, C))
+    taken, pushed = np.empty((C, T, 6)), np.empty((C, 6))
+    for k in range(len(first) - 1):
+        for t in range(first[k], first[k + 1]):
+            for c in range(C):
+                i = robot[c]
+                for a in range(6):
+                    pushed[c, a] = columns[t, c, a] * W[i, a]
+                    pull[k, c] += pushed[c, a] * apart[t, i, a]
+                for m in range(6):
+                    total = 0.0
+                    for a in range(6):
+                        total += pushed[c, a] * lever[i, a, m]
+                    taken[c, t, m] = total
+            for p in range(len(pairs)):
+                c, d = pairs[p]
+                for a in range(6):
+                    information[k, c, d] += pushed[c, a] * columns[t, d, a]
+    return pull, information, taken

@@ -5,22 +5,26 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence, Sized
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.clock import median_step
+from steelyard.logs.curve import Curve
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
-from steelyard.logs.team_rows import between, channel_at, common_time, mean_rotation, near_samples
+from steelyard.logs.team_rows import channel_at, common_time, mean_rotation, near_samples, within
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.clocks.errors import ClockError, punctual
+from steelyard.team.clocks.errors import PUNCTUAL, ClockError, Errors, punctual
 from steelyard.team.turns import turned_by, turns_between
 
 # Rows, and seconds, that a gap may last and still be filled: far below what the payload can do in that time. A curve
 # through 1 Hz is off by 3e-5 of it over as long, through 3 Hz by 0.2 %.
 BRIDGED, BRIEF = 3, 0.05
+# Of tracks that were read between their stamps: clocks are put right several times, and the curve stays.
+_CURVES: WeakKeyDictionary[Track, tuple[Rotation, Curve]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -69,12 +73,13 @@ def stretches(log: TeamLog, late: Mapping[str, float]) -> tuple[Stretch, ...]:
     clocks no longer overlap.
     """
     errors = {name: ClockError(seconds) for name, seconds in late.items() if seconds}
-    made = tuple(_stretch(log, punctual(recording, errors)) for recording in log.recordings)
+    made = tuple(_stretch(log, recording, errors) for recording in log.recordings)
     own = late.get(log.reference, 0.0)
     return tuple(replace(part, time=part.time + own) for part in made) if own else made
 
 
-def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
+def _stretch(log: TeamLog, given: TeamRecording, errors: Errors) -> Stretch:
+    recording = punctual(given, errors)
     time = common_time(recording, log.names)
     rows, count = len(time), len(log.names)
     turns, place = [Rotation.identity(rows, 1)] * count, np.zeros((rows, count, 3))
@@ -86,7 +91,9 @@ def _stretch(log: TeamLog, recording: TeamRecording) -> Stretch:
         if track is None:
             continue
         if _between(track, time):
-            turns[i], place[:, i], wrench[:, i], near = _together(track, time)
+            turns[i], place[:, i], wrench[:, i], near = _together(
+                given.tracks[name], errors.get(name, PUNCTUAL).own(time)
+            )
             seen[:, i] = felt[:, i] = bridged(near, time)
             continue
         if track.has("rotation", "position"):
@@ -112,15 +119,23 @@ def _between(track: Track, time: Array) -> bool:
 
 
 def _together(track: Track, time: Array) -> tuple[Rotation, Array, Array, Mask]:
-    """Return rotations (M, 1), positions (M, 3) and wrenches (M, 6) at `time` (M,) from one curve, and where near.
+    """Return rotations (M, 1), positions (M, 3) and wrenches (M, 6) at `time` (M,) from one curve, and where near."""
+    turn, curve = _curve(track)
+    values = curve.at(time)
+    near = within(track.time, time) if curve.whole else near_samples(track.time, time, median_step(track.time))
+    return turned_by(turn, values[:, :3]), turn.apply(values[:, 3:6]), values[:, 6:], near
 
-    It is that of `rotation_at`, `_place_at` and `channel_at` for each.
+
+def _curve(track: Track) -> tuple[Rotation, Curve]:
+    """Return a track's mean rotation, and rotation vectors from there, positions in its axes and wrenches (T, 12).
+
+    The curve is that of `rotation_at`, `_place_at` and `channel_at` for each.
     """
-    turn, pose = mean_rotation(track), track.pose
-    own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
-    curve = between(track.time, np.concatenate([*own, track.wrench()], axis=1), time)
-    near = near_samples(track.time, time, median_step(track.time))
-    return turned_by(turn, curve[:, :3]), turn.apply(curve[:, 3:6]), curve[:, 6:], near
+    if track not in _CURVES:
+        turn, pose = mean_rotation(track), track.pose
+        own = turns_between(turn, pose.rotation), turn.inverse().apply(pose.position)
+        _CURVES[track] = turn, Curve.through(track.time, np.concatenate([*own, track.wrench()], axis=1))
+    return _CURVES[track]
 
 
 def rotation_at(track: Track, time: Array) -> tuple[Rotation, Mask]:

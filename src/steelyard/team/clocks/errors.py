@@ -47,6 +47,12 @@ class ClockError:
         """Return stamps (T,) [s] put right."""
         return np.asarray(time - (self.late + self.rate * (time - self.middle)))
 
+    def own(self, time: Array) -> Array:
+        """Return the stamps (T,) [s] that are right at `time` (T,)."""
+        return np.asarray(time + (self.late + self.rate * (time - self.middle)) / (1 - self.rate))
+
+
+PUNCTUAL = ClockError()
 
 # By robot; others are punctual.
 Errors = Mapping[str, ClockError]
@@ -70,7 +76,7 @@ class ClockErrors:
             return more if more else self
         both = zip(self.recordings, more.recordings, strict=True)
         return ClockErrors(tuple(
-            {n: a.get(n, ClockError()) + b.get(n, ClockError()) for n in sorted({*a, *b})} for a, b in both
+            {n: a.get(n, PUNCTUAL) + b.get(n, PUNCTUAL) for n in sorted({*a, *b})} for a, b in both
         ))  # fmt: skip
 
     def corrected(self, log: TeamLog) -> TeamLog:
@@ -101,7 +107,7 @@ class ClockErrors:
         # What corrections one after the other leave of a fast clock is no rate of the others.
         least = max(LEAST_RATE, SHARE * max(abs(e.rate) for each in self.recordings for e in each.values()))
         for name in log.names:
-            moving = [(log.recordings[k].name, self.recordings[k].get(name, ClockError())) for k in _moving(log)]
+            moving = [(log.recordings[k].name, self.recordings[k].get(name, PUNCTUAL)) for k in _moving(log)]
             runs = [*_runs(moving, least)]
             words = [*_set_anew(moving), *runs]
             if words:

@@ -21,7 +21,7 @@ from steelyard.errors import BadValue
 from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Errors
+from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors
 from steelyard.team.clocks.steps import Step
 from steelyard.team.turns import turning_speed
 
@@ -41,7 +41,6 @@ DRIFTS_S, FASTEST, ROUGH, DRIFTING, FEW_BINS = 0.04, 0.015, 0.002, 1.3, 200
 _WIDTH = round(BIN_S / STEP_S)
 # Jumps of one recording.
 MOST = 3
-NONE = ClockError()
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> l
     """Return a recording, or its parts, each with what clocks are late by that run fast or jumped before it."""
     if recording.kind == "still":
         return [(recording, {})]
-    pairs = {n: pair for n in log.others if (pair := _Pair.of(recording, log.reference, n)) is not None}
+    pairs = dict(_pairs(recording, log.reference, log.others))
     for name in pairs if most else ():
         jump = pairs[name].jump()
         if jump is None:
@@ -84,7 +83,7 @@ def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> l
         if both and min(len(first.tracks), len(second.tracks)) > 1:
             more = {jump.name: ClockError(jump.after - jump.before) for jump in jumps}
             later = [
-                (r, {n: more.get(n, NONE) + late.get(n, NONE) for n in {*more, *late}})
+                (r, {n: more.get(n, PUNCTUAL) + late.get(n, PUNCTUAL) for n in {*more, *late}})
                 for r, late in _parts(log, second, most - 1, drifts)
             ]
             return [*_parts(log, first, most - 1, drifts), *later]
@@ -148,21 +147,6 @@ class _Pair:
     far: int
     cost: Array
 
-    @classmethod
-    def of(cls, recording: TeamRecording, reference: str, name: str) -> _Pair | None:
-        """Return the pair of a robot and the reference; None where too little is known of either."""
-        if not {name, reference} <= recording.tracks.keys():
-            return None
-        begin, end = recording.span
-        far = round(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S)
-        time = np.arange(begin, end - OVER_S, STEP_S)
-        if len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
-            return None
-        x, y = (_speed(recording.tracks[n], time) for n in (reference, name))
-        if x is None or y is None:
-            return None
-        return cls(recording, reference, name, begin, x, y, far, _costs(x, y, far))
-
     def jump(self) -> Jump | None:
         """Return where the clock surely jumps beside the reference's, None where it does not."""
         usual = int(self.cost.sum(1).argmin()) - self.far
@@ -191,6 +175,22 @@ class _Pair:
             return None
         middle = self.begin + STEP_S * self.far + 0.5 * BIN_S * width * bins
         return ClockError(STEP_S * (start - self.far), STEP_S * grows / seconds, middle)
+
+
+def _pairs(recording: TeamRecording, reference: str, others: Sequence[str]) -> Iterator[tuple[str, _Pair]]:
+    """Yield the pair of each robot and the reference of which enough is known."""
+    begin, end = recording.span
+    far = round(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S)
+    time = np.arange(begin, end - OVER_S, STEP_S)
+    if reference not in recording.tracks or len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
+        return
+    x = _speed(recording.tracks[reference], time)
+    if x is None:
+        return
+    for name in others:
+        y = _speed(recording.tracks[name], time) if name in recording.tracks else None
+        if y is not None:
+            yield name, _Pair(recording, reference, name, begin, x, y, far, _costs(x, y, far))
 
 
 @dataclass(frozen=True)
@@ -251,15 +251,18 @@ def _speed(track: Track, time: Array) -> Array | None:
 @njit(cache=True)
 def _costs(x: Array, y: Array, most: int) -> Array:
     """Return the squares (S, K) left between two speeds at every shift, summed over bins."""
-    count = (len(x) - 2 * most) // _WIDTH
-    out = np.empty((2 * most + 1, count))
-    for shift in range(len(out)):
-        for k in range(count):
-            total = 0.0
-            for t in range(k * _WIDTH, (k + 1) * _WIDTH):
-                off = x[most + t] - y[shift + t]
-                total += off * off
-            out[shift, k] = total
+    count, shifts = (len(x) - 2 * most) // _WIDTH, 2 * most + 1
+    out, total = np.empty((shifts, count)), np.empty(shifts)
+    # Shifts innermost: their sums do not wait for one another.
+    for k in range(count):
+        total[:] = 0.0
+        for t in range(k * _WIDTH, (k + 1) * _WIDTH):
+            here, there = x[most + t], y[t : t + shifts]
+            for shift in range(shifts):
+                off = here - there[shift]
+                total[shift] += off * off
+        for shift in range(shifts):
+            out[shift, k] = total[shift]
     return out
 
 

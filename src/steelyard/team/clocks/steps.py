@@ -60,7 +60,7 @@ def clearest(pull: Array, information: Array, at: Array, held: Array) -> Best:
     left = pull - beside @ (inverse @ (powers.T @ pull).ravel())
     # A step from every stretch on: (B, n, ...), the first being an offset.
     after = [np.cumsum(x[::-1], axis=0)[::-1][1:] for x in (left, beside, np.einsum("bii->bi", information))]
-    known = after[2] - np.einsum("bic,cd,bid->bi", after[1], inverse, after[1])
+    known = after[2] - ((after[1] @ inverse) * after[1]).sum(-1)
     share = after[2] / np.maximum(np.einsum("bii->i", information), 1e-300)
     known = np.where((share > EITHER) & (share < 1 - EITHER) & (known > 1e-9 * after[2]), known, np.inf)
     k, i = np.unravel_index(int(np.argmax(after[0] ** 2 / known)), known.shape)

@@ -15,6 +15,7 @@ import numpy as np
 
 from steelyard.check import FAILURES, Array
 from steelyard.logs.log import Integers, Mask
+from steelyard.logs.runs import distinct_rows
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.clocks.jumps import LEAST_S as PART_S
@@ -149,9 +150,9 @@ class _Told:
     @classmethod
     def of(cls, part: Left, J: Array, W: Array, reference: int) -> _Told | None:
         """Return what is told, None where rows or robots are too few."""
-        patterns, which, count = np.unique(part.seen, axis=0, return_inverse=True, return_counts=True)
-        most = int(np.argmax(count * (patterns.sum(1) > 1)))
-        robots, rows = np.flatnonzero(patterns[most]), np.flatnonzero(which.ravel() == most)
+        found, which = distinct_rows(part.seen)
+        most = int(np.argmax(np.bincount(which) * (found.sum(1) > 1)))
+        robots, rows = np.flatnonzero(found[most]), np.flatnonzero(which == most)
         if len(robots) < 2 or len(rows) < ROWS:
             return None
         middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
@@ -171,7 +172,7 @@ class _Told:
         size, covariances = self.scores.solved(self.common)
         against = np.kron(np.diag([1.0, 1 / self.half]), np.eye(some) - np.eye(some)[self.base])
         late, rate = (against @ size).reshape(2, some)
-        noise = [np.einsum("ij,jk,ik->i", against, V, against) for V in covariances]
+        noise = [((against @ V) * against).sum(1) for V in covariances]
         late_std, rate_std = np.sqrt(np.maximum(*noise)).reshape(2, some)
         return {
             names[i]: ClockError(float(late[k]), float(rate[k]), self.middle, float(late_std[k]), float(rate_std[k]))

@@ -249,6 +249,8 @@ def _gain_evidence(gains: Sequence[GainSight], ladder: Array) -> Array:
 
 def _all_of(gains: Sequence[GainSight]) -> GainSight:
     """Return what all recordings together say of gains that last."""
+    if len(gains) == 1:
+        return gains[0]
     return GainSight(np.sum([one.information for one in gains], axis=0), np.sum([one.right for one in gains], axis=0))
 
 

@@ -46,6 +46,7 @@ class PayloadFit:
     gain_squares mean products of the gains' errors: drawn anew (R, 3 N, 3 N), and lasting (3 N, 3 N)
     gainless     share of the evidence that gains do not err at all
     biases       (R, 6) that every recording is taken to have
+    normals      equations of every recording with these weights
     weights      (K, 6, 6) per group     groups  with their noise     blind  (10, 6) per recording: H_pb H_bb^-1
     unsure       factor by which weights that come from the rows widen the covariance
     levers       (U, 6, Q) of biases that keep their direction in the room (`home_bias`); none in this module. Where
@@ -63,6 +64,7 @@ class PayloadFit:
     gainless: float
     groups: tuple[Group, ...]
     biases: Array
+    normals: tuple[Normal, ...]
     weights: tuple[Array, ...]
     blind: tuple[tuple[Array, ...], ...]
     residual: Array
@@ -107,7 +109,7 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     return PayloadFit(
         phi, models.covariance_about(phi) * unsure, shown.lost, scale, models.information[models.best],
         shown.condition, models.gain, models.gain_squares, models.gainless, groups,
-        models.recordings(models.best).biases, found.weights, found.blind, _residual(groups),
+        models.recordings(models.best).biases, found.normals, found.weights, found.blind, _residual(groups),
         float(models.chi2[models.best]) / max(6 * rows - 10, 1.0), unsure,
     )  # fmt: skip
 

@@ -9,6 +9,7 @@ noisy are asked: elsewhere noise would explain itself.
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 
@@ -38,17 +39,18 @@ class GainSight:
 
     def evidence(self, sizes: Array) -> Array:
         """Return the logarithm (L,) of how likely gains ~ N(0, s^2) are against none, for `sizes` (L,)."""
-        values, _, along = self._axes()
+        values, _, along = self._axes
         kept = np.square(sizes)[:, None] / (1 + np.square(sizes)[:, None] * values)
         return np.asarray(0.5 * (kept @ along**2 - np.log1p(np.square(sizes)[:, None] * values).sum(1)))
 
     def squares(self, size: float) -> Array:
         """Return the mean products (F, F) of the gains' errors given what is seen, where they are ~ N(0, size^2)."""
-        values, axes, along = self._axes()
+        values, axes, along = self._axes
         kept = size**2 / (1 + size**2 * values)
         mean = axes @ (kept * along)
         return np.asarray((axes * kept) @ axes.T + np.outer(mean, mean))
 
+    @cached_property
     def _axes(self) -> tuple[Array, Array, Array]:
         """Return eigenvalues (F,) and vectors (F, F) of the information, and its right side (F,) along these."""
         values, axes = np.linalg.eigh(self.information)
@@ -81,12 +83,11 @@ def gain_sight(part: Spectra, D: Array, W: Array, noise: Array, levers: Array | 
     T[np.arange(beside, len(T)), :, axes] = unit.T
     K = np.zeros((6, S.shape[1]))
     K[:, 12:last] = D
-    seen = np.einsum("kij,pjx,kxy->kpiy", W, T, S, optimize=True)
-    H = np.einsum("kpiy,qiy->pq", seen, T, optimize=True)
-    g = np.einsum("kpiy,iy->p", seen, K, optimize=True)
+    seen = ((W[:, None] @ T).reshape(len(S), -1, S.shape[1]) @ S).sum(0).reshape(len(T), -1)
+    H, g = seen @ T.reshape(len(T), -1).T, seen @ K.ravel()
     # A sensor's own noise is in the sum and in its column: the robots are taken as noisy alike.
     own = 3 * each * rows / len(axes)
-    noisy = np.einsum("if,kij,jf,k->f", unit, W, unit, own, optimize=True)
+    noisy = (unit * (np.tensordot(own, W, 1) @ unit)).sum(0)
     g[beside:] -= noisy
     held = _root_of_inverse(H[:beside, :beside])
     blind = H[beside:, :beside] @ held

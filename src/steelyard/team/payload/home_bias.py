@@ -23,7 +23,7 @@ from steelyard.spatial import cross_matrix
 from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.gain_sight import gain_sight
-from steelyard.team.payload.model import Normal, normal
+from steelyard.team.payload.model import Normal
 from steelyard.team.payload.spectra import Spectra
 from steelyard.team.stacked import row_slices
 
@@ -115,7 +115,7 @@ def with_home_bias(
 class _Homes:
     """The equations of every recording in [phi (10), bias (6)] and, `wide`, in [phi (10), u (U,), bias (6)]."""
 
-    plain: list[Normal]
+    plain: tuple[Normal, ...]
     wide: list[Normal]
     levers: Array
     C: Array
@@ -125,13 +125,13 @@ class _Homes:
     def of(cls, fit: PayloadFit, D: Array, C: Array, places: Array) -> _Homes:
         """Return the equations with the weights of a fit."""
         levers = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3)
-        plain, wide = [], []
+        wide: list[Normal] = []
         for group, weights in zip(fit.groups, fit.weights, strict=True):
             for part in group.parts:
-                plain.append(normal(part, D, weights, group.motion_noise, group.noise_of_gains))
-                gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else plain[-1].gains
-                wide.append(replace(beside_home(plain[-1], part, D, weights, levers), gains=gains))
-        return cls(plain, wide, levers, C, fit.scale)
+                given = fit.normals[len(wide)]
+                gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else given.gains
+                wide.append(replace(beside_home(given, part, D, weights, levers), gains=gains))
+        return cls(fit.normals, wide, levers, C, fit.scale)
 
     def likely(self, ladder: Array) -> Array:
         """Return the sizes of a ladder (L, 4) without gains, and those with gains that count for something."""
@@ -169,12 +169,13 @@ def beside_home(plain: Normal, part: Spectra, D: Array, W: Array, levers: Array)
     H, g = np.zeros((16 + count, 16 + count)), np.zeros(16 + count)
     old, new = np.r_[:10, 10 + count : 16 + count], np.arange(10, 10 + count)
     H[np.ix_(old, old)], g[old] = plain.H, plain.g
-    WE = W[:, None] @ levers
-    H[np.ix_(new, new)] = np.einsum("kpix,kxy,qiy->pq", WE, part.room[..., width:], levers, optimize=True)
-    H[new, :10] = np.einsum("kpix,kxy,qiy->pq", WE, part.room[..., :12], basis(), optimize=True)
-    H[new, 10 + count :] = np.einsum("kpix,kx->pi", WE, part.room[..., width - 1])
+    # Levers at their weights times the rows of every band, (U, 6, Z + Q).
+    seen = ((W[:, None] @ levers).reshape(len(W), -1, levers.shape[2]) @ part.room).sum(0).reshape(count, 6, -1)
+    H[np.ix_(new, new)] = seen[..., width:].reshape(count, -1) @ levers.reshape(count, -1).T
+    H[new, :10] = seen[..., :12].reshape(count, -1) @ basis().reshape(10, -1).T
+    H[new, 10 + count :] = seen[..., width - 1]
     H[:10, new], H[10 + count :, new] = H[new, :10].T, H[new, 10 + count :].T
-    g[new] = np.einsum("kpix,kxi->p", WE, part.room[..., 12 : width - 1] @ D.T)
+    g[new] = seen[..., 12 : width - 1].reshape(count, -1) @ D.ravel()
     noise = np.zeros((10 + count, 10 + count))
     noise[:10, :10] = plain.noise
     return replace(plain, H=H, g=g, noise=noise)

@@ -17,7 +17,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, with_bar
 from steelyard.identify.regressor import motion_map
 from steelyard.logs.conditioning import FILTERED, taken_by_filter
-from steelyard.logs.team_rows import between
+from steelyard.logs.curve import Curve
 from steelyard.team.payload.body_rows import BodyRows, Run, slope
 from steelyard.team.payload.doubt import moved_by_pushes
 from steelyard.team.payload.fit import PayloadFit, Weighing
@@ -170,5 +170,8 @@ def _moved(run: Run, late: Array) -> Run:
     time = np.arange(len(run.pushed)) / run.rate
     begin, end = max(0.0, -late.min()), time[-1] - max(0.0, late.max())
     kept = slice(int(np.ceil(begin * run.rate)), int(np.floor(end * run.rate)) + 1)
-    each = (between(time, own, time[kept] + late[i]) for i, own in enumerate(np.split(run.pushed, len(late), axis=1)))
-    return replace(run.part(kept.start, kept.start + len(time[kept])), pushed=np.concatenate(list(each), axis=1))
+    each = [
+        Curve.through(time, own).at(time[kept] + late[i])
+        for i, own in enumerate(np.split(run.pushed, len(late), axis=1))
+    ]
+    return replace(run.part(kept.start, kept.start + len(time[kept])), pushed=np.concatenate(each, axis=1))

@@ -42,12 +42,15 @@ class Equations(Protocol[G]):
 
 @dataclass(frozen=True, eq=False)
 class Round(Generic[G]):
-    """The models of one round, with the groups and weights that they were made with, and the groups renewed by them.
+    """The models of one round, with what they were made from, and the groups renewed by them.
+
+    normals  of all recordings, from the noise and the weights of groups
 
     phi  (P,)     blind  (P, B) per group and recording, as of `Recordings`
     """
 
     phi: Array
+    normals: tuple[Normal, ...]
     models: Models
     blind: tuple[tuple[Array, ...], ...]
     groups: tuple[G, ...]
@@ -61,14 +64,15 @@ class Round(Generic[G]):
         """Return the round from phi (P,) and the noise of groups; C, ladder and scale as of `Models`."""
         weights = tuple(equations.weights(group, phi) for group in groups)
         normals = [equations.normals(group, W) for group, W in zip(groups, weights, strict=True)]
-        models = Models.of([one for each in normals for one in each], C, ladder, scale)
+        every = tuple(one for each in normals for one in each)
+        models = Models.of(every, C, ladder, scale)
         beside = models.recordings(models.best)
         places = row_slices(normals)
         renewed = tuple(
             equations.judged(group, W, beside, own.start) for group, W, own in zip(groups, weights, places, strict=True)
         )
         blind = tuple(tuple(beside.blind[own]) for own in places)
-        return cls(models.mean(), models, blind, groups, weights, renewed)
+        return cls(models.mean(), every, models, blind, groups, weights, renewed)
 
     @property
     def change(self) -> float:

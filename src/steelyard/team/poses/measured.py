@@ -12,6 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Integers, Mask
+from steelyard.logs.runs import distinct_rows
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.poses.statistic import scatter
 from steelyard.team.stacked import Stretch
@@ -84,10 +85,7 @@ class TeamMotion:
     @cached_property
     def patterns(self) -> tuple[Mask, Integers]:
         """Return the different sets of robots that have poses (C, N), and which of them each row (T,) has."""
-        if self.valid.all():
-            return np.ones((1, self.count), np.bool_), np.zeros(len(self.valid), np.int64)
-        found, place = np.unique(self.valid, axis=0, return_inverse=True)
-        return found, place.ravel()
+        return distinct_rows(self.valid)
 
     def motion_seen(self, grasps: Pose, homes: Pose) -> Pose:
         """Return the payload (T,) in the reference home as the first robot with a pose at that time sees it."""

@@ -39,7 +39,7 @@ UNCHANGED = 0.02
 # that so many poses of all robots together are enough.
 FEW_ROWS, FEW_POSES = 1500, 4500
 # Sweeps over a row with which the motion follows grasps and homes from wherever it was.
-FOLLOWED = 2
+FOLLOWED = 1
 # Noise above this share of the motion asks whether the payload is rigid.
 LOUD = 0.05
 # From this share on nobody can say that the payload turned at all.
@@ -76,16 +76,16 @@ class PoseTeam(MotionFit):
         timed = data
         if not clocks:
             fit = fit_poses(data, _followed(data, fit), reference, fit.noise)
-        known = None
+        known, close = None, ROUGHLY
         for left in reversed(range(CLOCK_ROUNDS if clocks else 0)):
             team = _followed(data, fit)
             timed = replace(data, twist=_twists(parts, team))
-            fit = fit_poses(timed, replace(team, delays=np.zeros(data.count)), reference, fit.noise, NEARLY, known)
+            fit = fit_poses(timed, replace(team, delays=np.zeros(data.count)), reference, fit.noise, close, known)
             step = np.abs(fit.team.delays)
             near = STILL if any(late.values()) else np.maximum(PUNCTUAL, DOUBTED * fit.doubt)
             if not left or (step < near).all():
                 break
-            known = fit.known if step.max() < UNCHANGED else None
+            known, close = fit.known if step.max() < UNCHANGED else None, NEARLY
             late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion.of(parts)

@@ -14,6 +14,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers, Mask
+from steelyard.logs.runs import distinct_rows
 from steelyard.team.twists.rows import TwistStretch, slope_shares
 
 # Windows that a log is cut into, so that correlated noise is noticed; fewer where their scatters have more numbers.
@@ -46,11 +47,11 @@ class TwistScatter:
             change = rates_of_change(part)
             for rows in np.array_split(np.arange(len(part.rows)), pieces):
                 here = slice(int(rows[0]), int(rows[-1]) + 1)
-                patterns, which = np.unique(part.seen[here], axis=0, return_inverse=True)
+                patterns, which = distinct_rows(part.seen[here])
                 for k, spoke in enumerate(patterns):
                     if spoke.sum() < 2:
                         continue
-                    chosen = which.ravel() == k
+                    chosen = which == k
                     both = [x[here][chosen] * spoke[:, None] for x in (part.twist, change)]
                     y = np.concatenate([x.reshape(len(x), -1) for x in both], axis=1)
                     found.append((y.T @ y, len(y), spoke, number))
@@ -68,10 +69,10 @@ class TwistScatter:
 
     def merged(self) -> TwistScatter:
         """Return one scatter per pattern of robots."""
-        patterns, which = np.unique(self.spoke, axis=0, return_inverse=True)
+        patterns, which = distinct_rows(self.spoke)
         scatter = np.zeros((len(patterns), *self.scatter.shape[1:]))
         rows = np.zeros(len(patterns))
-        for k, S, count in zip(which.ravel(), self.scatter, self.rows, strict=True):
+        for k, S, count in zip(which, self.scatter, self.rows, strict=True):
             scatter[k] += S
             rows[k] += count
         return TwistScatter(scatter, rows, patterns, np.zeros(len(patterns), np.int64))
