@@ -135,7 +135,7 @@ def _alike(jump: Jump, others: Iterable[Jump | None]) -> Iterator[Jump]:
 class _Pair:
     """How fast two robots turn, x and y (T,) from `begin` [s] on, and what shifts within `far` leave of it.
 
-    cost  (2 far + 1, K) squares that every shift of y leaves of every bin
+    cost  (2 far + 1, K) squares that every shift of y leaves of every bin, of `width` steps
     """
 
     recording: TeamRecording
@@ -145,6 +145,7 @@ class _Pair:
     x: Array
     y: Array
     far: int
+    width: int
     cost: Array
 
     def jump(self) -> Jump | None:
@@ -166,14 +167,12 @@ class _Pair:
         apart = int(self.cost[:, :third].sum(1).argmin()) - int(self.cost[:, -third:].sum(1).argmin())
         if usual < ROUGH * total or abs(apart) * STEP_S < DRIFTS_S / 2:
             return None
-        width = -(-self.cost.shape[1] // FEW_BINS)
-        bins = self.cost.shape[1] // width
-        cost = self.cost[:, : bins * width].reshape(len(left), bins, width).sum(2)
-        seconds = BIN_S * width * (bins - 1)
-        least, start, grows = min(_lines(cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far)))
+        bins, bin_s = self.cost.shape[1], STEP_S * self.width
+        seconds = bin_s * (bins - 1)
+        least, start, grows = min(_lines(self.cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far)))
         if abs(grows) * STEP_S < DRIFTS_S or least > LEFT * total or usual < DRIFTING * least:
             return None
-        middle = self.begin + STEP_S * self.far + 0.5 * BIN_S * width * bins
+        middle = self.begin + STEP_S * self.far + 0.5 * bin_s * bins
         return ClockError(STEP_S * (start - self.far), STEP_S * grows / seconds, middle)
 
 
@@ -187,10 +186,11 @@ def _pairs(recording: TeamRecording, reference: str, others: Sequence[str]) -> I
     x = _speed(recording.tracks[reference], time)
     if x is None:
         return
+    width = _WIDTH * -(-((len(x) - 2 * far) // _WIDTH) // FEW_BINS)
     for name in others:
         y = _speed(recording.tracks[name], time) if name in recording.tracks else None
         if y is not None:
-            yield name, _Pair(recording, reference, name, begin, x, y, far, _costs(x, y, far))
+            yield name, _Pair(recording, reference, name, begin, x, y, far, width, _costs(x, y, far, width))
 
 
 @dataclass(frozen=True)
@@ -226,7 +226,7 @@ def _split(x: Array, y: Array, common: int, most: int) -> _Split | None:
     ends = round(LEAST_S / BIN_S)
     if len(x) * STEP_S < 2 * (LEAST_S + LARGEST_S) + BIN_S:
         return None
-    cost, inner = _costs(x, y, most), x[most:-most]
+    cost, inner = _costs(x, y, most, _WIDTH), x[most:-most]
     least = 1e-12 * float(inner @ inner) + 1e-300
     sums = np.cumsum(cost, axis=1)
     rest = sums[:, -1:] - sums
@@ -249,14 +249,14 @@ def _speed(track: Track, time: Array) -> Array | None:
 
 
 @njit(cache=True)
-def _costs(x: Array, y: Array, most: int) -> Array:
-    """Return the squares (S, K) left between two speeds at every shift, summed over bins."""
-    count, shifts = (len(x) - 2 * most) // _WIDTH, 2 * most + 1
+def _costs(x: Array, y: Array, most: int, width: int) -> Array:
+    """Return the squares (S, K) left between two speeds at every shift, summed over bins of `width` steps."""
+    count, shifts = (len(x) - 2 * most) // width, 2 * most + 1
     out, total = np.empty((shifts, count)), np.empty(shifts)
     # Shifts innermost: their sums do not wait for one another.
     for k in range(count):
         total[:] = 0.0
-        for t in range(k * _WIDTH, (k + 1) * _WIDTH):
+        for t in range(k * width, (k + 1) * width):
             here, there = x[most + t], y[t : t + shifts]
             for shift in range(shifts):
                 off = here - there[shift]

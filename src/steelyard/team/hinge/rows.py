@@ -15,14 +15,13 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.fft import dct
 
 from steelyard.check import Array
 from steelyard.identify.regressor import basis
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.hinge.poses import Hinged
 from steelyard.team.payload.body_rows import BodyRows, Run, from_poses, summing
-from steelyard.team.payload.spectra import bands, fade, frequencies
+from steelyard.team.payload.spectra import as_frequencies, bands, frequencies
 from steelyard.team.stacked import Stretch
 
 WHOLE, SECOND, BIAS = 10, 7, 12
@@ -136,10 +135,7 @@ def gathered(one: BodyRows, two: BodyRows, team: Hinged, sums: Sums, edges: Arra
     parts: list[list[Array]] = [[] for _ in edges]
     for run, other in zip(one.runs, two.runs, strict=True):
         hz = frequencies(run, highest_hz)
-        flat = _rows(run, other, team, sums)
-        if not one.still:
-            flat *= fade(len(flat), run.rate)[:, None]
-        z = dct(flat, axis=0, norm="ortho", overwrite_x=True)[: len(hz)]
+        z = as_frequencies([_rows(run, other, team, sums)], run, highest_hz, not one.still)
         for band, chosen in enumerate(bands(hz, edges)):
             parts[band].append(z[chosen])
     joined = [np.concatenate(some) for some in parts]

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.fft import dct
 
 from steelyard.check import Array
 from steelyard.findings import Finding
@@ -17,7 +16,7 @@ from steelyard.team.hinge.poses import Hinged
 from steelyard.team.hinge.rows import Sums, about_z
 from steelyard.team.misread.signs import odd_one_out
 from steelyard.team.payload.body_rows import BodyRows
-from steelyard.team.payload.spectra import fade, frequencies
+from steelyard.team.payload.spectra import as_frequencies
 
 # Columns before the robots' forces: motion of the first body, of the second, that turned, means and means turned.
 MOTION = 12
@@ -54,10 +53,7 @@ def _scatter(team: Hinged, one: BodyRows, two: BodyRows, sums: Sums, highest_hz:
         force[..., team.second] = turn @ force[..., team.second]
         cos, sin = turn[:, :1, 0], turn[:, 1:2, 0]
         seen = [run.motion, other.motion, cos * other.motion, sin * other.motion, np.ones_like(cos), cos, sin]
-        flat = np.concatenate([*seen, force.reshape(len(force), -1)], axis=1)
-        if not one.still:
-            flat *= fade(len(flat), run.rate)[:, None]
-        z = dct(flat, axis=0, norm="ortho", overwrite_x=True)[: len(frequencies(run, highest_hz))]
+        z = as_frequencies([*seen, force.reshape(len(force), -1)], run, highest_hz, not one.still)
         out += z.T @ z
     return out
 

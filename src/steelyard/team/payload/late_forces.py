@@ -18,10 +18,10 @@ from steelyard.findings import Finding, with_bar
 from steelyard.identify.regressor import motion_map
 from steelyard.logs.conditioning import FILTERED, taken_by_filter
 from steelyard.logs.curve import Curve
-from steelyard.team.payload.body_rows import BodyRows, Run, slope
+from steelyard.team.payload.body_rows import BodyRows, Run
 from steelyard.team.payload.doubt import moved_by_pushes
 from steelyard.team.payload.fit import PayloadFit, Weighing
-from steelyard.team.payload.spectra import Spectra, band_edges, gathered
+from steelyard.team.payload.spectra import Spectra, band_edges, with_rates
 
 # Forces are late from so much [s] and so many standard deviations, and no later than this: beyond, clocks are apart.
 LATE_S, LATE_STD, LATEST_S = 1e-3, 5.0, 0.3
@@ -130,7 +130,7 @@ def _asked(fit: Weighing, rows: Rows, highest_hz: float) -> LateForces | None:
         return None
     edges = band_edges(moving, highest_hz)
     beside = iter(moving)
-    payload = _in_motion(fit.payload, lambda part: gathered(_with_rates(next(beside)), edges, highest_hz))
+    payload = _in_motion(fit.payload, lambda part: with_rates(part, next(beside), edges, highest_hz))
     summed = np.moveaxis(D.reshape(6, count, 6), 1, 0)
     first, last = 12 + 6 * count, 12 + 12 * count
     body, W = motion_map(payload.parameters), payload.weights[0]
@@ -154,15 +154,6 @@ def _in_motion(fit: PayloadFit, changed: Callable[[Spectra], Spectra]) -> Payloa
     return replace(
         fit, groups=(group,), weights=fit.weights[-1:], blind=fit.blind[-1:], biases=fit.biases[-len(parts) :]
     )
-
-
-def _with_rates(body: BodyRows) -> BodyRows:
-    """Return the rows with what every robot's pushes change in a second beside them (T, 12 N)."""
-
-    def beside(run: Run) -> Run:
-        return replace(run, pushed=np.concatenate([run.pushed, slope(run.pushed, run.rate)], axis=1))
-
-    return replace(body, runs=tuple(beside(run) for run in body.runs))
 
 
 def _moved(run: Run, late: Array) -> Run:

@@ -17,7 +17,7 @@ from scipy.fft import dct
 
 from steelyard.check import Array
 from steelyard.logs.log import Integers
-from steelyard.team.payload.body_rows import BodyRows, Run
+from steelyard.team.payload.body_rows import BodyRows, Run, slope
 
 # A band holds at least so many rows, and its upper end is at least so many times its lower one.
 ROWS, RATIO = 30, 1.35
@@ -29,6 +29,7 @@ FADE_SHARE, FADE_S = 0.1, 1.0
 class Spectra:
     """One recording: scatter (K, Z, Z) per band of [motion (12), pushed (6 N), 1], and rows (K,) in each.
 
+    lines                (F, Z + Q) of every run, from which the rest is
     room                 scatter (K, Q, Z + Q) of what stands still in the room (Q = 9 or 3) with these and itself
     judged, judged_rows  the same of the rows by which noise is judged: at rest not the means, which are mostly bias
     samples              rows of the recording that are in it
@@ -37,6 +38,7 @@ class Spectra:
 
     name: str
     still: bool
+    lines: tuple[Array, ...]
     scatter: Array
     room: Array
     rows: Array
@@ -78,20 +80,47 @@ def band_edges(recordings: Sequence[BodyRows], highest_hz: float) -> Array:
     return np.array([*edges, np.inf])
 
 
+def as_frequencies(columns: Sequence[Array], run: Run, highest_hz: float, faded: bool) -> Array:
+    """Return columns (T, D) of a run's rows, side by side, as the frequencies (F, D) that are used.
+
+    faded  whether rows are faded in and out
+    """
+    # Column after column: rows side by side take more than twice as long. Moments of passive gimbals are zero.
+    flat = np.concatenate([column.T for column in columns])
+    there = np.asarray(flat.any(1))
+    flat = flat[there] * fade(flat.shape[1], run.rate) if faded else flat[there]
+    rows = len(frequencies(run, highest_hz))
+    out = np.zeros((rows, len(there)))
+    out[:, there] = dct(flat, axis=1, norm="ortho", overwrite_x=True)[:, :rows].T
+    return out
+
+
 def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
     """Return the scatter of one recording in the bands that end at `edges` (K,) [Hz]."""
-    first = recording.runs[0]
-    width, beside = 12 + first.pushed.shape[1] + 1, first.room.shape[1]
+    lines = []
+    for run in recording.runs:
+        columns = run.motion, run.pushed, np.ones((len(run.motion), 1)), run.room
+        lines.append(as_frequencies(columns, run, highest_hz, not recording.still))
+    return _in_bands(recording, tuple(lines), edges, highest_hz)
+
+
+def with_rates(part: Spectra, recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
+    """Return the same with what every robot's pushes change in a second beside them (12 N)."""
+    lines = []
+    for run, z in zip(recording.runs, part.lines, strict=True):
+        rates = as_frequencies([slope(run.pushed, run.rate)], run, highest_hz, not recording.still)
+        lines.append(np.insert(z, [12 + rates.shape[1]], rates, axis=1))
+    return _in_bands(recording, tuple(lines), edges, highest_hz)
+
+
+def _in_bands(recording: BodyRows, lines: tuple[Array, ...], edges: Array, highest_hz: float) -> Spectra:
+    beside = recording.runs[0].room.shape[1]
+    width = lines[0].shape[1] - beside
     scatter, rows = np.zeros((len(edges), width, width)), np.zeros(len(edges))
     room = np.zeros((len(edges), beside, width + beside))
     judged, judged_rows, squares = scatter.copy(), rows.copy(), rows.copy()
-    for run in recording.runs:
+    for run, z in zip(recording.runs, lines, strict=True):
         hz = frequencies(run, highest_hz)
-        flat = np.ones((len(run.motion), width + beside))
-        flat[:, :12], flat[:, 12 : width - 1], flat[:, width:] = run.motion, run.pushed, run.room
-        if not recording.still:
-            flat *= fade(len(flat), run.rate)[:, None]
-        z = dct(flat, axis=0, norm="ortho")[: len(hz)]
         for band, chosen in enumerate(bands(hz, edges)):
             scatter[band] += z[chosen, :width].T @ z[chosen, :width]
             room[band] += z[chosen, width:].T @ z[chosen]
@@ -104,7 +133,7 @@ def gathered(recording: BodyRows, edges: Array, highest_hz: float) -> Spectra:
             judged_rows[band] += len(part)
     samples = sum(len(run.motion) for run in recording.runs)
     middle = np.sqrt(squares / np.maximum(rows, 1.0))
-    return Spectra(recording.name, recording.still, scatter, room, rows, judged, judged_rows, samples, middle)
+    return Spectra(recording.name, recording.still, lines, scatter, room, rows, judged, judged_rows, samples, middle)
 
 
 def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Array:
@@ -113,8 +142,7 @@ def band_power(values: Array, run: Run, edges: Array, highest_hz: float) -> Arra
     Bands without rows get nan.
     """
     hz = frequencies(run, highest_hz)
-    tapered = values * fade(len(values), run.rate)[:, None]
-    power = (dct(tapered, axis=0, norm="ortho")[: len(hz)] ** 2).mean(1)
+    power = (as_frequencies([values], run, highest_hz, True) ** 2).mean(1)
     gain = (2 * run.rate * np.sin(np.pi * hz / run.rate)) ** 2
     out = np.full((3, len(edges)), np.nan)
     for band, chosen in enumerate(bands(hz, edges)):

@@ -39,7 +39,7 @@ UNCHANGED = 0.02
 # that so many poses of all robots together are enough.
 FEW_ROWS, FEW_POSES = 1500, 4500
 # Sweeps over a row with which the motion follows grasps and homes from wherever it was.
-FOLLOWED = 1
+FOLLOWED = 2
 # Noise above this share of the motion asks whether the payload is rigid.
 LOUD = 0.05
 # From this share on nobody can say that the payload turned at all.
@@ -85,7 +85,7 @@ class PoseTeam(MotionFit):
             near = STILL if any(late.values()) else np.maximum(PUNCTUAL, DOUBTED * fit.doubt)
             if not left or (step < near).all():
                 break
-            known, close = fit.known if step.max() < UNCHANGED else None, NEARLY
+            known, close = fit.known if step.max() < UNCHANGED else None, ROUGHLY
             late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion.of(parts)
