@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from steelyard.logs.runs import lasting, runs
+from steelyard.logs.runs import distinct_rows, lasting, runs
 
 
 @pytest.mark.parametrize(
@@ -36,3 +36,14 @@ def test_what_lasts_are_the_runs_of_so_many_rows(mask: list[bool], least: int) -
     given_ = np.array(mask, bool)
     kept = lasting(given_, least)
     assert runs(kept).tolist() == [run for run in runs(given_).tolist() if run[1] - run[0] >= least]
+
+
+@pytest.mark.parametrize("mask", [
+    np.ones((7, 3), np.bool_), np.zeros((1, 4), np.bool_), np.random.default_rng(3).random((200, 5)) < 0.5,
+    np.repeat(np.random.default_rng(4).random((9, 3)) < 0.5, 20, axis=0),
+])  # fmt: skip
+def test_distinct_rows_are_those_of_numpy(mask):
+    found, which = distinct_rows(mask)
+    expected, place = np.unique(mask, axis=0, return_inverse=True)
+    np.testing.assert_array_equal(found, expected)
+    np.testing.assert_array_equal(which, place.ravel())

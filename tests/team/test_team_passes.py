@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scipy.interpolate import CubicSpline
+from scipy.interpolate import CubicSpline, PchipInterpolator
 
 from steelyard.bench.tables import block
 from steelyard.bench.teams.table import _SCALE
@@ -28,7 +28,21 @@ def test_the_cubic_is_that_of_scipy(rows: int) -> None:
     rng = np.random.default_rng(rows)
     known, values = np.cumsum(rng.uniform(0.5, 1.5, rows)), rng.normal(size=(rows, 4))
     time = rng.permutation(np.concatenate([known, rng.uniform(known[0], known[-1], 200)]))
-    np.testing.assert_allclose(Curve.through(known, values).at(time), CubicSpline(known, values)(time), atol=2e-14)
+    curve = Curve.through(known, values)
+    assert curve.whole
+    np.testing.assert_allclose(curve.at(time), CubicSpline(known, values)(time), atol=2e-14)
+
+
+@pytest.mark.parametrize("rows", [2, 30, 300])
+def test_through_gaps_a_curve_is_monotone_and_held_beyond_its_ends(rows: int) -> None:
+    rng = np.random.default_rng(rows)
+    known, values = np.cumsum(rng.uniform(0.5, 1.5, rows)), rng.normal(size=(rows, 4))
+    known[rows // 2 :] += 20.0
+    time = rng.uniform(known[0] - 5, known[-1] + 5, 200)
+    curve = Curve.through(known, values)
+    assert not curve.whole or rows == 2
+    expected = PchipInterpolator(known, values)(np.clip(time, known[0], known[-1]))
+    np.testing.assert_allclose(curve.at(time), expected, atol=2e-14)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-12, 1e-8, 1e-3, 0.02, 1.0, 3.0])

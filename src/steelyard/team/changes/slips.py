@@ -213,7 +213,7 @@ def _steps(apart: Array, seen: Mask, width: int, gap: int, noise: Array) -> tupl
     step, good = _means_apart(np.ascontiguousarray(apart), np.ascontiguousarray(seen), width, gap, FILLED * width)
     score = np.zeros(len(good))
     if good.any():
-        along = np.abs(np.linalg.solve(np.linalg.cholesky(noise), step if good.all() else step[:, good]))
+        along = np.abs(np.linalg.inv(np.linalg.cholesky(noise)) @ (step if good.all() else step[:, good]))
         # The few windows of a recording tell the spread along one direction poorly: it is not taken below that of all.
         spread = np.maximum(np.median(along, axis=1), np.median(along)) / 0.6745
         score[good] = ((along / np.maximum(spread, 1e-300)[:, None]) ** 2).sum(0)

@@ -32,7 +32,7 @@ def slip_between(parts: Sequence[Stretch], apart: Array) -> SlipAt | None:
     apart  (T, N, 6) rotation vector and position of each grasp against what the others say, recording after recording
     """
     found, count = list[SlipAt | None](), apart.shape[1]
-    for robot in range(count):
+    for robot in range(count if len(parts) > 1 else 0):
         means, recording = _windows(parts, apart[:, robot], robot)
         for first in np.unique(recording)[1:]:
             slip = _step(means, recording, int(first), robot, CHANCE / (count * (len(parts) - 1)))

@@ -85,7 +85,7 @@ class PoseTeam(MotionFit):
             near = STILL if any(late.values()) else np.maximum(PUNCTUAL, DOUBTED * fit.doubt)
             if not left or (step < near).all():
                 break
-            known, close = fit.known if step.max() < UNCHANGED else None, ROUGHLY
+            known, close = fit.known if step.max() < UNCHANGED else None, NEARLY
             late = _later(late, fit)
             parts = edit(stretches(log, late))
             data = TeamMotion.of(parts)
