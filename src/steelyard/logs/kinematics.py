@@ -171,7 +171,7 @@ class Kinematics:
     def _acceleration(
         self, time: Array, delays: Delays, turn: Rotation | None, omega: Array
     ) -> tuple[Array | None, Array]:
-        """Return the classical acceleration in S and its variance from the first channel beside positions that has it."""
+        """Return the classical acceleration in S and its variance from the first channel but positions that has it."""
         given = self._vector("linear_acceleration", time, delays, turn)
         if given is not None:
             return given, np.full(len(time), self.channels["linear_acceleration"].variance)

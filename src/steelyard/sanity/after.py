@@ -16,7 +16,7 @@ from steelyard.logs.recording import Recording
 from steelyard.sanity.coverage import coverage
 from steelyard.sanity.fitted.drift import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
-from steelyard.sanity.fitted.plausible import implausible
+from steelyard.sanity.fitted.no_body import implausible
 from steelyard.sanity.readings.glance import channel
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
