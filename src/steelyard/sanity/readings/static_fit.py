@@ -7,14 +7,11 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array, Integers
-from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
 LEAST_SHARE = 1e-4
-# Directions below this share of the largest, all columns scaled alike, are not told.
-RANK = 1e-6
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,5 +101,16 @@ def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Ar
     scatter = np.stack([g.reshape(-1, size + 1).T @ g.reshape(-1, size + 1) for g in groups])
     total = scatter.sum(0)
     rest = total - scatter
-    solution, *left_out = (inverse_scaled(s[:size, :size].copy(), RANK) @ s[:size, size] for s in (total, *rest))
-    return total, solution, np.stack(left_out)
+    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
+    return total, _least_norm(total[:size, :size], total[:size, size]), left_out
+
+
+def _least_norm(matrix: Array, vector: Array) -> Array:
+    """Return the least-norm solution after scaling the columns to one."""
+    size = float(np.trace(matrix))
+    if not size > 1e-200:
+        return np.zeros(len(vector))
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * size))
+    values, axes = np.linalg.eigh(matrix * np.outer(scale, scale))
+    inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))
