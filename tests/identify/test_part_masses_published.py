@@ -119,9 +119,9 @@ def test_geo_with_the_shape_is_nearly_exact_for_one_density():
 
 def test_published_prior_has_the_parallel_axis_term_twice():
     points = np.array([[0.0, 0.0, 0.1], [0.1, 0.0, 0.2], [0.0, 0.1, 0.3], [0.05, 0.05, 0.2]])
-    right = InertialParameters.from_point_masses(np.full(4, 0.5), points)
-    wrong = published_prior(points, 2.0)
-    assert wrong.mass == 2.0
+    right = InertialParameters.from_point_masses(np.full(4, 0.25), points)
+    wrong = published_prior(points)
+    assert wrong.mass == 1.0
     np.testing.assert_allclose(wrong.com, right.com)
-    moved = InertialParameters.from_com(2.0, right.com, np.zeros((3, 3)))
+    moved = InertialParameters.from_com(1.0, right.com, np.zeros((3, 3)))
     np.testing.assert_allclose(wrong.vector[4:], (right + moved).vector[4:])

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.identify.noise_aware import NoiseAware
-from steelyard.sanity.fitted.plausible import implausible
+from steelyard.sanity.fitted.no_body import implausible
 from steelyard.simulate.logs import simulate_log
 
 

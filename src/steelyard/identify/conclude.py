@@ -141,13 +141,8 @@ def widened(estimate: Estimate) -> Estimate:
 
     What the model leaves out (a soft wrist, cross-talk) is no noise, and only differs from one stretch to the next.
     """
-    jackknife, known = estimate.evidence.jackknife_people, estimate.identified
-    if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS or not known.any():
-        return estimate
-    # A channel that holds exact zeros has no noise at all, and nothing to be a multiple of.
-    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
-    factor = float(np.median(jackknife[known] / np.maximum(estimate.std, least)[known]))
-    if factor < WORTH_WIDENING:
+    moved, known = _moved(estimate), estimate.identified
+    if moved is None or not known.any() or (factor := float(np.median(moved[known]))) < WORTH_WIDENING:
         return estimate
     note = f"error bars are {factor:.1f} times those of noise alone: leaving blocks out moves the answer that much"
     return replace(
@@ -166,11 +161,10 @@ def _as_blocks_show(estimate: Estimate) -> Estimate:
 
     What the model leaves out (an arm that swings after a stop) moves some numbers more than others.
     """
-    jackknife, known = estimate.evidence.jackknife_people, estimate.identified
-    if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS:
+    moved = _moved(estimate)
+    if moved is None:
         return estimate
-    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
-    factor = np.where(known, np.maximum(jackknife / np.maximum(estimate.std, least), 1.0), 1.0)
+    factor = np.where(estimate.identified, np.maximum(moved, 1.0), 1.0)
     phi = estimate.parameters.vector.copy()
     stretch = parameter_jacobian(phi) @ (factor[:, None] * people_jacobian(phi))
     return replace(
@@ -178,6 +172,16 @@ def _as_blocks_show(estimate: Estimate) -> Estimate:
         covariance=stretch @ estimate.covariance @ stretch.T,
         cross_covariance=stretch @ estimate.cross_covariance,
     )
+
+
+def _moved(estimate: Estimate) -> Array | None:
+    """Return by how many of its bars leaving blocks out moves each number (10,), None where blocks are few."""
+    jackknife = estimate.evidence.jackknife_people
+    if jackknife is None or estimate.evidence.blocks < ENOUGH_BLOCKS:
+        return None
+    # A channel that holds exact zeros has no noise at all, and nothing to be a multiple of.
+    least = SMALLEST_STD * natural_sizes(estimate.parameters.vector.copy())
+    return np.asarray(jackknife / np.maximum(estimate.std, least))
 
 
 @dataclass(frozen=True, eq=False)

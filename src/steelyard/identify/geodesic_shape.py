@@ -50,13 +50,13 @@ class ShapeGeodesic(Estimator):
         return Geodesic(prior, alpha=self.alpha, bias="none")._fit(problem)
 
 
-def published_prior(points: ArrayLike, mass: float = 1.0) -> InertialParameters:
-    """Return the prior of the published code from the centroids (T, 3) [m] of tetrahedra in S: wrong, for the table.
+def published_prior(points: ArrayLike) -> InertialParameters:
+    """Return the prior of the published code, of 1 kg, from centroids (T, 3) [m] of tets in S: wrong, for the table.
 
     The centre of mass is the plain mean of the centroids, whatever their volume. The inertia J is that of equal point
-    masses about S, and on top of it the parallel-axis term m (|c|^2 1 - c c^T) is added a second time.
+    masses about S, and on top of it the parallel-axis term |c|^2 1 - c c^T is added a second time.
     """
     places = check.vectors("points", points)
     com = places.mean(0)
-    inertia = mass * (forms.point_inertia(places).mean(0) + forms.point_inertia(com))
-    return InertialParameters(np.concatenate([[mass], mass * com, forms.upper(inertia)]))
+    inertia = forms.point_inertia(places).mean(0) + forms.point_inertia(com)
+    return InertialParameters(np.concatenate([[1.0], com, forms.upper(inertia)]))

@@ -50,15 +50,12 @@ def with_noise(log: MotionLog, with_bias: bool) -> MotionLog:
         return log
     levels = np.where(unknown, EVERYDAY, np.stack([n.wrench for n in noise]))
     trial, resting = _resting(log)
+    moments = Moments.of_log(trial, by_block=False)
+    # In a table of poses that are alike up to signs all rows are rounded alike: by half a step, and none averages out.
+    least = np.maximum(SMALLEST, rounding(log.wrench) * (3.0 if log.time is None else 1.0))
     for _ in range(5):
-        trial = replace(trial, noise=_with_wrench(trial.noise or (), levels))
-        levels = np.where(unknown, _wrench_levels(trial, resting, with_bias), levels)
-    return replace(log, noise=_with_wrench(noise, levels))
-
-
-def _with_wrench(noise: tuple[Noise, ...], levels: Array) -> tuple[Noise, ...]:
-    """Return the noise with wrench variances `levels` (C, 6)."""
-    return tuple(replace(n, wrench=w) for n, w in zip(noise, levels, strict=True))
+        levels = np.where(unknown, _wrench_levels(trial, moments, levels, least, resting, with_bias), levels)
+    return replace(log, noise=tuple(replace(n, wrench=w) for n, w in zip(noise, levels, strict=True)))
 
 
 def _resting(log: MotionLog) -> tuple[MotionLog, list[int]]:
@@ -141,19 +138,18 @@ def _acceleration_levels(log: MotionLog) -> Array:
     return _pooled((differences**2).mean(0) / 70, len(log))
 
 
-def _wrench_levels(log: MotionLog, resting: list[int], with_bias: bool) -> Array:
-    """Return wrench variances (C, 6) per class from the residuals of the current weighted solution.
+def _wrench_levels(
+    log: MotionLog, moments: Moments, levels: Array, least: Array, resting: list[int], with_bias: bool
+) -> Array:
+    """Return wrench variances (C, 6) per class from the residuals of the solution weighted by `levels` (C, 6).
 
-    Classes at rest are judged by their median, since a few of their rows may move; the others are no quieter.
+    Classes at rest are judged by their median, since a few of their rows may move; the others are no quieter, and none
+    is below `least` (6,).
     """
-    moments = Moments.of_log(log, by_block=False)
-    noise = log.noise or ()
-    # In a table of poses that are alike up to signs all rows are rounded alike: by half a step, and none averages out.
-    least = np.maximum(SMALLEST, rounding(log.wrench) * (3.0 if log.time is None else 1.0))
-    out, shares = np.tile(least, (len(noise), 1)), np.zeros(len(noise))
+    out, shares = np.tile(least, (len(levels), 1)), np.zeros(len(levels))
     T = design(with_bias)
-    acceleration = np.stack([noise[c].acceleration for c in moments.noise_class])
-    wrench = np.stack([noise[c].wrench for c in moments.noise_class])
+    acceleration = np.stack([n.acceleration for n in log.noise or ()])[moments.noise_class]
+    wrench = levels[moments.noise_class]
     linear = reweighted(T, moments.scatter, acceleration, wrench, 4)
     K = residual_map_of(T, linear)
     # Parameters that the data fix take their share of the residual degrees of freedom away.

@@ -105,10 +105,12 @@ class Kinematics:
         turn, omega, alpha, alpha_variance = self._turning(time, delays)
         gravity = self._gravity(time, delays, turn)
         velocity = self._vector("linear_velocity", time, delays, turn)
-        if velocity is None and turn is not None and "position" in self.channels:
-            states, _ = self._smooth("position", time, delays)
-            velocity = turn.inverse().apply(states[:, 1])
         acceleration, variance = self._acceleration(time, delays, turn, omega)
+        if turn is not None and "position" in self.channels and (velocity is None or acceleration is None):
+            states, of_states = self._smooth("position", time, delays)
+            velocity = turn.inverse().apply(states[:, 1]) if velocity is None else velocity
+            if acceleration is None:
+                acceleration, variance = turn.inverse().apply(states[:, 2]), of_states[:, 2]
         measured = acceleration is not None
         if acceleration is None:
             acceleration = np.zeros_like(omega)
@@ -169,7 +171,7 @@ class Kinematics:
     def _acceleration(
         self, time: Array, delays: Delays, turn: Rotation | None, omega: Array
     ) -> tuple[Array | None, Array]:
-        """Return the classical acceleration in S and its variance from the first channel that tells it."""
+        """Return the classical acceleration in S and its variance from the first channel but positions that has it."""
         given = self._vector("linear_acceleration", time, delays, turn)
         if given is not None:
             return given, np.full(len(time), self.channels["linear_acceleration"].variance)
@@ -180,9 +182,6 @@ class Kinematics:
             if not channel.world:
                 derivative = derivative + np.cross(omega, states[:, 0])
             return derivative, variance[:, 1]
-        if "position" in self.channels and turn is not None:
-            states, variance = self._smooth("position", time, delays)
-            return turn.inverse().apply(states[:, 2]), variance[:, 2]
         return None, np.zeros(len(time))
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.findings import Finding
+from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.scale import allow_scale
 from steelyard.identify.tool import shares_bias
@@ -14,7 +14,6 @@ from steelyard.pipelines.load import Load
 from steelyard.pipelines.options import DRIFT_ALLOWED
 from steelyard.pipelines.rows import FitRows
 from steelyard.sanity import (
-    after,
     allow_filter,
     allow_sag,
     allow_softness,
@@ -24,6 +23,8 @@ from steelyard.sanity import (
     examine_motion,
     examine_sensor,
     examine_wrench_unit,
+    of_answer,
+    of_rows,
     row_noise,
 )
 
@@ -41,12 +42,12 @@ def looked_back(
     before  what was found before the fit
     """
     drift = drift_of(load.log)
-    late = after(load.log, estimate, rows.aligned, recording, drift)
+    late = of_rows(load.log, rows.aligned, recording.gravity, drift)
     steady = load.bias.free and not load.bias.drift
-    if steady and drift and drift.sure and not _has(late, "base-tilted"):
+    if steady and drift and drift.sure and "base-tilted" not in codes(late):
         load, estimate = load.drifting().followed()
         estimate = estimate.noted(f"{DRIFT_ALLOWED}, as the log shows (most surely {drift.surest_words})")
-        late = after(load.log, estimate, rows.aligned, recording, drift)
+    late = (*late, *of_answer(load.log, estimate, recording))
     if not rows.unmeasured:
         late = (*late, *examine_masses(load.log, (*before, *late)))
     if load.shape is None:
@@ -92,10 +93,6 @@ def of_sensor_and_body(
             estimate = allow_softness(load.log, estimate)
             estimate = allow_filter(load.log, estimate, rows.aligned.wrench_late_s)
     return allow_scale(estimate, _scale_std(recording, rows.aligned), load.shape is not None), found
-
-
-def _has(findings: tuple[Finding, ...], code: str) -> bool:
-    return any(finding.code == code for finding in findings)
 
 
 def _scale_std(recording: Recording, aligned: Aligned) -> float:

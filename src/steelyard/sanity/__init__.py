@@ -1,6 +1,6 @@
 """Sanity: is the log what its description says, and does the answer look like one?"""
 
-from steelyard.sanity.after import after, row_noise
+from steelyard.sanity.after import of_answer, of_rows, row_noise
 from steelyard.sanity.before import examine
 from steelyard.sanity.fitted.density import impossible_density, maybe_hollow
 from steelyard.sanity.fitted.drift import drift_of
@@ -17,7 +17,6 @@ from steelyard.sanity.one_body import one_body
 from steelyard.sanity.rows.frozen_rows import dead_channels
 
 __all__ = [
-    "after",
     "allow_filter",
     "allow_sag",
     "allow_softness",
@@ -34,6 +33,8 @@ __all__ = [
     "impossible_density",
     "levelled",
     "maybe_hollow",
+    "of_answer",
+    "of_rows",
     "one_body",
     "row_noise",
 ]

@@ -16,7 +16,7 @@ from steelyard.logs.recording import Recording
 from steelyard.sanity.coverage import coverage
 from steelyard.sanity.fitted.drift import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
-from steelyard.sanity.fitted.plausible import implausible
+from steelyard.sanity.fitted.no_body import implausible
 from steelyard.sanity.readings.glance import channel
 
 # chi^2 per degree of freedom above this, and declared noise off by this factor, are far from right.
@@ -29,27 +29,29 @@ PRIOR_SHARE = 0.5
 PASSED = 0.8
 
 
-def after(
-    log: MotionLog, estimate: Estimate, aligned: Aligned, recording: Recording, drift: Drift | None
-) -> tuple[Finding, ...]:
-    """Return findings about the rows `log` that were fitted, which `aligned` gave; `drift` is that of the bias in them.
+def of_answer(log: MotionLog, estimate: Estimate, recording: Recording) -> tuple[Finding, ...]:
+    """Return findings about the answer that rows `log` gave: declared noise off, mostly the prior, no body's."""
+    size = implausible(estimate, float(np.linalg.norm(recording.gravity)), row_noise(log, recording, "force"))
+    return (*_noise_level(estimate, recording), *_prior(estimate), *size)
 
-    Too few directions, nearly planar, base tilted, bias drift, declared noise off, an answer that is mostly the prior.
+
+def of_rows(log: MotionLog, aligned: Aligned, gravity: Array, drift: Drift | None) -> tuple[Finding, ...]:
+    """Return findings about the rows `log` that are fitted, which `aligned` gave, whatever they weigh.
+
+    Too few directions, nearly planar, base tilted, bias drift.
+
+    gravity  (3,) [m/s^2] in W as it was used
+    drift    that of the bias in the rows
     """
     seen = tuple(f for f in coverage(log.gravity) if f.code not in codes(aligned.findings))
+    tilted = _base_tilted(log, aligned, gravity)
+    return (*seen, *tilted, *(() if tilted or drift is None else drift.findings))
+
+
+def _base_tilted(log: MotionLog, aligned: Aligned, gravity: Array) -> tuple[Finding, ...]:
+    """Return `base-tilted` where another direction of gravity in W explains the wrench clearly better."""
     rotation = rotation_of(log, aligned)
-    tilted = () if rotation is None else base_tilted(log, rotation, recording.gravity, aligned.acceleration_from)
-    drifts = () if tilted or drift is None else drift.findings
-    size = implausible(estimate, float(np.linalg.norm(recording.gravity)), row_noise(log, recording, "force"))
-    return (*seen, *tilted, *drifts, *_noise_level(estimate, recording), *_prior(estimate), *size)
-
-
-def base_tilted(log: MotionLog, rotation: Array, gravity: Array, acceleration_from: str) -> tuple[Finding, ...]:
-    """Return `base-tilted` where another direction of gravity in W explains the wrench clearly better.
-
-    rotation (N, 3, 3) S to W at the rows of the log; gravity (3,) [m/s^2] in W as it was used.
-    """
-    found = fitted_gravity(log, rotation, gravity, acceleration_from)
+    found = None if rotation is None else fitted_gravity(log, rotation, gravity, aligned.acceleration_from)
     if found is None or found.angle <= max(TILT, SURE * found.angle_std) or found.left >= TILT_SHARE:
         return ()
     message = (

@@ -66,8 +66,7 @@ def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]
 def mixture(weight: Array, means: Sequence[Array], covariances: Sequence[Array]) -> tuple[Array, Array]:
     """Return mean (n,) and covariance (n, n) of a mixture with weights (K,), the spread between its means included."""
     mean = weight @ np.stack(means)
-    off = np.stack(means) - mean
-    return mean, np.einsum("k,kij->ij", weight, np.stack(covariances)) + np.einsum("k,ki,kj->ij", weight, off, off)
+    return mean, density_priors.spread_of(weight, np.stack(means) - mean, np.stack(covariances))
 
 
 def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:

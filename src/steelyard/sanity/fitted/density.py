@@ -15,7 +15,7 @@ from steelyard.evidence import PartMass
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.shape_error import ShapeError
-from steelyard.sanity.fitted.plausible import DENSEST
+from steelyard.sanity.fitted.no_body import DENSEST
 
 # Half of what the lightest foams weigh [kg/m^3]: an inflated ball that counts as solid has more.
 LIGHTEST = 5.0

@@ -148,7 +148,7 @@ class Misplaced:
     def widened(self, estimate: Estimate) -> Estimate:
         """Return the estimate with bars that hold how well the point is known."""
         share = float(np.linalg.norm(self.std) / np.linalg.norm(self.place))
-        return replace(estimate, covariance=estimate.covariance + share**2 * np.outer(self.moved, self.moved))
+        return estimate.allowing(share * self.moved)
 
     def put_right(self, log: MotionLog) -> MotionLog:
         """Return the log with accelerations of S."""

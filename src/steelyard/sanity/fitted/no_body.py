@@ -1,4 +1,4 @@
-"""A wrench that no rigid body explains, and the unit of force or torque with which one does.
+"""A wrench that no rigid body explains, or none that a robot holds, and the unit in which one does.
 
 Ten free numbers often fit where no body does: forces too small beside the torques show little mass far out, with less
 inertia than a point of it there has. The answer is always a body, so that its residuals tell.
@@ -23,9 +23,13 @@ from steelyard.sanity.readings.torques import UNITS
 UNEXPLAINED, SOUND = 2.5, 1.6
 # Larger factors explain whatever bends torques, and show by where the centre of mass lies.
 LARGEST = 10.0
-# Torques are far beyond what a right model leaves above this share of what the weight makes at this arm [m], which few
-# centres of mass exceed, and so many times what scatters from row to row, or this [N m] of a table.
-MISFIT, ARM, NO_NOISE, QUIET = 0.2, 0.1, 5.0, 0.01
+# A residual is far beyond what a right model leaves above this share of what the weight makes, and so many times what
+# scatters from row to row: noise of a table nobody knows, but no reading at rest scatters by more than is said here.
+# Torques beside those that the weight makes at this arm [m], which few centres of mass exceed.
+MISFIT, NO_NOISE, ARM = 0.2, 5.0, 0.1
+_PARTS = {"force": (1.0, 0.1, "N", ""), "torque": (ARM, 0.01, "N m", f" at {ARM:g} m")}
+# No arm holds more [kg]; nothing is denser [kg/m^3] than osmium.
+HEAVIEST, DENSEST = 500.0, 22600.0
 ELSEWHERE = {"weight-compensated", "motion-mismatch", "base-tilted", "force-unit"}
 TOLD = {"wrench-unexplained", "noise-level-off", "sensor-turned", "gains-differ"}
 
@@ -68,21 +72,57 @@ def examine_body(
     """
     if codes(known) & (ELSEWHERE | TOLD):
         return ()
-    chi2, miss = estimate.evidence.chi2_per_dof, estimate.evidence.residual_torque_Nm
-    weight = ARM * estimate.mass * gravity
+    chi2 = estimate.evidence.chi2_per_dof
     # Noise that nobody declared is told by the residuals, and chi-square then says nothing of those.
-    if miss > max(MISFIT * weight, NO_NOISE * (noise or QUIET)):
-        text = (
-            f"The torque misses by {miss:.2g} N m rms where the weight makes {weight:.2g} N m at {ARM:g} m: one rigid "
-            "body does not explain these torques, and the error bars do not hold."
-        )
-    elif chi2 is not None and chi2 > UNEXPLAINED:
+    if missed := _missed(estimate, "torque", gravity, noise):
+        return missed
+    if chi2 is not None and chi2 > UNEXPLAINED:
         text = (
             f"{_much(chi2)}: one rigid body does not explain this wrench to its noise; the error bars hold only what "
             "leaving parts of the log out shows."
         )
     else:
         return ()
+    return (Finding.of("wrench-unexplained", text),)
+
+
+def implausible(estimate: Estimate, gravity: float, noise: float = 0.0) -> tuple[Finding, ...]:
+    """Return `force-unit`, `length-in-mm` or `wrench-unexplained` where mass, size or forces are those of no held body.
+
+    gravity, noise  as for `examine_body`, the noise that of the force [N]
+    """
+    mass = estimate.mass
+    if mass > HEAVIEST:
+        return (Finding.of("force-unit", f"The mass comes out at {mass:.4g} kg, more than an arm holds."),)
+    if missed := _missed(estimate, "force", gravity, noise):
+        return missed
+    if not estimate.identified[4:].all():
+        return ()
+    # The second moment of a ball of the densest metal is the least that a body of this mass can have.
+    ball = (3 * mass / (4 * np.pi * DENSEST)) ** (1 / 3)
+    least = 3 * mass * ball**2 / 5
+    half_trace = float(np.trace(estimate.parameters.inertia_com)) / 2
+    if half_trace + 3 * float(estimate.std[4:].max()) > least:
+        return ()
+    text = (
+        f"The body is denser than any metal: {mass:.3g} kg within {1e3 * np.sqrt(max(half_trace, 0) / mass):.2g} mm. "
+        "The torques are too small for the forces, as those in N m are that were declared as N*mm, or forces in N that "
+        "were declared as kgf."
+    )
+    return (Finding.of("length-in-mm", text),)
+
+
+def _missed(estimate: Estimate, part: str, gravity: float, noise: float) -> tuple[Finding, ...]:
+    """Return `wrench-unexplained` where force or torque miss by more than noise and what a right model leaves."""
+    arm, quiet, unit, at = _PARTS[part]
+    seen, made = estimate.evidence, arm * estimate.mass * gravity
+    miss = seen.residual_force_N if part == "force" else seen.residual_torque_Nm
+    if miss <= max(MISFIT * made, NO_NOISE * (noise or quiet)):
+        return ()
+    text = (
+        f"The {part} misses by {miss:.2g} {unit} rms where the weight makes {made:.2g} {unit}{at}: one rigid body does "
+        "not explain this wrench, and the error bars do not hold."
+    )
     return (Finding.of("wrench-unexplained", text),)
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -86,7 +87,7 @@ def find_change(slices: Slices, tolerance: Array, memory: float) -> LoadChange |
     tolerance = np.maximum(tolerance, level)
     H, g, c = sums(slices, tolerance)
     run = _Running(_running(H), _running(g), float(c.sum()), slices.ridge)
-    j = _best(run, slices.time)
+    j = first_after(slices.time, lambda j: run.cost(j, slice(0, 10)))
     if j is None:
         return None
     normal, right = run.normal(j, slice(0, 10))
@@ -123,13 +124,16 @@ def _running(values: Array) -> Array:
     return np.concatenate([np.zeros((1, *values.shape[1:])), np.cumsum(values, axis=0)])
 
 
-def _best(run: _Running, time: Array) -> int | None:
-    """Return the first slice of the second body: on a grid, then slice by slice around its best."""
+def first_after(time: Array, cost: Callable[[int], float], ends: int = 0) -> int | None:
+    """Return the first row after a change, where `cost` is least: on a grid, then around its best; None of too few.
+
+    time  (N,) [s] of the rows; either side has more than `ends` of them
+    """
     inside = np.flatnonzero((time > time[0] + SHORTEST) & (time < time[-1] - SHORTEST))
+    inside = inside[(inside >= ends) & (inside < len(time) - ends)]
     if not len(inside):
         return None
     step = max(len(inside) // GRID, 1)
-    body = slice(0, 10)
-    first = min(inside[::step], key=lambda j: run.cost(int(j), body))
-    near = inside[abs(inside - first) <= step]
-    return int(min(near, key=lambda j: run.cost(int(j), body)))
+    first = min(inside[::step].tolist(), key=cost)
+    near = inside[np.abs(inside - first) <= step].tolist()
+    return int(min(near[:: max(len(near) // GRID, 1)], key=cost))

@@ -16,10 +16,10 @@ from steelyard.findings import Finding
 from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import RANK, Rows
-from steelyard.sanity.holding.load_change import SHORTEST, longer_side, slip_words
+from steelyard.sanity.holding.load_change import SHORTEST, first_after, longer_side, slip_words
 
-# Times tried on a first grid; either side must hold this many rows.
-GRID, FEWEST = 40, 12
+# Either side must hold this many rows.
+FEWEST = 12
 # Of the squared residual of one body with a drift, a slip leaves no more than this share, and takes so many times as
 # much away as a bias that jumps at that time, and as a gravity that is tilted.
 LEFT, BESIDE_JUMP, BESIDE_TILT = 0.9, 1.5, 2.0
@@ -77,24 +77,14 @@ def small_slip(log: MotionLog, rotation: Array | None = None, gravity: Array | N
 
 
 def _best(rows: Rows) -> float | None:
-    """Return the time [s] from which a first moment of its own leaves least: on a grid, then row by row around it."""
+    """Return the time [s] from which a first moment of its own leaves least."""
     time = np.asarray(rows.log.time)
-    inside = np.flatnonzero((time > time[0] + SHORTEST) & (time < time[-1] - SHORTEST))
-    inside = inside[(inside >= FEWEST) & (inside < len(time) - FEWEST)]
-    if not len(inside):
-        return None
     both = np.concatenate([rows.columns, rows.values[:, :, None]], 2) * np.sqrt(rows.weights)[:, :, None]
     # Row j of `after` sums over rows j and on: with it, the equations of a step at any row are known.
     after = np.cumsum((np.swapaxes(both, 1, 2) @ both)[::-1], axis=0)[::-1]
 
-    def left(j: int) -> float:
-        return _left(after[0], after[j])
-
-    step = max(len(inside) // GRID, 1)
-    first = min(inside[::step].tolist(), key=left)
-    near = [j for j in range(first - step + 1, first + step) if inside[0] <= j <= inside[-1]]
-    j = min(near[:: max(len(near) // GRID, 1)], key=left)
-    return float(time[j - 1] + time[j]) / 2
+    j = first_after(time, lambda j: _left(after[0], after[j]), FEWEST)
+    return None if j is None else float(time[j - 1] + time[j]) / 2
 
 
 def _left(whole: Array, late: Array) -> float:

@@ -32,8 +32,8 @@ def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple
     if reading.rotation is None or reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
         return recording, ()
     tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
-    turned = turned_sensor(view, reading.gravity, sign_of(view, reading))
-    mirror = mirrored(view, reading.gravity, sign_of(view, reading))
+    sign = sign_of(view, reading)
+    turned, mirror = turned_sensor(view, reading.gravity, sign), mirrored(view, reading.gravity, sign)
     if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
         return recording, (_mixed_finding(mirror, reading.fit),)
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):

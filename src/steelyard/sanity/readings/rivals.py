@@ -143,10 +143,8 @@ def _rivals(recording: Recording, view: Glance, gravity: Array) -> Iterator[Read
     R = view.rotation
     if R is None:
         return
-    for misread in (*MISREAD, INVERTED):
-        meant = glance(put) if (put := _put_right(recording, misread)) is not None else None
-        if meant is not None and meant.rotation is not None:
-            yield reading_of(meant if misread.whole else view, misread.words, gravity, meant.rotation, misread)
+    for misread, _, meant in _meant(recording):
+        yield reading_of(meant if misread.whole else view, misread.words, gravity, meant.rotation, misread)
     size = float(np.linalg.norm(gravity))
     for axis in range(3):
         if abs(gravity[axis]) < 0.8 * size:
@@ -175,11 +173,18 @@ def _in_other_axes(recording: Recording, view: Glance, given: Reading) -> Iterat
 
 def _misread_in_other_axes(recording: Recording, gravity: Array) -> Iterator[Reading]:
     """Yield the wrench in other axes beside rotations that are misread, too: neither alone explains such a log."""
+    for misread, put, meant in _meant(recording):
+        for rival in _in_other_axes(put, meant, reading_of(meant, "", gravity, meant.rotation)):
+            yield replace(rival, words=f"{rival.words}, and {misread.words}", misread=misread)
+
+
+def _meant(recording: Recording) -> Iterator[tuple[Misread, Recording, Glance]]:
+    """Yield the ways to misread rotations, and the recording and what is seen of it with each undone."""
     for misread in (*MISREAD, INVERTED):
-        meant = glance(put) if (put := _put_right(recording, misread)) is not None else None
+        put = _put_right(recording, misread)
+        meant = None if put is None else glance(put)
         if put is not None and meant is not None and meant.rotation is not None:
-            for rival in _in_other_axes(put, meant, reading_of(meant, "", gravity, meant.rotation)):
-                yield replace(rival, words=f"{rival.words}, and {misread.words}", misread=misread)
+            yield misread, put, meant
 
 
 def _axes_in_words(world: frozenset[str]) -> str:
