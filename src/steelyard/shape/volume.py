@@ -149,7 +149,7 @@ def _made(used: WorkingCloud) -> tuple[Solid, float]:
     mesh, around = (
         TetMesh.known(xyz, order[cells.tets], cells.volumes, cells.neighbours) for cells in (made.mesh, around)
     )
-    return replace(made, mesh=mesh, around=around, cloud=replace(used.cloud, normals=normals)), doubt
+    return replace(made, mesh=mesh, around=around, cloud=used.cloud.with_normals(normals)), doubt
 
 
 def _has(made: Solid, *codes: str) -> bool:
@@ -210,7 +210,7 @@ def _apart(some: Array, others: Array) -> float:
 def _without_normals(used: WorkingCloud, why: str) -> tuple[Solid, TetMesh, float]:
     """Return the closed volume of points without their normals, with what says so."""
     findings = (*used.findings, Finding.of("normals-flipped", f"{why}; they were found anew."))
-    return _enclosed(used._replace(cloud=replace(used.cloud, normals=None), findings=findings))
+    return _enclosed(used._replace(cloud=used.cloud.with_normals(None), findings=findings))
 
 
 def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
@@ -257,7 +257,7 @@ def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
     few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
     skin = used.noise * total * diagonal**2 / solid.volume
     std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
-    kept = replace(used.cloud, normals=surface.normals)
+    kept = used.cloud.with_normals(surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
 
 
