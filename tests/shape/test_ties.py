@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cells.complex import Complex
-from steelyard.shape.orient import SLOPE
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.sides.sheets import sheet_planes
 from steelyard.shape.sides.ties import Ties
@@ -28,7 +27,7 @@ def tube() -> Surface:
 
 def ties(tube: Surface, normals: np.ndarray) -> Ties:
     xyz, _, near, complex = tube
-    plane, link = sheet_planes(xyz, near.index, SLOPE)
+    plane, link = sheet_planes(xyz, near.index)
     sign = np.sign((plane * normals).sum(1))
     link = link * sign[:, None] * sign[near.index]
     return Ties.of(xyz, normals, near.index, link, complex, float(np.median(near.spacing)))
