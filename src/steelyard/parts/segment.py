@@ -75,7 +75,7 @@ class Segmentation:
         """The parts with their exact moments, in the frame of the solid."""
         return Parts(np.arange(len(self)), self.mesh.moments(self.labels, len(self)), self.rgb)
 
-    @property
+    @cached_property
     def border_share(self) -> float:
         """Share of the volume that corners of another part say, of cells that reach from one part to another.
 
