@@ -18,7 +18,6 @@ from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.merging import merge_all
 from steelyard.shape.hull import TOLERANCE
 from steelyard.shape.mesh import Integers
-from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
 
 
@@ -69,9 +68,7 @@ def cluster(
     volumes = np.bincount(leaf, mesh.volumes / diagonal**3, count).astype(np.float64)
     tets, edges = np.bincount(leaf, minlength=count), _edges(mesh, leaf, count)
     size = -1.0 if isinstance(cost, Published) else cost.size
-    merges, costs, volume, hull = with_stand_ins(
-        xyz, lambda known: merge_all(xyz, start, member, volumes, tets, groups, edges, TOLERANCE, size, known)
-    )
+    merges, costs, volume, hull = merge_all(xyz, start, member, volumes, tets, groups, edges, TOLERANCE, size)
     return Hierarchy(leaf, merges, costs, volume * diagonal**3, hull * diagonal**3)
 
 
