@@ -29,14 +29,13 @@ _HELD, _GROWN, _EXACT, _GONE = 0, 1, 2, 3
 
 
 class Clusters(NamedTuple):
-    """Clusters (N,): volume, that of the hull, number of tets, group (-1 for more than one), whether it is joined, and
-    the first of its edges' ends; `latest` (N, 2): the edge to it that was met last, and the merge that met it.
+    """Clusters (N,): volume, that of the hull, number of tets, whether it is joined, and the first of its edges' ends;
+    `latest` (N, 2): the edge to it that was met last, and the merge that met it.
     """
 
     volume: Any
     hull: Any
     tets: Any
-    group: Any
     gone: Any
     head: Any
     latest: Any
@@ -64,14 +63,11 @@ class Making(NamedTuple):
 
 
 class Measure(NamedTuple):
-    """What a merge is measured by: the number of first clusters, the volume and the tets of all of them, and the
-    weight of a union's size (below zero: the published cost).
-    """
+    """What a merge is measured by: the number of first clusters, the volume and the tets of all of them."""
 
     n: int
     whole: float
     tets: float
-    size: float
 
 
 class Tree(NamedTuple):
@@ -102,39 +98,33 @@ def _five_points(xyz: Array, rows: Any) -> float:
 @numba.njit(cache=True, nogil=True)
 def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, measure: Measure) -> float:
     """Return what orders merges, the cost or a number that rises with it; from a bound of the hull, a bound of it."""
-    whole, size = measure.whole, measure.size
-    grains = (hull - va - vb) / (GRAIN * whole)
+    grains = (hull - va - vb) / (GRAIN * measure.whole)
     hollow: float = GRAIN * max(0.0, np.rint(grains if exact else grains - 1e-3))
-    if size >= 0:
-        return float(hollow + size * (va + vb) / whole)
     if hollow > 0:
         return hollow
     return -1.0 / (float(na) * na + float(nb) * nb)
 
 
 def merge_all(
-    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
-    tolerance: float, size: float,
-) -> tuple[Any, Array, Array, Array]:  # fmt: skip
+    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, ends: Any, tolerance: float
+) -> tuple[Any, Array, Array, Array]:
     """Return merges (n - 1, 2), the cost (n - 1,) of each, and volume and hull (2 n - 1,) of every node, leaves first.
 
     xyz            (V, 3) points, in any unit of length
     start, member  numbers of the points of leaf k: member[start[k]:start[k + 1]]
-    leaf_volume, leaf_tets, leaf_group  (n,)
+    leaf_volume, leaf_tets  (n,)
     ends           (E, 2) leaves that touch
-    size           weight of a union's size in the cost; below zero: the published cost
     """
     n = len(leaf_volume)
     merges, cost, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), (0, n - 1)
     volume, tets = np.pad(leaf_volume, more), np.pad(leaf_tets, more)
-    group, gone, head = np.pad(leaf_group, more), np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
-    latest = np.full((2 * n - 1, 2), -1, np.int32)
-    clusters = Clusters(volume, np.zeros(2 * n - 1), tets, group, gone, head, latest)
+    gone, head = np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
+    clusters = Clusters(volume, np.zeros(2 * n - 1), tets, gone, head, np.full((2 * n - 1, 2), -1, np.int32))
     hulls = hulls_of(start, member, 2 * n - 1, len(xyz))
     making, tree = Making(xyz, tolerance, hull_work(len(xyz))), Tree(merges, cost)
     edges = Edges(np.empty((len(ends), 4), np.int32), np.empty(len(ends)), np.zeros(len(ends), np.int8))
     _begin(making, n, clusters, hulls, ends, edges)
-    made = _join_neighbours(making, n, size, clusters, hulls, edges, empty_heap(len(ends)), room(), tree)
+    made = _join_neighbours(making, n, clusters, hulls, edges, empty_heap(len(ends)), room(), tree)
     if made < n - 1:
         _join_bodies(making, n, made, clusters, hulls, tree)
     return merges, cost, volume, clusters.hull
@@ -170,38 +160,28 @@ def _priced(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, m
 
 @numba.njit(cache=True, nogil=True)
 def _join_neighbours(
-    making: Making, n: int, size: float, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges, full_heap: Heap,
-    space: Room, tree: Tree,
+    making: Making, n: int, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges, full_heap: Heap, space: Room,
+    tree: Tree,
 ) -> int:  # fmt: skip
     """Join clusters that touch, always the two of least cost; return how often."""
     c, h, d, p = all_clusters, all_hulls, all_edges, full_heap
     clusters = Clusters(
-        borrowed(c.volume), borrowed(c.hull), borrowed(c.tets), borrowed(c.group), borrowed(c.gone), borrowed(c.head),
-        borrowed(c.latest),
-    )  # fmt: skip
+        borrowed(c.volume), borrowed(c.hull), borrowed(c.tets), borrowed(c.gone), borrowed(c.head), borrowed(c.latest)
+    )
     hulls = Hulls(
         borrowed(h.vertex), borrowed(h.face), borrowed(h.offset), borrowed(h.length), borrowed(h.mark),
         borrowed(h.rows), borrowed(h.state),
     )  # fmt: skip
     edges = Edges(borrowed(d.end), borrowed(d.known), borrowed(d.stage))
     heap = Heap(borrowed(p.edge), borrowed(p.order), borrowed(p.place))
-    end, stage, group = edges.end, edges.stage, clusters.group
-    measure = Measure(n, clusters.volume[:n].sum(), float(clusters.tets[:n].sum()), size)
+    end, stage = edges.end, edges.stage
+    measure = Measure(n, clusters.volume[:n].sum(), float(clusters.tets[:n].sum()))
     xyz, tolerance, work = making
-    across, made, heaped, stamp = False, integer(0), integer(0), integer(1)
+    made, heaped, stamp = integer(0), integer(0), integer(1)
     last, kept = integer(-1), integer(0)  # the edge whose hull was made last, and its number of vertices
     for e in range(len(end)):
-        if group[end[e, 0]] == group[end[e, 1]]:
-            heaped = _priced(clusters, edges, heap, heaped, e, measure)
-    while made < n - 1:
-        if heaped == 0:
-            if across:
-                break
-            across = True
-            for e in range(len(end)):
-                if stage[e] != _GONE:
-                    heaped = _priced(clusters, edges, heap, heaped, e, measure)
-            continue
+        heaped = _priced(clusters, edges, heap, heaped, e, measure)
+    while heaped > 0:
         e = integer(heap.edge[0])
         if stage[e] == _HELD:
             stamp = _grow(xyz, clusters, hulls, edges, e, space, stamp)
@@ -217,7 +197,7 @@ def _join_neighbours(
                 kept = _hull_again(making, hulls, end[e, 0], end[e, 1])
             last = integer(-1)
             keep(hulls, n + made, clusters.gone, work.point, work.stack, kept, clusters.hull[n + made] > 0)
-            heaped = _hand_over(clusters, edges, heap, heaped, e, made, across, measure)
+            heaped = _hand_over(clusters, edges, heap, heaped, e, made, measure)
             made += 1
     return int(made)
 
@@ -245,15 +225,11 @@ def _note(clusters: Clusters, edges: Edges, e: int, key: float, made: int, measu
     """Make a cluster of the ends of an edge."""
     a, b, c = edges.end[e, 0], edges.end[e, 1], measure.n + made
     (merges, cost), in_all = tree, measure.tets
-    volume, tets, group = clusters.volume, clusters.tets, clusters.group
+    volume, tets = clusters.volume, clusters.tets
     merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
     volume[c], tets[c], clusters.hull[c] = volume[a] + volume[b], tets[a] + tets[b], edges.known[e]
-    group[c] = group[a] if group[a] == group[b] else -1
     clusters.gone[a] = clusters.gone[b] = True
-    if measure.size >= 0:
-        cost[made] = key
-    else:
-        cost[made] = 1 + edges.known[e] - volume[a] - volume[b] if key > 0 else -1.0 / (key * in_all * in_all)
+    cost[made] = 1 + edges.known[e] - volume[a] - volume[b] if key > 0 else -1.0 / (key * in_all * in_all)
 
 
 @numba.njit(cache=True, nogil=True)
@@ -268,12 +244,10 @@ def _hull_again(making: Making, hulls: Hulls, a: int, b: int) -> int:
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _hand_over(
-    clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, made: int, across: bool, measure: Measure
-) -> int:
+def _hand_over(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, made: int, measure: Measure) -> int:
     """Give the edges of two clusters to the one made of them, two to one cluster as one; return the heap's size."""
     end, known, stage = edges.end, edges.known, edges.stage
-    head, latest, group, c = clusters.head, clusters.latest, clusters.group, measure.n + made
+    head, latest, c = clusters.head, clusters.latest, measure.n + made
     stage[e] = _GONE
     heaped = remove(heap.edge, heap.order, heap.place, heaped, e)
     for node in (integer(end[e, 0]), integer(end[e, 1])):
@@ -298,8 +272,7 @@ def _hand_over(
         f, side = half >> 1, half & 1
         known[f] = max(known[f], clusters.hull[c])
         stage[f] = _HELD
-        if across or group[c] == group[end[f, 1 - side]]:
-            heaped = _priced(clusters, edges, heap, heaped, f, measure)
+        heaped = _priced(clusters, edges, heap, heaped, f, measure)
         half = integer(end[f, 2 + side])
     return heaped
 
