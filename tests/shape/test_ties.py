@@ -30,7 +30,7 @@ def ties(tube: Surface, normals: np.ndarray) -> Ties:
     plane, link = sheet_planes(xyz, near.index)
     sign = np.sign((plane * normals).sum(1))
     link = link * sign[:, None] * sign[near.index]
-    return Ties.of(xyz, normals, near.index, link, complex, float(np.median(near.spacing)))
+    return Ties.of(xyz, normals, near.index, link, complex, near.spacing)
 
 
 def test_true_normals_keep_their_ties(tube: Surface) -> None:
@@ -56,7 +56,7 @@ def test_a_wall_turned_inside_out_is_known_from_its_outside(tube: Surface) -> No
 
 def test_the_hull_of_all_points_shows_which_way_is_out(tube: Surface) -> None:
     xyz, normals, near, complex = tube
-    spacing = float(np.median(near.spacing))
+    spacing = near.spacing
     flux = complex.flux(xyz, normals, spacing)
     assert flux > 0.3
     assert complex.flux(xyz, -normals, spacing) == pytest.approx(-flux)

@@ -32,7 +32,7 @@ def drawn(body: object, turned: float = 1.0) -> Drawn:
     xyz = 1e3 * xyz
     near, complex = Neighbours.of(xyz), Complex.of(xyz, Tree.of(xyz).order)
     planes, link = sheet_planes(xyz, near.index)
-    wall = Wall.of(xyz, turned * normals, planes, link, complex, float(np.median(near.spacing)))
+    wall = Wall.of(xyz, turned * normals, planes, link, complex, near.spacing)
     return xyz, normals, planes, wall
 
 

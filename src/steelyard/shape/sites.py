@@ -43,7 +43,7 @@ class Sites:
         """Return the points of a cloud."""
         diagonal = cloud.diagonal
         xyz, near = (cloud.xyz - cloud.xyz.mean(0)) / diagonal, cloud.near.scaled(1 / diagonal)
-        return cls(cloud.xyz, diagonal, xyz, near, Tree.of(xyz), float(np.median(near.spacing)))
+        return cls(cloud.xyz, diagonal, xyz, near, Tree.of(xyz), near.spacing)
 
     @cached_property
     def delaunay(self) -> Complex:
