@@ -136,4 +136,5 @@ def overlap_finding(mesh: TriangleMesh, solids: Solids | None = None) -> Finding
 def body_of(mesh: TriangleMesh, labels: list[int]) -> manifold3d.Manifold:
     """Return the parts as one body for set operations."""
     own = mesh.of_part(*labels)
-    return manifold3d.Manifold(manifold3d.Mesh64(own.vertices, np.ascontiguousarray(own.triangles, np.uint64)))
+    # Arrays of its own: read-only ones are refused.
+    return manifold3d.Manifold(manifold3d.Mesh64(np.array(own.vertices), own.triangles.astype(np.uint64)))
