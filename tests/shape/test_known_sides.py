@@ -68,7 +68,7 @@ def test_normals_fitted_to_neighbours_feign_no_noise() -> None:
     near -= near.mean(1, keepdims=True)
     fitted = np.linalg.eigh(np.einsum("nki,nkj->nij", near, near))[1][..., 0]
     fitted *= np.sign((fitted * out).sum(1))[:, None]
-    assert settled_along(xyz, fitted, np.arange(4000), float(np.median(Cloud(xyz).near.spacing))) is None
+    assert settled_along(xyz, fitted, np.arange(4000), Cloud(xyz).near.spacing) is None
 
 
 def test_points_past_an_edge_are_left_out_and_all_others_reach_their_face() -> None:

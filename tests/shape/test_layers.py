@@ -88,7 +88,7 @@ def test_grooves_of_a_file_are_no_walls() -> None:
     teeth = [block((1.6 * k, 1.6 * k + 0.8), (-11, 11), (2, 2.5)) for k in range(75)]
     made = sheet(union([block((0, 120), (-11, 11), (-2, 2)), *teeth]))
     xyz, near = made.cloud.xyz, made.cloud.near
-    found = Layers.of(xyz, near.index, float(np.median(near.spacing)))
+    found = Layers.of(xyz, near.index, near.spacing)
     assert found is not None
     assert found.part
     solid = enclose(made.cloud)

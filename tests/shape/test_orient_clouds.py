@@ -129,7 +129,7 @@ def test_discs_fill_a_slab_that_dipoles_leave_empty(plate: tuple[np.ndarray, np.
 def test_planes_of_a_thin_plate_are_those_of_its_sheets(plate: tuple[np.ndarray, np.ndarray]) -> None:
     xyz, normal = plate
     near = Neighbours.of(xyz)
-    plane, link = sheet_planes(xyz, near.index, 0.12)
+    plane, link = sheet_planes(xyz, near.index)
     assert (np.abs((plane * normal).sum(1)) > 0.99).mean() > 0.9
     across = normal[near.index] @ np.array([0, 0, 1.0]) * normal[:, 2:] < 0
     assert np.abs(link[across]).mean() < 0.25 * np.abs(link[~across]).mean()

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 
 from steelyard.shape.cells.complex import Complex
-from steelyard.shape.orient import SLOPE
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.sides.sheets import sheet_planes
 from steelyard.shape.sides.ties import Ties
@@ -28,10 +27,10 @@ def tube() -> Surface:
 
 def ties(tube: Surface, normals: np.ndarray) -> Ties:
     xyz, _, near, complex = tube
-    plane, link = sheet_planes(xyz, near.index, SLOPE)
+    plane, link = sheet_planes(xyz, near.index)
     sign = np.sign((plane * normals).sum(1))
     link = link * sign[:, None] * sign[near.index]
-    return Ties.of(xyz, normals, near.index, link, complex, float(np.median(near.spacing)))
+    return Ties.of(xyz, normals, near.index, link, complex, near.spacing)
 
 
 def test_true_normals_keep_their_ties(tube: Surface) -> None:
@@ -57,7 +56,7 @@ def test_a_wall_turned_inside_out_is_known_from_its_outside(tube: Surface) -> No
 
 def test_the_hull_of_all_points_shows_which_way_is_out(tube: Surface) -> None:
     xyz, normals, near, complex = tube
-    spacing = float(np.median(near.spacing))
+    spacing = near.spacing
     flux = complex.flux(xyz, normals, spacing)
     assert flux > 0.3
     assert complex.flux(xyz, -normals, spacing) == pytest.approx(-flux)

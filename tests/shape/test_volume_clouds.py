@@ -14,8 +14,7 @@ from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.nesting import winding_number
-from steelyard.shape.orient import SLOPE
-from steelyard.shape.sides.sheets import torn
+from steelyard.shape.sides.sheets import sheet_planes, torn
 from steelyard.shape.sides.tree import Tree
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import Solid, enclose
@@ -207,7 +206,8 @@ def test_right_normals_on_both_sides_of_a_thin_wall_are_not_torn(wall: float) ->
     index = Cloud(xyz).near.index
     along = xyz @ np.array([1.0, 0.4, 0.2])
     turned = np.where((along < np.median(along))[:, None], -normals, normals)
-    assert torn(xyz, normals, index, SLOPE) < 0.004 < torn(xyz, turned, index, SLOPE)
+    link = sheet_planes(xyz, index)[1]
+    assert torn(xyz, normals, index, link) < 0.004 < torn(xyz, turned, index, link)
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ from steelyard.evaluate.solids import score, true_solid
 from steelyard.shape import filling
 from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.orient import SLOPE, Oriented, oriented, walled
+from steelyard.shape.orient import Oriented, oriented
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.sides.sheets import sheet_planes
 from steelyard.shape.sides.tree import Tree
@@ -31,8 +31,8 @@ def drawn(body: object, turned: float = 1.0) -> Drawn:
     xyz, normals, _ = spread_evenly(mesh, np.random.default_rng(0), 2000)
     xyz = 1e3 * xyz
     near, complex = Neighbours.of(xyz), Complex.of(xyz, Tree.of(xyz).order)
-    planes, link = sheet_planes(xyz, near.index, SLOPE)
-    wall = Wall.of(xyz, turned * normals, planes, link, complex, float(np.median(near.spacing)))
+    planes, link = sheet_planes(xyz, near.index)
+    wall = Wall.of(xyz, turned * normals, planes, link, complex, near.spacing)
     return xyz, normals, planes, wall
 
 
@@ -84,7 +84,7 @@ def test_what_is_clear_is_not_looked_at_again(monkeypatch: pytest.MonkeyPatch) -
     def never(surface: Oriented) -> Oriented:
         raise AssertionError
 
-    monkeypatch.setattr(filling, "walled", never)
+    monkeypatch.setattr(Oriented, "walled", never)
     made = sheet_of("a channel", channel(100, 12, 15, 2), np.random.default_rng(0), 1500)
     enclose(made.cloud)
 
@@ -94,7 +94,7 @@ def test_a_thickness_that_empties_the_tool_is_not_believed(grip: Tool, monkeypat
     thin = enclose(cloud)
     monkeypatch.setattr(filling, "_LEFT", 0.99)
     kept = enclose(cloud)
-    monkeypatch.setattr(filling, "walled", lambda surface: None)
+    monkeypatch.setattr(Oriented, "walled", lambda surface: None)
     without = enclose(cloud)
     assert thin.mesh.volume < 0.9 * kept.mesh.volume
     assert (kept.mesh.volume, kept.volume_std) == (without.mesh.volume, without.volume_std)
@@ -102,7 +102,7 @@ def test_a_thickness_that_empties_the_tool_is_not_believed(grip: Tool, monkeypat
 
 def test_normals_found_again_are_unit_and_the_same_bits(grip: Tool) -> None:
     surface = oriented(Cloud(surface_cloud(grip).xyz))
-    first, second = walled(surface), walled(surface)
+    first, second = surface.walled(), surface.walled()
     assert first is not None
     assert second is not None
     assert np.array_equal(first.normals, second.normals)

@@ -8,7 +8,6 @@ stay in the tree: they are joined last.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -18,67 +17,34 @@ from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.merging import merge_all
 from steelyard.shape.hull import TOLERANCE
 from steelyard.shape.mesh import Integers
-from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
 
 
-@dataclass(frozen=True)
-class Published:
-    """The paper's cost, eq. 8: 1 + hollow where the union is hollow, else (n_i^2 + n_j^2) / N^2 of the numbers of tets.
-
-    Hollow is hull(i and j) - volume(i) - volume(j), scaled to a solid whose box has a diagonal of one.
-    """
-
-
-@dataclass(frozen=True)
-class Hollow:
-    """max(0, hull(i and j) - volume(i) - volume(j)) / V + size (volume(i) + volume(j)) / V, V the whole volume.
-
-    The second term joins small clusters first; it is an area of the tree's cost that grows with every level.
-    """
-
-    size: float = 0.02
-
-
-def cluster(
-    mesh: TetMesh,
-    piece: Any = None,
-    group: Any = None,
-    cost: Published | Hollow = Published(),
-) -> Hierarchy:
+def cluster(mesh: TetMesh, piece: Any = None) -> Hierarchy:
     """Return the tree of merges of the pieces of a solid.
 
     piece  (T,) initial cluster of every tet (labels, any integers), None: every tet by itself
-    group  (T,) or None: pieces of one group (all tets of a piece share it) are joined before any are joined across
 
-    Where both are used up, separate bodies are joined at cost inf, always the two of least volume.
-    Raises BadValue where shapes do not fit or a piece lies in two groups.
+    The cost of a merge is that of eq. 8: 1 + hollow where the union is hollow, else (n_i^2 + n_j^2) / N^2 of numbers of
+    tets. Hollow is hull(i and j) - volume(i) - volume(j), scaled to a solid whose box has a diagonal of one. Separate
+    bodies are joined last, at cost inf, always the two of least volume. Raises BadValue where the shape does not fit.
     """
-    leaf = np.arange(len(mesh)) if piece is None else _numbered("piece", piece, len(mesh))
+    leaf = np.arange(len(mesh)) if piece is None else _numbered(piece, len(mesh))
     count = int(leaf.max()) + 1
-    groups = np.zeros(count, dtype=np.int64)
-    if group is not None:
-        of_tet = _numbered("group", group, len(mesh))
-        groups[leaf] = of_tet
-        if (groups[leaf] != of_tet).any():
-            raise BadValue("all tets of a piece must be in one group; at least one piece lies in two.")
     start, member = _corners(mesh, leaf, count)
     used = mesh.vertices[np.bincount(mesh.tets.ravel(), minlength=len(mesh.vertices)) > 0]
     diagonal = float(np.linalg.norm(np.ptp(used, axis=0)))
     xyz = np.ascontiguousarray(mesh.vertices - used.mean(0)) / diagonal
     volumes = np.bincount(leaf, mesh.volumes / diagonal**3, count).astype(np.float64)
     tets, edges = np.bincount(leaf, minlength=count), _edges(mesh, leaf, count)
-    size = -1.0 if isinstance(cost, Published) else cost.size
-    merges, costs, volume, hull = with_stand_ins(
-        xyz, lambda known: merge_all(xyz, start, member, volumes, tets, groups, edges, TOLERANCE, size, known)
-    )
+    merges, costs, volume, hull = merge_all(xyz, start, member, volumes, tets, edges, TOLERANCE)
     return Hierarchy(leaf, merges, costs, volume * diagonal**3, hull * diagonal**3)
 
 
-def _numbered(name: str, labels: Any, tets: int) -> Integers:
+def _numbered(labels: Any, tets: int) -> Integers:
     labels = np.asarray(labels)
     if labels.shape != (tets,) or labels.dtype.kind not in "iu":
-        raise BadValue(f"{name} needs one whole number per tet ({tets},); got {labels.dtype} of shape {labels.shape}.")
+        raise BadValue(f"piece needs one whole number per tet ({tets},); got {labels.dtype} of shape {labels.shape}.")
     return np.unique(labels, return_inverse=True)[1]
 
 

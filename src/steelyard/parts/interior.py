@@ -5,8 +5,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 
-import numpy as np
-
 from steelyard.check import Array
 from steelyard.shape.inside import inside
 from steelyard.shape.mesh import TriangleMesh
@@ -31,9 +29,7 @@ class Interior:
     def points(self, part: int, count: int) -> tuple[Array, Array]:
         """Return about `count` points (K, 3) in part number `part` (its row) in A [m], and the volume (K,) of each."""
         if (part, count) not in self.filled:
-            chosen = np.isin(self.mesh.part, self.surfaces[part])
-            surface = TriangleMesh(self.mesh.vertices, self.mesh.triangles[chosen], self.mesh.part[chosen])
-            self.filled[part, count] = inside(surface, count)
+            self.filled[part, count] = inside(self.mesh.of_part(*self.surfaces[part]), count)
         points, volume = self.filled[part, count]
         return self.X_AM.apply(points), volume
 

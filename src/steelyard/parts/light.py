@@ -10,10 +10,12 @@ Source: Basri and Jacobs 2003, "Lambertian reflectance and linear subspaces", se
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.mesh import Integers
 
 _TURNED = 0.15  # between the normals of a pair, for it to tell of the light
 _LIGHT_SEEN = 0.1  # weaker shading is below the difference of two colours
@@ -77,8 +79,8 @@ def light_on(colour: Array, normals: Array, flatness: Array, xyz: Array) -> Ligh
     before = _cost(side)
     if before < _EVEN:
         return UNLIT
-    wave = _harmonics(normals)
-    weights, after = _fitted(wave[i], wave[j], side)
+    places, end = np.unique(np.concatenate([i, j]), return_inverse=True)
+    weights, after = _fitted(_Pairs(_harmonics(normals[places]), end[: len(i)], end[len(i) :], side))
     return Light(weights) if after < 0.75 * before and np.linalg.norm(weights) >= _LIGHT_SEEN else UNLIT
 
 
@@ -98,25 +100,39 @@ def _brightness(weights: Array, wave: Array) -> Array:
     return np.asarray(1 + wave @ weights[:8] + np.maximum(0, wave[..., :3] @ weights[8:]))
 
 
-def _fitted(one: Array, two: Array, side: Array) -> tuple[Array, float]:
-    """Return the weights that explain differences of log brightness best, and their cost: a sky, then with a lamp.
+class _Pairs(NamedTuple):
+    """Harmonics (P, 8) at places; the places `one` and `two` (E,) of each pair, and their log brightness apart (E,)."""
 
-    one, two  (E, 8) harmonics at either place of a pair
-    """
-    sky, _ = _improved(np.zeros(11), 8, one, two, side)
-    return _improved(np.append(sky[:8], sky[:3]), 11, one, two, side)
+    wave: Array
+    one: Integers
+    two: Integers
+    side: Array
+
+    def apart(self, of_place: Array) -> Array:
+        """Return how far what places (P, ...) have is apart in each pair (E, ...)."""
+        return np.asarray(of_place[self.one] - of_place[self.two])
+
+    def left(self, weights: Array) -> Array:
+        """Return what the light leaves (E,) of the differences of log brightness."""
+        return np.asarray(self.side - self.apart(np.log(_brightness(weights, self.wave))))
 
 
-def _improved(weights: Array, count: int, one: Array, two: Array, side: Array) -> tuple[Array, float]:
+def _fitted(pairs: _Pairs) -> tuple[Array, float]:
+    """Return the weights that explain differences of log brightness best, and their cost: a sky, then with a lamp."""
+    sky, _ = _improved(np.zeros(11), 8, pairs)
+    return _improved(np.append(sky[:8], sky[:3]), 11, pairs)
+
+
+def _improved(weights: Array, count: int, pairs: _Pairs) -> tuple[Array, float]:
     """Return weights and their cost after robust Gauss-Newton steps of the first `count`.
 
     Pairs of two albedos are outliers (Cauchy's weights). A step is shortened until the cost falls: a lamp has a kink.
     """
-    cost = _cost(_left(weights, one, two, side))
+    cost = _cost(pairs.left(weights))
     for _ in range(_STEPS):
-        step = _step(weights, count, one, two, side)
-        tried = (_not_black(weights + length * step, one, two) for length in _LENGTHS)
-        better = ((moved, less) for moved in tried if (less := _cost(_left(moved, one, two, side))) < cost)
+        step = _step(weights, count, pairs)
+        tried = (_not_black(weights + length * step, pairs.wave) for length in _LENGTHS)
+        better = ((moved, less) for moved in tried if (less := _cost(pairs.left(moved))) < cost)
         moved, less = next(better, (weights, cost))
         fall, weights, cost = cost - less, moved, less
         if fall <= _SETTLED * cost:
@@ -124,10 +140,10 @@ def _improved(weights: Array, count: int, one: Array, two: Array, side: Array) -
     return weights, cost
 
 
-def _step(weights: Array, count: int, one: Array, two: Array, side: Array) -> Array:
+def _step(weights: Array, count: int, pairs: _Pairs) -> Array:
     """Return a Gauss-Newton step (11,) of the first `count` weights, those of the harmonics held by a small ridge."""
-    off = _left(weights, one, two, side)
-    rows = (_slopes(weights, one) - _slopes(weights, two))[:, :count]
+    off = pairs.left(weights)
+    rows = pairs.apart(_slopes(weights, pairs.wave)[:, :count])
     weighted = rows.T / (_ROUGH**2 + off**2)
     normal = weighted @ rows
     ridge, held = _RIDGE * np.trace(normal) / count, np.where(_OF_SKY, weights, 0.0)[:count]
@@ -135,18 +151,13 @@ def _step(weights: Array, count: int, one: Array, two: Array, side: Array) -> Ar
     return np.append(step, np.zeros(len(weights) - count))
 
 
-def _left(weights: Array, one: Array, two: Array, side: Array) -> Array:
-    """Return what the light leaves (E,) of differences `side` of log brightness."""
-    return np.asarray(side - np.log(_brightness(weights, one) / _brightness(weights, two)))
-
-
 def _slopes(weights: Array, wave: Array) -> Array:
-    """Return how log brightness (E, 11) changes with every weight."""
+    """Return how log brightness (P, 11) changes with every weight."""
     lit = (wave[:, :3] @ weights[8:] > 0)[:, None]
     return np.hstack([wave, wave[:, :3] * lit]) / _brightness(weights, wave)[:, None]
 
 
-def _not_black(weights: Array, one: Array, two: Array) -> Array:
+def _not_black(weights: Array, wave: Array) -> Array:
     """Return weights with harmonics so weak that no place is black without the lamp."""
-    dip = -min(float((one @ weights[:8]).min()), float((two @ weights[:8]).min()))
+    dip = -float((wave @ weights[:8]).min())
     return np.where(_OF_SKY, weights * min(1.0, (1 - _DARKEST) / max(dip, 1e-12)), weights)

@@ -18,9 +18,8 @@ from steelyard.check import Array
 from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
 from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place
 from steelyard.parts.reach import MOST, Room, reach, room
-from steelyard.shape.hull import HullWork, hull_work
+from steelyard.shape.hull import HullWork, hull_work, sure_hull
 from steelyard.shape.hulls.borrowed import borrowed, integer
-from steelyard.shape.stand_ins import StandIns, sure_hull
 
 # Hollow is counted in grains of this share of the whole volume. Unions that leave out the same tets are equally hollow,
 # and rounding is not to choose between them (the smaller one goes first), nor to make a convex union hollow.
@@ -30,14 +29,13 @@ _HELD, _GROWN, _EXACT, _GONE = 0, 1, 2, 3
 
 
 class Clusters(NamedTuple):
-    """Clusters (N,): volume, that of the hull, number of tets, group (-1 for more than one), whether it is joined, and
-    the first of its edges' ends; `latest` (N, 2): the edge to it that was met last, and the merge that met it.
+    """Clusters (N,): volume, that of the hull, number of tets, whether it is joined, and the first of its edges' ends;
+    `latest` (N, 2): the edge to it that was met last, and the merge that met it.
     """
 
     volume: Any
     hull: Any
     tets: Any
-    group: Any
     gone: Any
     head: Any
     latest: Any
@@ -57,23 +55,19 @@ class Edges(NamedTuple):
 
 
 class Making(NamedTuple):
-    """What hulls are made of and with: points (V, 3), how level is level, room, and hulls that Qhull stands in for."""
+    """What hulls are made of and with: points (V, 3), how level is level, and room."""
 
     xyz: Any
     tolerance: float
     work: HullWork
-    stand_ins: StandIns
 
 
 class Measure(NamedTuple):
-    """What a merge is measured by: the number of first clusters, the volume and the tets of all of them, and the
-    weight of a union's size (below zero: the published cost).
-    """
+    """What a merge is measured by: the number of first clusters, the volume and the tets of all of them."""
 
     n: int
     whole: float
     tets: float
-    size: float
 
 
 class Tree(NamedTuple):
@@ -104,39 +98,33 @@ def _five_points(xyz: Array, rows: Any) -> float:
 @numba.njit(cache=True, nogil=True)
 def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, measure: Measure) -> float:
     """Return what orders merges, the cost or a number that rises with it; from a bound of the hull, a bound of it."""
-    whole, size = measure.whole, measure.size
-    grains = (hull - va - vb) / (GRAIN * whole)
+    grains = (hull - va - vb) / (GRAIN * measure.whole)
     hollow: float = GRAIN * max(0.0, np.rint(grains if exact else grains - 1e-3))
-    if size >= 0:
-        return float(hollow + size * (va + vb) / whole)
     if hollow > 0:
         return hollow
     return -1.0 / (float(na) * na + float(nb) * nb)
 
 
 def merge_all(
-    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, leaf_group: Any, ends: Any,
-    tolerance: float, size: float, stand_ins: StandIns,
-) -> tuple[Any, Array, Array, Array]:  # fmt: skip
+    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, ends: Any, tolerance: float
+) -> tuple[Any, Array, Array, Array]:
     """Return merges (n - 1, 2), the cost (n - 1,) of each, and volume and hull (2 n - 1,) of every node, leaves first.
 
     xyz            (V, 3) points, in any unit of length
     start, member  numbers of the points of leaf k: member[start[k]:start[k + 1]]
-    leaf_volume, leaf_tets, leaf_group  (n,)
+    leaf_volume, leaf_tets  (n,)
     ends           (E, 2) leaves that touch
-    size           weight of a union's size in the cost; below zero: the published cost
     """
     n = len(leaf_volume)
     merges, cost, more = np.empty((n - 1, 2), np.int64), np.empty(n - 1), (0, n - 1)
     volume, tets = np.pad(leaf_volume, more), np.pad(leaf_tets, more)
-    group, gone, head = np.pad(leaf_group, more), np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
-    latest = np.full((2 * n - 1, 2), -1, np.int32)
-    clusters = Clusters(volume, np.zeros(2 * n - 1), tets, group, gone, head, latest)
+    gone, head = np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
+    clusters = Clusters(volume, np.zeros(2 * n - 1), tets, gone, head, np.full((2 * n - 1, 2), -1, np.int32))
     hulls = hulls_of(start, member, 2 * n - 1, len(xyz))
-    making, tree = Making(xyz, tolerance, hull_work(len(xyz)), stand_ins), Tree(merges, cost)
+    making, tree = Making(xyz, tolerance, hull_work(len(xyz))), Tree(merges, cost)
     edges = Edges(np.empty((len(ends), 4), np.int32), np.empty(len(ends)), np.zeros(len(ends), np.int8))
     _begin(making, n, clusters, hulls, ends, edges)
-    made = _join_neighbours(making, n, size, clusters, hulls, edges, empty_heap(len(ends)), room(), tree)
+    made = _join_neighbours(making, n, clusters, hulls, edges, empty_heap(len(ends)), room(), tree)
     if made < n - 1:
         _join_bodies(making, n, made, clusters, hulls, tree)
     return merges, cost, volume, clusters.hull
@@ -145,14 +133,14 @@ def merge_all(
 @numba.njit(cache=True, nogil=True)
 def _begin(making: Making, n: int, clusters: Clusters, hulls: Hulls, ends: Any, edges: Edges) -> None:
     """Find the hulls of the first clusters and hang their edges on them."""
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     volume, hull, head, end = clusters.volume, clusters.hull, clusters.head, edges.end
     for k in range(n):
         if hulls.length[k] == 4:
             hull[k] = volume[k]
             four_faces(xyz, hulls, k)
         else:
-            hull[k], kept = sure_hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, stand_ins)
+            hull[k], kept = sure_hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work)
             keep_in_place(hulls, k, work.point, work.stack, kept, hull[k] > 0)
     for e in range(len(ends)):
         a, b = ends[e, 0], ends[e, 1]
@@ -172,45 +160,35 @@ def _priced(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, m
 
 @numba.njit(cache=True, nogil=True)
 def _join_neighbours(
-    making: Making, n: int, size: float, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges, full_heap: Heap,
-    space: Room, tree: Tree,
+    making: Making, n: int, all_clusters: Clusters, all_hulls: Hulls, all_edges: Edges, full_heap: Heap, space: Room,
+    tree: Tree,
 ) -> int:  # fmt: skip
     """Join clusters that touch, always the two of least cost; return how often."""
     c, h, d, p = all_clusters, all_hulls, all_edges, full_heap
     clusters = Clusters(
-        borrowed(c.volume), borrowed(c.hull), borrowed(c.tets), borrowed(c.group), borrowed(c.gone), borrowed(c.head),
-        borrowed(c.latest),
-    )  # fmt: skip
+        borrowed(c.volume), borrowed(c.hull), borrowed(c.tets), borrowed(c.gone), borrowed(c.head), borrowed(c.latest)
+    )
     hulls = Hulls(
         borrowed(h.vertex), borrowed(h.face), borrowed(h.offset), borrowed(h.length), borrowed(h.mark),
         borrowed(h.rows), borrowed(h.state),
     )  # fmt: skip
     edges = Edges(borrowed(d.end), borrowed(d.known), borrowed(d.stage))
     heap = Heap(borrowed(p.edge), borrowed(p.order), borrowed(p.place))
-    end, stage, group = edges.end, edges.stage, clusters.group
-    measure = Measure(n, clusters.volume[:n].sum(), float(clusters.tets[:n].sum()), size)
-    xyz, tolerance, work, stand_ins = making
-    across, made, heaped, stamp = False, integer(0), integer(0), integer(1)
+    end, stage = edges.end, edges.stage
+    measure = Measure(n, clusters.volume[:n].sum(), float(clusters.tets[:n].sum()))
+    xyz, tolerance, work = making
+    made, heaped, stamp = integer(0), integer(0), integer(1)
     last, kept = integer(-1), integer(0)  # the edge whose hull was made last, and its number of vertices
     for e in range(len(end)):
-        if group[end[e, 0]] == group[end[e, 1]]:
-            heaped = _priced(clusters, edges, heap, heaped, e, measure)
-    while made < n - 1:
-        if heaped == 0:
-            if across:
-                break
-            across = True
-            for e in range(len(end)):
-                if stage[e] != _GONE:
-                    heaped = _priced(clusters, edges, heap, heaped, e, measure)
-            continue
+        heaped = _priced(clusters, edges, heap, heaped, e, measure)
+    while heaped > 0:
         e = integer(heap.edge[0])
         if stage[e] == _HELD:
             stamp = _grow(xyz, clusters, hulls, edges, e, space, stamp)
             heaped = _priced(clusters, edges, heap, heaped, e, measure)
         elif stage[e] == _GROWN:
             count = both(hulls, end[e, 0], end[e, 1])
-            edges.known[e], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
+            edges.known[e], kept = sure_hull(xyz, hulls.rows, count, tolerance, work)
             stage[e], last = _EXACT, e
             heaped = _priced(clusters, edges, heap, heaped, e, measure)
         else:
@@ -219,7 +197,7 @@ def _join_neighbours(
                 kept = _hull_again(making, hulls, end[e, 0], end[e, 1])
             last = integer(-1)
             keep(hulls, n + made, clusters.gone, work.point, work.stack, kept, clusters.hull[n + made] > 0)
-            heaped = _hand_over(clusters, edges, heap, heaped, e, made, across, measure)
+            heaped = _hand_over(clusters, edges, heap, heaped, e, made, measure)
             made += 1
     return int(made)
 
@@ -247,35 +225,29 @@ def _note(clusters: Clusters, edges: Edges, e: int, key: float, made: int, measu
     """Make a cluster of the ends of an edge."""
     a, b, c = edges.end[e, 0], edges.end[e, 1], measure.n + made
     (merges, cost), in_all = tree, measure.tets
-    volume, tets, group = clusters.volume, clusters.tets, clusters.group
+    volume, tets = clusters.volume, clusters.tets
     merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
     volume[c], tets[c], clusters.hull[c] = volume[a] + volume[b], tets[a] + tets[b], edges.known[e]
-    group[c] = group[a] if group[a] == group[b] else -1
     clusters.gone[a] = clusters.gone[b] = True
-    if measure.size >= 0:
-        cost[made] = key
-    else:
-        cost[made] = 1 + edges.known[e] - volume[a] - volume[b] if key > 0 else -1.0 / (key * in_all * in_all)
+    cost[made] = 1 + edges.known[e] - volume[a] - volume[b] if key > 0 else -1.0 / (key * in_all * in_all)
 
 
 @numba.njit(cache=True, nogil=True)
 def _hull_again(making: Making, hulls: Hulls, a: int, b: int) -> int:
     """Make the hull of two clusters, which was made before, or is that of five points; return its vertices."""
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     count = both(hulls, a, b)
     if count == 5:
         five_faces(xyz, hulls.rows, work.point, work.stack)
         return 5
-    return int(sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)[1])
+    return int(sure_hull(xyz, hulls.rows, count, tolerance, work)[1])
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _hand_over(
-    clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, made: int, across: bool, measure: Measure
-) -> int:
+def _hand_over(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int, made: int, measure: Measure) -> int:
     """Give the edges of two clusters to the one made of them, two to one cluster as one; return the heap's size."""
     end, known, stage = edges.end, edges.known, edges.stage
-    head, latest, group, c = clusters.head, clusters.latest, clusters.group, measure.n + made
+    head, latest, c = clusters.head, clusters.latest, measure.n + made
     stage[e] = _GONE
     heaped = remove(heap.edge, heap.order, heap.place, heaped, e)
     for node in (integer(end[e, 0]), integer(end[e, 1])):
@@ -300,8 +272,7 @@ def _hand_over(
         f, side = half >> 1, half & 1
         known[f] = max(known[f], clusters.hull[c])
         stage[f] = _HELD
-        if across or group[c] == group[end[f, 1 - side]]:
-            heaped = _priced(clusters, edges, heap, heaped, f, measure)
+        heaped = _priced(clusters, edges, heap, heaped, f, measure)
         half = integer(end[f, 2 + side])
     return heaped
 
@@ -309,7 +280,7 @@ def _hand_over(
 @numba.njit(cache=True, nogil=True)
 def _join_bodies(making: Making, n: int, made: int, clusters: Clusters, hulls: Hulls, tree: Tree) -> None:
     """Join separate bodies: always the two of least volume, until one is left."""
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     merges, cost = tree
     volume, gone = clusters.volume, clusters.gone
     bodies = [(volume[k], k) for k in range(n + made) if not gone[k]]
@@ -318,7 +289,7 @@ def _join_bodies(making: Making, n: int, made: int, clusters: Clusters, hulls: H
         (va, a), (vb, b) = heapq.heappop(bodies), heapq.heappop(bodies)
         c = n + made
         count = both(hulls, a, b)
-        clusters.hull[c], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
+        clusters.hull[c], kept = sure_hull(xyz, hulls.rows, count, tolerance, work)
         merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
         cost[made], volume[c] = np.inf, va + vb
         gone[a] = gone[b] = True

@@ -14,7 +14,6 @@ from steelyard.shape.mesh import Integers
 FLUSH = 0.75  # vector area over area; plates, whose rims count, are flush as well
 SMALL = 0.05  # of the boundary's area: a larger patch is rather a plate, and a part more does less harm than one less
 PART = 0.01  # of the boundary's area: what sticks out and is as large as this is a part
-CONNECTED, APART = 6, -0.3  # neighbours of a vertex in its patch; cosine of normals that look out of opposite sides
 SPECK = 0.003  # of the boundary's area: three points in a thousand tell nothing
 
 
@@ -49,18 +48,13 @@ def without_prints(label: Integers, skin: Skin) -> Integers:
 
 
 def patches(label: Integers, skin: Skin) -> Integers:
-    """Return the number (V,) of the connected patch of one colour that each vertex lies in.
-
-    Near vertices are connected as well, unless they look apart: few triangles lead from face to face of a sharp edge.
-    """
+    """Return the number (V,) of the connected patch of one colour that each vertex lies in."""
     from scipy.sparse import coo_matrix
     from scipy.sparse.csgraph import connected_components
 
     count = len(label)
-    beside = skin.near[:, :CONNECTED]
-    pairs = np.stack([np.repeat(np.arange(count), beside.shape[1]), beside.ravel()], axis=1)
-    facing = (skin.normals[pairs[:, 0]] * skin.normals[pairs[:, 1]]).sum(1)
-    pairs = np.concatenate([skin.edges, pairs[facing > APART]])
-    i, j = pairs[label[pairs[:, 0]] == label[pairs[:, 1]]].T
+    i, j = skin.links.T
+    one = label[i] == label[j]
+    i, j = i[one], j[one]
     graph = coo_matrix((np.ones(len(i), np.int8), (i, j)), shape=(count, count))
     return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)

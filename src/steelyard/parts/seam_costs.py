@@ -12,7 +12,7 @@ NECK, FLANK = 1.0, 2.0  # contact area over (volume of the smaller)^(2/3): a cub
 POINT = 0.02  # the same where two clusters only touch in a point or along an edge
 PAINT = 10.0  # cost of painting over all of the surface: a hundredth of it is worth a part
 FAR = 3.0  # bits of one colour that do not touch: three hundredths of the surface are worth a part of their own
-_SIZE = 0.02  # small clusters first (as in clustering.Hollow)
+_SIZE = 0.02  # small clusters first
 _STAGE = 100.0  # first what touches in one colour, then all of one colour, then colours
 # Columns of the table of contacts between two clusters.
 AREA, VECTOR, LENGTH, TURN, BEHIND = 0, 1, 4, 10, 16  # scalar, 3 and three times 6 numbers

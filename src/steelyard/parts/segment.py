@@ -75,7 +75,7 @@ class Segmentation:
         """The parts with their exact moments, in the frame of the solid."""
         return Parts(np.arange(len(self)), self.mesh.moments(self.labels, len(self)), self.rgb)
 
-    @property
+    @cached_property
     def border_share(self) -> float:
         """Share of the volume that corners of another part say, of cells that reach from one part to another.
 
@@ -103,10 +103,6 @@ class Segmentation:
     def cut(self, count: int) -> Segmentation:
         """Return the solid in another number of parts: the best cut of the tree into so many."""
         nodes = self.hierarchy.nodes(count) if self.cuts is None else self.cuts.nodes(count)
-        return self.cut_at(nodes)
-
-    def cut_at(self, nodes: Sequence[int]) -> Segmentation:
-        """Return the solid in the parts that are these nodes of the hierarchy."""
         return self._labelled(self.hierarchy.cut_at(nodes))
 
     def with_labels(self, labels: Integers) -> Segmentation:
@@ -167,15 +163,14 @@ class Pieces:
     nearest: Integers
 
 
-def segment(cloud: Cloud, solid: Any, *, parts: int | None = None, per_part: float = PER_PART) -> Segmentation:
+def segment(cloud: Cloud, solid: Any, *, parts: int | None = None) -> Segmentation:
     """Return the solid of a cloud in its homogeneous parts.
 
-    cloud     points of the surface, with or without colours, in the frame of the solid
-    solid     a TetMesh, or what has one under `mesh` (the Solid that `enclose` returns)
-    parts     how many, where that is known; chosen by description length where not
-    per_part  worth of a part: larger gives fewer
+    cloud  points of the surface, with or without colours, in the frame of the solid
+    solid  a TetMesh, or what has one under `mesh` (the Solid that `enclose` returns)
+    parts  how many, where that is known; chosen by description length where not
     """
-    return parts_of_pieces(coloured_pieces(cloud, solid), parts=parts, per_part=per_part)
+    return parts_of_pieces(coloured_pieces(cloud, solid), parts)
 
 
 def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
@@ -198,10 +193,10 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     return Pieces(cloud, mesh, skin, piece, of_piece, pairs, corners, nearest)
 
 
-def parts_of_pieces(pieces: Pieces, *, parts: int | None = None, per_part: float = PER_PART) -> Segmentation:
+def parts_of_pieces(pieces: Pieces, parts: int | None = None) -> Segmentation:
     """Return the parts put together from small pieces: the second half of `segment`."""
     tree = seam_tree(pieces.mesh, pieces.skin, pieces.piece, pieces.colour, pieces.pairs, pieces.corners)
-    cuts = cuts_of(tree.hierarchy, tree.seam, per_part)
+    cuts = cuts_of(tree.hierarchy, tree.seam, PER_PART)
     one = np.zeros(len(pieces.mesh), dtype=np.int64)
     whole = Segmentation(
         pieces.mesh, one, tree.hierarchy, cuts, None, one[pieces.nearest], ("part 0",), pieces.cloud, pieces.nearest

@@ -14,6 +14,7 @@ from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import cross, unit_vectors
 
 NEAR = 16
+LINKED, APART = 6, -0.3  # neighbours linked to a vertex; cosine of normals that look out of opposite sides
 OPPOSITE = -0.5  # product of the normals of a vertex and one behind it, on the other side of a thin wall
 SMOOTH = 0.8  # weight of a neighbour's normal beside the vertex's own
 
@@ -60,6 +61,17 @@ class Skin:
         """The nearest other vertices (V, up to 16) of each, nearest first."""
         known = self.known or Neighbours.of(self.vertices, NEAR)
         return np.asarray(known.index[:, :NEAR], dtype=np.int64)
+
+    @cached_property
+    def links(self) -> Integers:
+        """Pairs (L, 2) of vertices that lie beside each other: at the ends of an edge, or near and not looking apart.
+
+        Few triangles lead from face to face of a sharp edge.
+        """
+        beside = self.near[:, :LINKED]
+        pairs = np.stack([np.repeat(np.arange(len(beside)), beside.shape[1]), beside.ravel()], axis=1)
+        facing = (self.normals[pairs[:, 0]] * self.normals[pairs[:, 1]]).sum(1)
+        return np.concatenate([self.edges, pairs[facing > APART]])
 
     @cached_property
     def _vertex_sums(self) -> tuple[Array, Array]:

@@ -18,6 +18,7 @@ from steelyard.errors import BadValue
 from steelyard.parts.groups import root
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
+from steelyard.shape.sides.tangent_planes import plane_normals
 from steelyard.shape.tets import TetMesh
 
 COUNT = 50
@@ -40,7 +41,7 @@ def supervoxels(cloud: Cloud, count: int = COUNT) -> Integers:
     order = np.argsort(np.round((middle**2).sum(1) / diagonal**2, 12), kind="stable")
     xyz = middle[order] / diagonal
     near = cKDTree(xyz).query(xyz, min(NEIGHBOURS + 1, len(xyz)))[1].reshape(len(xyz), -1)
-    normals = _plane_normals(xyz[near]) if cloud.normals is None else cloud.normals[order]
+    normals = plane_normals(xyz, near) if cloud.normals is None else cloud.normals[order]
     colour = np.zeros_like(xyz) if cloud.rgb is None else cloud.rgb[order] / 255
     feature = np.hstack([WEIGHTS[0] * xyz, WEIGHTS[1] * colour, normals])
     labels = np.empty(len(xyz), dtype=np.int64)
@@ -53,12 +54,6 @@ def pieces_of_points(mesh: TetMesh, cloud: Cloud, labels: Any) -> Integers:
     from scipy.spatial import cKDTree
 
     return np.asarray(np.asarray(labels, dtype=np.int64)[cKDTree(cloud.xyz).query(mesh.centroids)[1]])
-
-
-def _plane_normals(around: Array) -> Array:
-    """Return the normal (N, 3), of either sign, of the plane through points (N, K, 3)."""
-    spread = around - around.mean(1, keepdims=True)
-    return np.asarray(np.linalg.eigh(np.swapaxes(spread, 1, 2) @ spread)[1][..., 0])
 
 
 @numba.njit(cache=True, nogil=True)

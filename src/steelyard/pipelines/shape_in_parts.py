@@ -116,7 +116,7 @@ def shape_of(
         solid = replace(solid, mesh=mesh, sure=np.ones(len(mesh)), around=None, inside=None)
     # Normals that were found and not measured blur at edges: they would split one colour by its shading.
     measured = cloud.normals is not None
-    made = segment(solid.cloud if measured else replace(solid.cloud, normals=None), solid, parts=parts)
+    made = segment(solid.cloud if measured else solid.cloud.with_normals(None), solid, parts=parts)
     return Shape(solid, made, scan, parts is not None, (*_notes(cloud), *notes))
 
 

@@ -18,7 +18,7 @@ def lacking(surface: Oriented, volume: float) -> float:
     A chord of length d between normals t apart leaves a gap of d t / 8 in its middle. Round bodies come out smaller by
     about half of this, hollows larger.
     """
-    index, apart = surface.near.index[:, :_NEAREST], surface.near.distance[:, :_NEAREST]
+    index, apart = surface.sites.near.index[:, :_NEAREST], surface.sites.near.distance[:, :_NEAREST]
     turn = np.arccos(np.clip(np.einsum("nkd,nd->nk", surface.normals[index], surface.normals), -1, 1))
     smooth = turn < _SMOOTH
     gap = (apart * turn * smooth).sum(1) / (8 * np.maximum(smooth.sum(1), 1))

@@ -80,7 +80,7 @@ class Cloud:
 
     def reordered(self, order: Integers) -> Cloud:
         """Return the same points in an order (N,) of all."""
-        return _knowing(self.chosen(order), self.near.reordered(order))
+        return self.chosen(order)._near_as(self.near.reordered(order))
 
     def chosen(self, rows: Any) -> Cloud:
         """Return the points of `rows`, numbers or a mask."""
@@ -90,14 +90,17 @@ class Cloud:
     def in_frame(self, X_AB: Pose) -> Cloud:
         """Return the same points, given in B, seen from frame A."""
         normals = None if self.normals is None else X_AB.rotation.apply(self.normals)
-        moved = replace(self, xyz=X_AB.apply(self.xyz), normals=normals)
-        return _knowing(moved, self.near) if "near" in vars(self) else moved
+        return replace(self, xyz=X_AB.apply(self.xyz), normals=normals)._near_as(vars(self).get("near"))
 
+    def with_normals(self, normals: Array | None) -> Cloud:
+        """Return the same points with other normals (N, 3), or with none."""
+        return replace(self, normals=normals)._near_as(vars(self).get("near"))
 
-def _knowing(cloud: Cloud, near: Neighbours) -> Cloud:
-    """Return a cloud that need not look for its neighbours any more."""
-    vars(cloud)["near"] = near  # where the cached property keeps it
-    return cloud
+    def _near_as(self, near: Neighbours | None) -> Cloud:
+        """Return this cloud, which need not look for its neighbours any more where they are known."""
+        if near is not None:
+            vars(self)["near"] = near  # where the cached property keeps it
+        return self
 
 
 def _column(name: str, values: Any, shape: tuple[int, ...], dtype: type) -> Any:

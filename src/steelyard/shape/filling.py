@@ -8,15 +8,12 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
-from steelyard.shape.cells.cells import cells
+from steelyard.shape.cells.cells import votes_of
 from steelyard.shape.cells.islands import without_islands
-from steelyard.shape.cloud import Cloud
-from steelyard.shape.orient import DEPTH, SLOPE, Oriented, one_layered, signed_links, walled
+from steelyard.shape.orient import DEPTH, Oriented, on_sheets, signed_links
 from steelyard.shape.sides.discs import Discs
-from steelyard.shape.sides.sheets import sheet_planes, stacked
+from steelyard.shape.sides.sheets import stacked
 from steelyard.shape.sides.ties import Ties
-from steelyard.shape.sides.tree import Tree
-from steelyard.shape.sides.winding import Sight
 from steelyard.shape.tets import TetMesh
 
 CLEAR = 0.2  # doubt below which no sheets need be looked at
@@ -48,66 +45,72 @@ class Filled:
     doubt: float
 
 
-def filled(used: Cloud, surface: Oriented) -> Filled:
+def filled(surface: Oriented) -> Filled:
     """Return the cells that lie behind a surface. Raises BadValue where there are none."""
-    mesh, centres, votes = _cells_of(used.xyz, surface)
-    found = _winding_number(surface, centres)
-    score = found - 0.5 + votes
-    if not (score > 0).any():
+    found = _filled(surface)
+    if found is None:
         raise BadValue(
             "the points enclose nothing: no side of their surface is inside. Scan the object from all sides."
         )
-    inside = without_islands(mesh, score > 0, _SPAN * surface.spacing * used.diagonal)
+    return found
+
+
+def _filled(surface: Oriented) -> Filled | None:
+    """Return the cells that lie behind a surface, None where there are none."""
+    sites, (mesh, centres) = surface.sites, surface.sites.cells
+    # How much the normals (-1..1) of its corners say that a cell lies inside.
+    votes = votes_of(sites.xyz, surface.normals, mesh.tets, centres)
+    found = _winding_number(surface)
+    score = found - 0.5 + votes
+    if not (score > 0).any():
+        return None
+    inside = without_islands(mesh, score > 0, _SPAN * sites.spacing * sites.diagonal)
     blur = _blur(mesh.volumes, found, votes)
     doubt = blur + _contradictions(surface) if blur > CLEAR else blur
     return Filled(mesh, score, inside, mesh.chosen(inside), blur, doubt)
 
 
-def clearer_alone(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
+def clearer_alone(surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
     """Return the surface and its cells without what sheets said, where these are clear and clearer.
 
     Relief as deep as the points are far apart, as of threads and ribs, looks like sheets that face each other: what
     they say of their sides then turns whole rods inside out, where dipoles alone are right. Walls that are two layers
     are sheets.
     """
-    surface, found = _clearer_thick(used, surface, found)
-    alone = surface.without_sheets if surface.layers is None else None
-    if alone is None or float(((alone.normals * surface.normals).sum(1) < 0).mean()) < _UPSET:
+    surface, found = _clearer_thick(surface, found)
+    alone = surface.alone if surface.layers is None else None
+    if alone is None or float(((alone * surface.normals).sum(1) < 0).mean()) < _UPSET:
         return surface, found
-    alone = outward(alone)
-    try:
-        again = filled(used, alone)
-    except BadValue:  # they enclose nothing
+    without = outward(Oriented.by(surface.sites, alone))
+    again = _filled(without)
+    if again is None or again.blur >= min(CLEAR, _NO_SHEETS * found.blur):
         return surface, found
-    clear = again.blur < min(CLEAR, _NO_SHEETS * found.blur)
-    return (alone, again) if clear else (surface, found)
+    return without, again
 
 
-def _clearer_thick(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
+def _clearer_thick(surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
     """Return the surface and its cells without the two layers of a thin wall, where these are no clearer for them.
 
     Grooves finer than the points are far apart have two layers, too, but one side.
     """
-    if surface.alone is None or surface.layers is None or not surface.layers.part:
+    sites, alone = surface.sites, surface.alone
+    if alone is None or surface.layers is None or not surface.layers.part:
         return surface, found
-    thick = outward(one_layered(surface, surface.alone))
-    try:
-        again = filled(used, thick)
-    except BadValue:  # they enclose nothing
-        return surface, found
-    return (surface, found) if found.blur < again.blur else (thick, again)
+    thick = outward(Oriented.by(sites, on_sheets(sites, alone), alone))
+    again = _filled(thick)
+    return (surface, found) if again is None or found.blur < again.blur else (thick, again)
 
 
-def by_walls(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
+def by_walls(surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
     """Return the surface and its cells found anew from the one thickness of its walls, or as they are if it has none.
 
     Doubt stays: what a thickness tells is likely, not seen.
     """
-    again = walled(surface)
+    again = surface.walled()
     if again is None:
         return surface, found
     again = outward(again)
-    emptied = filled(used, again)
+    emptied = filled(again)
     if emptied.solid.volume < _LEFT * found.solid.volume:
         return surface, found
     return again, replace(emptied, doubt=max(found.doubt, emptied.doubt))
@@ -116,26 +119,16 @@ def by_walls(used: Cloud, surface: Oriented, found: Filled) -> tuple[Oriented, F
 def outward(surface: Oriented) -> Oriented:
     """Return the surface, all of it turned if it is inside out."""
     # What the hull shows is the outer side: true also of a surface with holes, whose total flux may have any sign.
-    inside_out = surface.delaunay.flux(surface.xyz, surface.normals, surface.spacing) < 0
+    sites = surface.sites
+    inside_out = sites.delaunay.flux(sites.xyz, surface.normals, sites.spacing) < 0
     return replace(surface, normals=-surface.normals) if inside_out else surface
 
 
-def _cells_of(xyz: Array, surface: Oriented) -> tuple[TetMesh, Array, Array]:
-    """Return the Delaunay cells of points (N, 3) [m], their centroids (T, 3) in units of the surface, and votes (T,).
-
-    A vote is how much the normals (-1..1) of its corners say that a cell lies inside.
-    """
-    made = surface.delaunay
-    tets, neighbours, volumes, centres, votes = cells(surface.xyz, surface.normals, made.simplices, made.beside)
-    unit = (np.ptp(xyz, axis=0) ** 2).sum() ** 1.5
-    return TetMesh.known(xyz, tets, volumes * unit, neighbours), centres, votes
-
-
-def _winding_number(surface: Oriented, centres: Array) -> Array:
+def _winding_number(surface: Oriented) -> Array:
     """Return the winding number (T,) of the surface at centroids of cells."""
-    targets = Tree.of(centres)
-    discs = Discs.on(surface.tree, surface.normals, surface.area, DEPTH, _JUMP * surface.spacing)
-    found = targets.back(discs.winding(Sight.of(targets, surface.tree)))
+    sites = surface.sites
+    discs = Discs.on(sites.tree, surface.normals, surface.area, DEPTH, _JUMP * sites.spacing)
+    found = sites.sight_of_cells.targets.back(discs.winding(sites.sight_of_cells))
     return np.asarray(np.clip(found, 0, 2), float)
 
 
@@ -150,8 +143,8 @@ def _blur(volumes: Array, found: Array, votes: Array) -> float:
 
 def _contradictions(surface: Oriented) -> float:
     """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
-    xyz, normals, index = surface.xyz, surface.normals, surface.near.index
-    plane, link = sheet_planes(xyz, index, SLOPE, surface.layers)
+    sites, normals, index = surface.sites, surface.normals, surface.sites.near.index
+    plane, link = sites.sheets(surface.layers)
     link = signed_links(link, plane, normals, index)
-    ties = Ties.of(xyz, normals, index, link, surface.delaunay, surface.spacing)
-    return stacked(xyz, normals, index, link) + ties.torn
+    ties = Ties.of(sites.xyz, normals, index, link, sites.delaunay, sites.spacing)
+    return stacked(sites.xyz, normals, index, link) + ties.torn

@@ -77,9 +77,9 @@ class TriangleMesh:
         a, b, c = np.moveaxis(self.corners, 1, 0)
         return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
 
-    def of_part(self, label: int) -> TriangleMesh:
-        """Return the triangles of one part with only the vertices they use."""
-        chosen = self.part == label
+    def of_part(self, *labels: int) -> TriangleMesh:
+        """Return the triangles of one part, or of some, with only the vertices they use."""
+        chosen = np.isin(self.part, labels)
         used, corners = np.unique(self.triangles[chosen], return_inverse=True)
         rgb = None if self.rgb is None else self.rgb[chosen]
         return TriangleMesh(self.vertices[used], corners.reshape(-1, 3), self.part[chosen], rgb)

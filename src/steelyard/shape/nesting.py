@@ -105,7 +105,7 @@ def overlaps(mesh: TriangleMesh, solids: Solids | None = None) -> tuple[Overlap,
     """
     solids = solids_of(mesh) if solids is None else solids
     whole = float(solids.moments[:, 0].sum())
-    boxes = np.stack([_box(mesh, int(k)) for k in solids.label])
+    boxes = np.stack([mesh.of_part(int(k)).bounds for k in solids.label])
     bodies: dict[int, manifold3d.Manifold] = {}
     found = []
     for i, j in combinations(range(len(boxes)), 2):
@@ -133,18 +133,8 @@ def overlap_finding(mesh: TriangleMesh, solids: Solids | None = None) -> Finding
     return Finding.of("parts-overlap", f"{'; '.join(map(str, found))}.".capitalize()) if found else None
 
 
-def _box(mesh: TriangleMesh, label: int) -> Array:
-    """Return the lower and upper corner (2, 3) of a part's box [m]."""
-    used = mesh.vertices[mesh.triangles[mesh.part == label].ravel()]
-    return np.stack([used.min(0), used.max(0)])
-
-
 def body_of(mesh: TriangleMesh, labels: list[int]) -> manifold3d.Manifold:
     """Return the parts as one body for set operations."""
-    chosen = np.isin(mesh.part, labels)
-    used, corners = np.unique(mesh.triangles[chosen], return_inverse=True)
-    return manifold3d.Manifold(
-        manifold3d.Mesh64(
-            np.ascontiguousarray(mesh.vertices[used]), np.ascontiguousarray(corners.reshape(-1, 3), np.uint64)
-        )
-    )
+    own = mesh.of_part(*labels)
+    # Arrays of its own: read-only ones are refused.
+    return manifold3d.Manifold(manifold3d.Mesh64(np.array(own.vertices), own.triangles.astype(np.uint64)))

@@ -2,28 +2,25 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.points.spacing import Neighbours, areas
+from steelyard.shape.points.spacing import areas
 from steelyard.shape.sides.discs import Discs
 from steelyard.shape.sides.layers import Layers
-from steelyard.shape.sides.sheets import sheet_planes
 from steelyard.shape.sides.ties import Ties
-from steelyard.shape.sides.tree import Tree
 from steelyard.shape.sides.walls import Wall
 from steelyard.shape.sides.winding import Sight
+from steelyard.shape.sites import Sites
 
 DEPTH = 0.4  # of a disc, in sides of the square that it stands for
 _STEPS = 15
 _WIDEST, _NARROWEST = 2.0, 0.25  # width of the softened dipoles, first and last, in spacings
 _SAMPLED = 4  # one block of points in so many gives the length of a step
-SLOPE = 0.12  # of the line between neighbours on one sheet against its plane
 _SIGN_STEPS = 10
 _FREE = 4  # steps before signs are driven to plus or minus one
 _SWEEPS, _KEPT = 4, 0.3
@@ -38,67 +35,46 @@ _JUMP = 0.1  # of a spacing: height over which the jump through a disc is spread
 
 @dataclass(frozen=True, eq=False)
 class Oriented:
-    """A cloud's surface as oriented elements, in units of its diagonal.
+    """The points of a cloud as oriented elements of a surface, in units of their diagonal.
 
-    xyz      (N, 3) about the mean, over the diagonal
+    sites    the points
     normals  (N, 3) unit vectors that leave the solid
     area     (N,) of surface that each point stands for
-    near     its neighbours
-    tree     of the points
-    delaunay  their Delaunay complex
-    spacing  median of the points
     alone    (N, 3) the normals before any sheet was looked at; None where the cloud brought its own
     layers   of its walls, where these are thinner than the spacing
     """
 
-    xyz: Array
+    sites: Sites
     normals: Array
     area: Array
-    near: Neighbours
-    tree: Tree
-    delaunay: Complex
-    spacing: float
     alone: Array | None = None
     layers: Layers | None = None
 
-    @property
-    def without_sheets(self) -> Oriented | None:
-        """The same surface with its normals from dipoles alone; None where the cloud brought its own."""
-        if self.alone is None:
+    @classmethod
+    def by(cls, sites: Sites, normals: Array, alone: Array | None = None, layers: Layers | None = None) -> Oriented:
+        """Return the elements whose normals are these; what else is known of them as in the fields."""
+        return cls(sites, normals, areas(sites.near, normals), alone, layers)
+
+    def walled(self) -> Oriented | None:
+        """Return the surface with its sides anew from the thickness of its walls; None where they have no one."""
+        sites, layers = self.sites, self.layers
+        wall = Wall.of(sites.xyz, self.normals, *sites.sheets(layers), sites.delaunay, sites.spacing)
+        if wall is None:
             return None
-        return replace(self, normals=self.alone, area=areas(self.near, self.alone), alone=None)
+        return Oriented.by(sites, on_sheets(sites, self.normals, wall, layers), self.alone, layers)
 
 
-def oriented(cloud: Cloud) -> Oriented:
-    """Return the surface elements of a cloud; normals that it carries are kept."""
-    xyz = (cloud.xyz - cloud.xyz.mean(0)) / cloud.diagonal
-    near, tree = cloud.near.scaled(1 / cloud.diagonal), Tree.of(xyz)
-    delaunay, spacing = Complex.of(xyz, tree.order), float(np.median(near.spacing))
-    normals, alone, layers = cloud.normals, None, None
-    if normals is None:
-        sight = Sight.of(tree, tree)
-        alone = consistent(sight, spacing)
-        layers = Layers.of(xyz, near.index, spacing)
-        normals = on_sheets(xyz, alone, near, delaunay, sight, spacing, None, layers)
-    return Oriented(xyz, normals, areas(near, normals), near, tree, delaunay, spacing, alone, layers)
+def oriented(cloud: Cloud, sites: Sites | None = None) -> Oriented:
+    """Return the surface elements of a cloud; normals that it carries are kept.
 
-
-def one_layered(surface: Oriented, first: Array) -> Oriented:
-    """Return a surface whose sides were found anew from normals (N, 3) before any sheet, no wall as two layers."""
-    xyz, near, sight = surface.xyz, surface.near, Sight.of(surface.tree, surface.tree)
-    normals = on_sheets(xyz, first, near, surface.delaunay, sight, surface.spacing, None)
-    return replace(surface, normals=normals, area=areas(near, normals), layers=None)
-
-
-def walled(surface: Oriented) -> Oriented | None:
-    """Return a surface whose sides were found anew from the thickness of its walls; None where they have no one."""
-    xyz, near, delaunay, spacing = surface.xyz, surface.near, surface.delaunay, surface.spacing
-    wall = Wall.of(xyz, surface.normals, *sheet_planes(xyz, near.index, SLOPE, surface.layers), delaunay, spacing)
-    if wall is None:
-        return None
-    sight = Sight.of(surface.tree, surface.tree)
-    normals = on_sheets(xyz, surface.normals, near, delaunay, sight, spacing, wall, surface.layers)
-    return replace(surface, normals=normals, area=areas(near, normals))
+    sites  its points, where they are known already
+    """
+    sites = sites or Sites.of(cloud)
+    if cloud.normals is not None:
+        return Oriented.by(sites, cloud.normals)
+    alone = consistent(sites.sight, sites.spacing)
+    layers = Layers.of(sites.xyz, sites.near.index, sites.spacing)
+    return Oriented.by(sites, on_sheets(sites, alone, None, layers), alone, layers)
 
 
 def consistent(sight: Sight, spacing: float) -> Array:
@@ -119,10 +95,7 @@ def consistent(sight: Sight, spacing: float) -> Array:
     return np.asarray(tree.back(_units(dipoles)).T, np.float64)
 
 
-def on_sheets(
-    xyz: Array, first: Array, near: Neighbours, delaunay: Complex, sight: Sight, spacing: float, wall: Wall | None,
-    layers: Layers | None = None,
-) -> Array:  # fmt: skip
+def on_sheets(sites: Sites, first: Array, wall: Wall | None = None, layers: Layers | None = None) -> Array:
     """Return unit normals (N, 3), those of points on flat pieces of surface decided piece by piece.
 
     In a wall thinner than the spacing the dipoles of both sheets cancel. Flat discs do not: their signs are moved
@@ -130,9 +103,10 @@ def on_sheets(
     turn. Points off them, as on edges, are then found anew, with the sheets as they are. Where all walls are of one
     thickness, what lies between sheets so far apart is in the solid; where they are two layers, these face apart.
     """
-    tree, order, sampled = sight.sources, sight.sources.order, sight.targets.of_blocks(_SAMPLED)
-    plane, link = sheet_planes(xyz, near.index, SLOPE, layers)
-    ties = Ties.of(xyz, plane, near.index, link, delaunay, spacing)
+    xyz, near, sight, spacing = sites.xyz, sites.near, sites.sight, sites.spacing
+    tree, order, sampled = sites.tree, sites.tree.order, sites.tree.of_blocks(_SAMPLED)
+    plane, link = sites.sheets(layers)
+    ties = Ties.of(xyz, plane, near.index, link, sites.delaunay, spacing)
     if wall:
         ties = ties.told(wall.outward(plane))
     sign = ties.spread(np.sign((plane * first).sum(1)), _SWEEPS, _KEPT)
@@ -145,7 +119,7 @@ def on_sheets(
             sign = np.clip(2 * sign, -1, 1)
     flat = (np.abs(link).sum(1) > (_WALLED if wall else _LINKED)) & (np.abs(sign) > _CERTAIN)
     normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
-    ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), delaunay, spacing)
+    ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), sites.delaunay, spacing)
     if wall:
         ties = ties.told(wall.outward(normals))
     normals *= ties.settled(_LAST_SWEEPS, _LAST_KEPT)[:, None]

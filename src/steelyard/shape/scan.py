@@ -27,7 +27,7 @@ from steelyard.shape.scans.region import followed, lost_share
 from steelyard.shape.scans.registration import Seen, agreed
 from steelyard.shape.scans.scan_colours import colours_of
 from steelyard.shape.scans.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
-from steelyard.shape.scans.scene import LEAST_VIEWS, Scene, scene_of
+from steelyard.shape.scans.scene import Scene, scene_of
 from steelyard.shape.scans.stand import put_on_stand
 from steelyard.shape.scans.underside import DOWNWARD, Underside, closed_below
 from steelyard.shape.scans.uneven import uneven
@@ -186,8 +186,7 @@ def _empty(scene: Scene, bottom: Underside) -> Callable[[Array], Any]:
         found = np.asarray(bottom.below(at))
         rows = np.flatnonzero(~found)
         rows = rows[in_cubes(at[rows], 8 * scene.pixel)] if len(rows) else rows
-        past = sight_lines.seen_past(*scene.images(), at[rows], 0.0, scene.noise, LEAST_VIEWS)
-        found[rows] = past >= min(LEAST_VIEWS, len(scene.R))
+        found[rows] = scene.seen_empty(at[rows])
         return found
 
     return empty

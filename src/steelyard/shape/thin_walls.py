@@ -37,5 +37,5 @@ def within_noise(share: float, noise: float) -> Finding:
 
 def share_within_noise(surface: Oriented, noise: float) -> float:
     """Return the share of points with the other side of a wall or gap nearer than noise lets see."""
-    facing = np.einsum("nd,nkd->nk", surface.normals, surface.normals[surface.near.index]) < _FACING
-    return float((facing & (surface.near.distance < _WITHIN * noise)).any(1).mean())
+    facing = np.einsum("nd,nkd->nk", surface.normals, surface.normals[surface.sites.near.index]) < _FACING
+    return float((facing & (surface.sites.near.distance < _WITHIN * noise)).any(1).mean())

@@ -15,8 +15,9 @@ from steelyard.shape.chords import lacking
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.filling import CLEAR, Filled, by_walls, clearer_alone, filled, outward
 from steelyard.shape.mesh import Integers
-from steelyard.shape.orient import SLOPE, Oriented, oriented
+from steelyard.shape.orient import Oriented, oriented
 from steelyard.shape.sides.sheets import torn
+from steelyard.shape.sites import Sites
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.thin_walls import blurred_walls, share_within_noise, thinner_than_seen, within_noise
 
@@ -143,35 +144,36 @@ def _made(used: WorkingCloud) -> tuple[Solid, float]:
     """Return the closed volume of points that need no more work, and the doubt about it."""
     xyz = used.cloud.xyz
     X_CB, order = canonical(xyz)
-    made, around, doubt = _enclosed(used._replace(cloud=used.cloud.reordered(order).in_frame(X_CB)))
+    cloud = used.cloud.reordered(order).in_frame(X_CB)
+    made, around, doubt = _enclosed(used._replace(cloud=cloud), Sites.of(cloud))
     normals = np.empty_like(xyz)
     normals[order] = X_CB.inverse().rotation.apply(np.asarray(made.cloud.normals))
     mesh, around = (
         TetMesh.known(xyz, order[cells.tets], cells.volumes, cells.neighbours) for cells in (made.mesh, around)
     )
-    return replace(made, mesh=mesh, around=around, cloud=replace(used.cloud, normals=normals)), doubt
+    return replace(made, mesh=mesh, around=around, cloud=used.cloud.with_normals(normals)), doubt
 
 
 def _has(made: Solid, *codes: str) -> bool:
     return any(finding.code in codes for finding in made.findings)
 
 
-def _enclosed(used: WorkingCloud) -> tuple[Solid, TetMesh, float]:
+def _enclosed(used: WorkingCloud, sites: Sites) -> tuple[Solid, TetMesh, float]:
     """Return the closed volume of points in their canonical frame and order, all cells, and the doubt about it.
 
     No doubt is left that averaging could take where one thickness of all walls was found.
     """
     cloud = used.cloud
-    surface, turned = _oriented(cloud)
-    found = filled(cloud, surface)
+    surface, turned = _oriented(cloud, sites)
+    found = filled(surface)
     anew = None if cloud.normals is None else _anew(used, surface, found)
     if anew is not None:
         return anew
-    surface, found = clearer_alone(cloud, surface, found)
+    surface, found = clearer_alone(surface, found)
     doubt = found.doubt
     if cloud.normals is None and doubt > _UNCLEAR:
         as_found = surface
-        surface, found = by_walls(cloud, surface, found)
+        surface, found = by_walls(surface, found)
         doubt = doubt if surface is as_found else 0.0
     made = _solid(used, surface, found, turned)
     return replace(made, inside=np.flatnonzero(found.inside)), found.mesh, doubt
@@ -184,21 +186,27 @@ def _anew(used: WorkingCloud, surface: Oriented, found: Filled) -> tuple[Solid, 
     opposite ways along their rims. Normals that views gave have no such patches.
     """
     against = _against(surface, found.solid)
+    sites = surface.sites
     if against > _TURNED:
-        return _without_normals(used, f"The normals of {100 * against:.0f} % of the points contradict the rest")
-    split = 0.0 if used.cloud.seen is not None else torn(surface.xyz, surface.normals, surface.near.index, SLOPE)
+        return _without_normals(used, sites, f"The normals of {100 * against:.0f} % of the points contradict the rest")
+    split = 0.0 if used.cloud.seen is not None else _torn(sites, surface.normals)
     if found.doubt <= _BY_CHANCE and split <= _TORN:
         return None
     try:
-        anew = _without_normals(used, "The normals contradict one another, and the points alone give a clearer solid")
+        why = "The normals contradict one another, and the points alone give a clearer solid"
+        anew = _without_normals(used, sites, why)
     except BadValue:  # the points alone enclose nothing
         return None
     if found.doubt > _BY_CHANCE and anew[2] < _CLEARER * found.doubt:
         return anew
     normals = np.asarray(anew[0].cloud.normals)
-    left, share = torn(surface.xyz, normals, surface.near.index, SLOPE), _apart(normals, surface.normals)
+    left, share = _torn(sites, normals), _apart(normals, surface.normals)
     patches = share > _PATCHES or found.doubt > _BLURRED
     return anew if split > _TORN and left < _MENDED * split and patches and anew[2] <= found.doubt else None
+
+
+def _torn(sites: Sites, normals: Array) -> float:
+    return torn(sites.xyz, normals, sites.near.index, sites.sheets()[1])
 
 
 def _apart(some: Array, others: Array) -> float:
@@ -207,15 +215,15 @@ def _apart(some: Array, others: Array) -> float:
     return min(turned, 1 - turned)
 
 
-def _without_normals(used: WorkingCloud, why: str) -> tuple[Solid, TetMesh, float]:
+def _without_normals(used: WorkingCloud, sites: Sites, why: str) -> tuple[Solid, TetMesh, float]:
     """Return the closed volume of points without their normals, with what says so."""
     findings = (*used.findings, Finding.of("normals-flipped", f"{why}; they were found anew."))
-    return _enclosed(used._replace(cloud=replace(used.cloud, normals=None), findings=findings))
+    return _enclosed(used._replace(cloud=used.cloud.with_normals(None), findings=findings), sites)
 
 
-def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
+def _oriented(cloud: Cloud, sites: Sites) -> tuple[Oriented, tuple[Finding, ...]]:
     """Return the cloud's surface elements; normals that came with it and all point inward are turned."""
-    surface = oriented(cloud)
+    surface = oriented(cloud, sites)
     turned = outward(surface)
     if turned is surface or cloud.normals is None:
         return turned, ()
@@ -226,9 +234,9 @@ def _oriented(cloud: Cloud) -> tuple[Oriented, tuple[Finding, ...]]:
 def _against(surface: Oriented, solid: TetMesh) -> float:
     """Return the share of the points whose normals disagree with the surface of the cells inside."""
     skin = solid.surface
-    corners = surface.xyz[skin]
+    corners = surface.sites.xyz[skin]
     across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    out = np.stack([np.bincount(skin.ravel(), np.repeat(across[:, k], 3), len(surface.xyz)) for k in range(3)], 1)
+    out = np.stack([np.bincount(skin.ravel(), np.repeat(across[:, k], 3), len(surface.normals)) for k in range(3)], 1)
     return float(((out * surface.normals).sum(1) < _AGAINST * np.linalg.norm(out, axis=1)).mean())
 
 
@@ -242,8 +250,8 @@ def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
     findings = used.findings + turned
     thin = _thin_walls(used, surface, doubt, noisy)
     wrong = 0.0 if thin is None else 1.0
-    if thin is None and surface.layers is not None and surface.layers.thickness < _LOST * surface.spacing:
-        thin = thinner_than_seen(surface.layers.thickness * diagonal * 1e3, surface.spacing * diagonal * 1e3)
+    if thin is None and surface.layers is not None and surface.layers.thickness < _LOST * surface.sites.spacing:
+        thin = thinner_than_seen(surface.layers.thickness * diagonal * 1e3, surface.sites.spacing * diagonal * 1e3)
         wrong = min(surface.layers.volume(surface.area) * diagonal**3 / solid.volume, 1.0)
     if thin is not None:
         findings += (thin,)
@@ -257,12 +265,12 @@ def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[F
     few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
     skin = used.noise * total * diagonal**2 / solid.volume
     std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
-    kept = replace(used.cloud, normals=surface.normals)
+    kept = used.cloud.with_normals(surface.normals)
     return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
 
 
 def _thin_walls(used: WorkingCloud, surface: Oriented, doubt: float, noisy: float) -> Finding | None:
     """Return what is said of walls that are no walls for the points, or for a share `noisy` of them in their noise."""
     if doubt > _BLURRED:
-        return blurred_walls(used.cloud, surface.spacing * used.cloud.diagonal * 1e3, doubt)
+        return blurred_walls(used.cloud, surface.sites.spacing * used.cloud.diagonal * 1e3, doubt)
     return within_noise(noisy, used.noise) if noisy > _NOISY else None

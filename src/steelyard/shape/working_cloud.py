@@ -15,7 +15,7 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.points.known_sides import settled_along
 from steelyard.shape.points.left_table import left_table
 from steelyard.shape.points.noisy_points import settled
-from steelyard.shape.points.spacing import Neighbours
+from steelyard.shape.points.spacing import Neighbours, evenly
 from steelyard.shape.points.thinning import spread_to
 
 LEAST = 20  # points that can show a solid
@@ -56,7 +56,7 @@ def working_cloud(cloud: Cloud, most: int, settle: bool | None = None) -> Workin
     cloud, last = _one_object(thin.cloud)
     _require_solid(cloud.xyz)
     # What views gave stands on a table that was found and taken away.
-    table = left_table(cloud.xyz, float(np.median(cloud.near.spacing))) if cloud.seen is None else None
+    table = left_table(cloud.xyz, cloud.near.spacing) if cloud.seen is None else None
     findings = (*found, *thin.findings, *last, *([table] if table else []))
     return thin._replace(cloud=cloud, findings=findings)
 
@@ -95,7 +95,7 @@ def _thinned(cloud: Cloud, most: int, settle: bool | None) -> WorkingCloud:
         whole = WorkingCloud(cloud, 0.0, ())
         if settle is False or (cloud.normals is None and not settle):
             return whole
-        return _settled(whole, float(np.median(cloud.near.spacing)), len(cloud), sheets=bool(settle))
+        return _settled(whole, cloud.near.spacing, len(cloud), sheets=bool(settle))
     drawn = np.random.default_rng(0).permutation(len(cloud))[: _DRAWN * most]
     chosen = cloud.chosen(np.sort(drawn))
     kept, apart, third = _spread(chosen, most)
@@ -122,7 +122,7 @@ def _settled(used: WorkingCloud, apart: float, most: int, sheets: bool = True) -
     sheets  whether noise is looked for about sheets through neighbours, too, and not by normals alone
     """
     cloud = used.cloud
-    rows = np.linspace(0, len(cloud) - 1, min(most, len(cloud))).astype(np.int64)
+    rows = evenly(len(cloud), most)
     along = None if cloud.normals is None else settled_along(cloud.xyz, cloud.normals, rows, apart)
     found = settled(cloud.xyz, cloud.normals, rows, apart) if sheets and along is None else along
     if found is None:
@@ -157,7 +157,7 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
     """Return the largest of the pieces that lie far apart, without strays."""
     if len(cloud) < LEAST:
         return cloud, []
-    piece, spacing = _pieces(cloud.near)
+    piece = _pieces(cloud.near)
     sizes = np.bincount(piece)
     stray = (sizes < LEAST)[piece]
     if 0 < stray.sum() < _STRAY * len(cloud):
@@ -168,7 +168,7 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
         return cloud, []
     main = int(np.argmax(sizes))
     gap = _gap(cloud.xyz[piece == main], cloud.xyz[piece != main])
-    if len(large) == 1 or gap < _APART * spacing:
+    if len(large) == 1 or gap < _APART * cloud.near.spacing:
         return cloud, []
     text = (
         f"The points form {len(large)} pieces, {gap * 1e3:.3g} mm apart; the largest, {sizes[main]} points, was kept."
@@ -178,20 +178,19 @@ def _one_object(cloud: Cloud) -> tuple[Cloud, list[Finding]]:
 
 def in_small_pieces(near: Neighbours) -> Mask:
     """Return which points (N,) hang together with too few others to be an object."""
-    piece = _pieces(near)[0]
+    piece = _pieces(near)
     return np.asarray((np.bincount(piece) < LEAST)[piece])
 
 
-def _pieces(near: Neighbours) -> tuple[Integers, float]:
-    """Return the piece (N,) of each point, joined where nearest neighbours are not far apart, and the spacing [m]."""
+def _pieces(near: Neighbours) -> Integers:
+    """Return the piece (N,) of each point, joined where nearest neighbours are not far apart."""
     from scipy.sparse import csr_matrix
     from scipy.sparse.csgraph import connected_components
 
-    spacing = float(np.median(near.spacing))
-    index, close = near.index[:, :_LINKS], near.distance[:, :_LINKS] < _APART * spacing
+    index, close = near.index[:, :_LINKS], near.distance[:, :_LINKS] < _APART * near.spacing
     start = np.concatenate([[0], np.cumsum(close.sum(1))])
     graph = csr_matrix((np.ones(start[-1]), index[close], start), (len(index), len(index)))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64), spacing
+    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
 
 
 def _gap(a: Array, b: Array) -> float:

@@ -9,7 +9,6 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.parts.clustering import Hollow, Published
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.merging import GRAIN
 from steelyard.shape.hull import qhull
@@ -28,7 +27,6 @@ class PlainClustering:
 
     mesh: TetMesh
     piece: Integers
-    cost: Published | Hollow
     lazy: bool = True
     hulls: int = 0
     hull_s: float = 0.0
@@ -120,11 +118,8 @@ class PlainClustering:
         a, b = edge
         hull, exact = self.known[edge]
         both = self.volume[a] + self.volume[b]
-        whole = self.mesh.volume
-        grains = (hull - both) / (GRAIN * whole)
+        grains = (hull - both) / (GRAIN * self.mesh.volume)
         hollow = GRAIN * max(0.0, np.rint(grains if exact else grains - 1e-3))
-        if isinstance(self.cost, Hollow):
-            return True, hollow + self.cost.size * both / whole, both
         if hollow > 0:
             return True, hollow, both
         return False, self.tets[a] ** 2 + self.tets[b] ** 2, both
@@ -132,11 +127,7 @@ class PlainClustering:
     def _tree(self, merges: list[Edge], costs: list[tuple[bool, float, float]]) -> Hierarchy:
         used = self.mesh.vertices[np.unique(self.mesh.tets)]
         unit = float(np.linalg.norm(np.ptp(used, axis=0))) ** 3
-        values = [c[1] for c in costs]
-        if isinstance(self.cost, Published):
-            values = [
-                1 + c * self.mesh.volume / unit if concave else c / len(self.mesh) ** 2 for concave, c, _ in costs
-            ]
+        values = [1 + c * self.mesh.volume / unit if concave else c / len(self.mesh) ** 2 for concave, c, _ in costs]
         nodes = range(len(self.volume))
         return Hierarchy(
             self.piece,
@@ -147,13 +138,8 @@ class PlainClustering:
         )
 
 
-def plain_cluster(
-    mesh: TetMesh,
-    piece: Integers | None = None,
-    cost: Published | Hollow = Published(),  # noqa: B008
-    lazy: bool = True,
-) -> tuple[Hierarchy, PlainClustering]:
+def plain_cluster(mesh: TetMesh, piece: Integers | None = None, lazy: bool = True) -> tuple[Hierarchy, PlainClustering]:
     """Return the tree of merges and what it took; one body only."""
     leaf = np.arange(len(mesh)) if piece is None else np.unique(piece, return_inverse=True)[1]
-    run = PlainClustering(mesh, leaf, cost, lazy)
+    run = PlainClustering(mesh, leaf, lazy)
     return run.run(), run

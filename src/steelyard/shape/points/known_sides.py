@@ -13,6 +13,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.shape.mesh import Integers
+from steelyard.shape.points.spacing import evenly
 
 # Noise over spacing below which it does little harm. Normals that were fitted to neighbours feign up to 0.22 on points
 # without noise.
@@ -46,7 +47,7 @@ def settled_along(xyz: Array, normals: Array, rows: Integers, spacing: float) ->
 
     Noise also moves points along their own face, past its edges: those are left out.
     """
-    some = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
+    some = evenly(len(xyz), _LOOKED_AT)
     noise = 0.0
     for _ in range(_ROUNDS):
         reach = max(_REACH * spacing, _NOISES * noise)

@@ -9,12 +9,13 @@ neighbourhood moves by is taken back (twicing: Tukey 1977, "Exploratory Data Ana
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
+from steelyard.shape.points.spacing import evenly
 
 _REACHES = (1.0, 1.4, 2.0, 2.8)  # of neighbourhoods, in spacings of the points that will be kept
 _NOISY = 0.08  # noise over reach below which it does no harm
@@ -41,38 +42,49 @@ def settled(xyz: Array, normals: Array | None, rows: Integers, spacing: float) -
     normals  (M, 3), None where not known: neighbours that look the other way do not count
     spacing  of the points that will be kept of them [m]
     """
-    reach, step, noise = _reach(xyz, normals, spacing)
+    among, reach, noise = _reach(xyz, normals, spacing)
     if noise < _NOISY * reach:
         return None
     sides = None if normals is None else normals[rows]
-    others = None if normals is None else normals[::step]
-    sheet = _Around.of(xyz[rows], sides, xyz[::step], others, reach).sheet()
-    moved = _Around.of(xyz[rows], sides, xyz[rows], sides, _WIDER * reach)
+    sheet = _Around.of(xyz[rows], sides, among, reach).sheet()
+    moved = _Around.of(xyz[rows], sides, _Among.of(xyz[rows], sides), _WIDER * reach)
     offset = sheet.offset - moved.shared(sheet.offset, sheet.across)
     return Settled(xyz[rows] + offset[:, None] * sheet.across, noise)
 
 
-def _reach(xyz: Array, normals: Array | None, spacing: float) -> tuple[float, int, float]:
-    """Return the least reach at which neighbourhoods look like a surface [m], and the noise across it [m].
+class _Among(NamedTuple):
+    """Points among which neighbours are looked for: a kd tree of them, their normals (M, 3) where they are known."""
 
-    The number between tells that one point in so many is neighbour enough.
-    """
-    rows = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
-    sides, step = None if normals is None else normals[rows], 1
+    tree: Any
+    normals: Array | None
+
+    @classmethod
+    def of(cls, xyz: Array, normals: Array | None, step: int = 1) -> _Among:
+        """Return one point in `step` of points (N, 3)."""
+        from scipy.spatial import cKDTree
+
+        return cls(cKDTree(xyz[::step]), None if normals is None else normals[::step])
+
+
+def _reach(xyz: Array, normals: Array | None, spacing: float) -> tuple[_Among, float, float]:
+    """Return neighbours enough, the least reach at which they look like a surface [m], and the noise across it [m]."""
+    rows = evenly(len(xyz), _LOOKED_AT)
+    sides, step, among = None if normals is None else normals[rows], 1, _Among.of(xyz, normals)
     for factor in _REACHES:
         reach = factor * spacing
         while True:
-            around = _Around.of(xyz[rows], sides, xyz[::step], None if normals is None else normals[::step], reach)
+            around = _Around.of(xyz[rows], sides, among, reach)
             if np.median(around.count) < _MOST:
                 break
             step += 1
+            among = _Among.of(xyz, normals, step)
         count = np.median(around.count)
         if count < _FEW and factor < _REACHES[-1]:
             continue
         noise = float(np.median(around.sheet().noise))
         if noise < _NOISY * reach or (noise < _THIN * reach and count >= _ENOUGH):
             break
-    return reach, step, noise
+    return among, reach, noise
 
 
 class _Sheet(NamedTuple):
@@ -92,10 +104,9 @@ class _Around:
     weight: Array
 
     @classmethod
-    def of(cls, points: Array, sides: Array | None, xyz: Array, normals: Array | None, reach: float) -> _Around:
-        from scipy.spatial import cKDTree
-
-        far, index = cKDTree(xyz).query(points, min(_MOST, len(xyz)), distance_upper_bound=reach)
+    def of(cls, points: Array, sides: Array | None, among: _Among, reach: float) -> _Around:
+        xyz, normals = among.tree.data, among.normals
+        far, index = among.tree.query(points, min(_MOST, len(xyz)), distance_upper_bound=reach)
         found = np.isfinite(far)
         index = np.where(found, index, 0)
         weight = np.where(found, (1 - np.where(found, far / reach, 1) ** 2) ** 2, 0)

@@ -41,10 +41,15 @@ class Neighbours:
         return Neighbours(self.index, factor * self.distance)
 
     @property
-    def spacing(self) -> Array:
-        """Side (N,) of the square of surface per point, were all close neighbours on one flat sheet."""
+    def spacing(self) -> float:
+        """Median side of the square of surface per point, were all close neighbours on one flat sheet."""
         k = min(_CLOSE, self.distance.shape[1])
-        return np.asarray(self.distance[:, k - 1] * np.sqrt(np.pi / k))
+        return float(np.median(self.distance[:, k - 1] * np.sqrt(np.pi / k)))
+
+
+def evenly(count: int, most: int) -> Integers:
+    """Return the numbers of up to `most` of `count` points, evenly along their order."""
+    return np.linspace(0, count - 1, min(most, count)).astype(np.int64)
 
 
 def areas(near: Neighbours, normals: Array) -> Array:

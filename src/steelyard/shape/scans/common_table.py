@@ -13,7 +13,6 @@ import numpy as np
 from scipy import ndimage
 
 from steelyard.check import Array
-from steelyard.shape.scans import depth_images as images
 from steelyard.shape.scans.scene import Scene
 from steelyard.shape.scans.table_plane import lowest_planes, noise_of, table_frame, table_planes
 from steelyard.shape.views import TablePlane
@@ -125,7 +124,7 @@ def _tables(scene: Scene) -> Array:
 
     The lowest plane of each, fitted to the points on it: so an object as wide as the table in view does not lift it.
     """
-    sampled = images.sampled(*scene.images(), _stride(scene, _SAMPLES[0]))
+    sampled = scene.sampled(_SAMPLES[0])
     sampled = sampled[sampled[:, 2] > scene.floor] if np.isfinite(scene.floor) else sampled
     clear = min(_CLEAR * scene.sigma, _THIN * scene.distance)
     drawn = np.random.default_rng(0).random((_TRIES, 3))
@@ -139,17 +138,13 @@ def _tables(scene: Scene) -> Array:
     return np.asarray(planes[np.hypot(planes[:, 2], planes[:, 3]) < _STEEPEST])
 
 
-def _stride(scene: Scene, pixels: int) -> int:
-    return max(1, int(np.sqrt(scene.views.depth.size / pixels)))
-
-
 def slid(scene: Scene) -> None:
     """Slide and turn level views on the table until they have the same heights on it.
 
     Every view by itself, to the mean of all by Gauss and Newton, from wide blurs to narrow ones. It finds its way from
     afar and ends a millimetre or two off: a view sees what faces it, and the mean is of both sides.
     """
-    sampled = images.sampled(*scene.images(), _stride(scene, _SAMPLES[1]))
+    sampled = scene.sampled(_SAMPLES[1])
     half, cap = _REACH * scene.distance, max(6 * scene.sigma, _CAP * scene.distance)
     sampled = sampled[(np.abs(sampled[:, :2]) < half).all(1)]
     start, view = sampled[:, :2], sampled[:, 4].astype(np.int64)

@@ -14,6 +14,11 @@ FACING = 0.3  # cosine of incidence below which a view's word about a surface is
 _STEEP = 3.0  # slope between neighbouring pixels that still counts as one surface (72 degrees)
 
 
+def stride_of(depth: Any, pixels: int) -> int:
+    """Return the stride with which about so many pixels of images (V, H, W) are looked at."""
+    return max(1, int(np.sqrt(depth.size / pixels)))
+
+
 @numba.njit(cache=True, nogil=True)
 def sampled(depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int) -> Any:
     """Return points (N, 5) of every stride-th pixel: x, y, z in the poses' frame, depth [m] and number of the view."""

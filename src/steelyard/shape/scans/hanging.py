@@ -14,8 +14,7 @@ from scipy import ndimage
 
 from steelyard.check import Array
 from steelyard.findings import Finding, percent
-from steelyard.shape.scans import sight_lines
-from steelyard.shape.scans.scene import LEAST_VIEWS, Scene
+from steelyard.shape.scans.scene import Scene
 from steelyard.shape.scans.underside import Underside, median_along
 
 # What a rod hangs below where it was last seen, of its rise above that: (1 - sin e) / (1 + sin e) for sight lines at
@@ -42,8 +41,7 @@ def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple
     column, k = np.nonzero(level < free[:, None])
     spot = bottom.low + bottom.pitch * (np.stack([i[column], j[column]], axis=1) + 0.5)
     points = np.column_stack([spot, level[column, k]])
-    past = sight_lines.seen_past(*scene.images(), points, 0.0, scene.noise, LEAST_VIEWS)
-    empty = past >= min(LEAST_VIEWS, len(scene.R))
+    empty = scene.seen_empty(points)
     size = tall[column] * bottom.pitch**2 / _LEVELS
     closed, left = float(size[~empty].sum()), float(tall.sum() * bottom.pitch**2 - size[empty].sum())
     return ((_open(closed / left),) if closed > _MUCH * left else ()), closed

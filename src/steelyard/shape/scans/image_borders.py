@@ -8,7 +8,7 @@ from scipy.spatial import cKDTree
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.shape.scans import sight_lines
-from steelyard.shape.scans.scene import LEAST_VIEWS, Scene
+from steelyard.shape.scans.scene import Scene
 
 # A spot that fewer images hold than this may be the last that enough views see: one view in four sees a given spot, and
 # three must. Of few views three fifths, of many a quarter is little for an arc around the object.
@@ -47,7 +47,7 @@ def _open(scene: Scene, xyz: Array, ends: Array, normal: Array) -> Array:
     found = spots[..., 2] > 3 * scene.sigma
     found[found] = tree.query(spots[found])[0] > _COVERED * way
     past, on = sight_lines.sights(*scene.images(), spots[found], scene.noise).T
-    held, least = scene.held(spots[found])[:, 0], min(LEAST_VIEWS, len(scene.R))
+    held, least = scene.held(spots[found])[:, 0], scene.enough
     found[found] = (past < least) & ((on > past) | (held < least))
     return np.asarray(found.any(1))
 

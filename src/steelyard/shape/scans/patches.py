@@ -12,7 +12,7 @@ from steelyard.shape.points.thinning import in_cubes, spread_to
 from steelyard.shape.scans import depth_images as images
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.region import REACHES, STRIDE, Region, heights
-from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.shape.scans.scene import WINDOW, Scene
 
 _NORMAL_STEP = 2  # pixels from one whose normal is taken to its neighbours
 _SEEDS = 4  # points that are settled, for each that stays
@@ -29,7 +29,7 @@ def surfels(scene: Scene, region: Region) -> Array:
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else STRIDE
     found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
-    found = np.asarray(found[found[:, 7] >= min(LEAST_VIEWS, len(scene.R))])
+    found = np.asarray(found[found[:, 7] >= scene.enough])
     if not len(found):
         raise no_surface()
     return found
@@ -64,18 +64,24 @@ def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int)
     return support
 
 
+def settled_patches(
+    scene: Scene, patches: Array, points: int, apart: float, window: float, rounds: int
+) -> tuple[Array, Array, Array]:
+    """Return well-spread patches, those of most pixels first, `apart` [m]: points, normals and support (N, 3)."""
+    order = np.argsort(-patches[:, 6], kind="stable")
+    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, points, apart)
+    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
+    return xyz, normal, settled(scene, xyz, normal, window, rounds)
+
+
 def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tuple[Array, Array]:
     """Return points (N, 3) of the object's surface and normals, settled among the views, the table around it level 0.
 
     CannotAnswer where nothing stands out of that.
     """
     mask = region.mask
-    order = np.argsort(-patches[:, 6], kind="stable")
-    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _SEEDS * points, scene.pixel)
-    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
-    support = settled(scene, xyz, normal, WINDOW, 2)
-    least = min(LEAST_VIEWS, len(scene.R))
-    good = (support[:, 0] >= least) & (support[:, 1] <= 0.5 * support[:, 0])
+    xyz, normal, support = settled_patches(scene, patches, _SEEDS * points, scene.pixel, WINDOW, 2)
+    good = (support[:, 0] >= scene.enough) & (support[:, 1] <= 0.5 * support[:, 0])
     table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
     level, rough = 0.0, 0.1 * scene.sigma
     object_cells = ndimage.binary_erosion(mask, np.ones((3, 3)), iterations=3)

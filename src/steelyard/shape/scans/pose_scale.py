@@ -40,7 +40,7 @@ def pose_scale(views: Views) -> float | None:
 def _plane(views: Views, k: int) -> Array | None:
     """Return the normal of the plane that most of a view lies on, in the camera's axes, and its distance [m]."""
     depth, eye = views.depth[k : k + 1], np.zeros((1, 3))
-    stride = max(1, int(np.sqrt(depth.size / _SAMPLES)))
+    stride = images.stride_of(depth, _SAMPLES)
     points = images.sampled(depth, views.depth_unit, views.intrinsics.vector, np.eye(3)[None], eye, stride)
     if len(points) < _FEW:
         return None

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.points.medians import middle_half_std
 from steelyard.shape.scans import depth_images as images
-from steelyard.shape.scans.scene import LEAST_VIEWS, Scene
+from steelyard.shape.scans.scene import Scene
 
 STRIDE = 3  # of the pixels that are averaged
 _ENDS, _CUT = 1.0, 0.5  # per cent of an object: its ends; share of the images from which on enough hold them
@@ -169,7 +169,7 @@ def _watched(scene: Scene, count: Array, middle: tuple[slice, slice], low: Array
     well[middle] = usual[middle]
     held, density = _held(scene, count.shape, low, pitch)
     apart[middle] = held[middle] < _CUT * len(scene.R)
-    apart &= held >= min(LEAST_VIEWS, len(scene.R))
+    apart &= held >= scene.enough
     due = density * pitch**2
     share = float(np.median(count[well] / np.maximum(due[well], 1e-9)))
     return well, usual | (apart & (count > 0) & (count >= _WATCHED * share * due))

@@ -10,13 +10,11 @@ from scipy.spatial import cKDTree
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.shape.points.thinning import spread_to
-from steelyard.shape.scans import depth_images as images
 from steelyard.shape.scans.common_table import slid
 from steelyard.shape.scans.depth_images import FACING
-from steelyard.shape.scans.patches import no_surface, settled, surface_of, surfels
+from steelyard.shape.scans.patches import no_surface, settled, settled_patches, surface_of, surfels
 from steelyard.shape.scans.region import Region, object_on_table
-from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.shape.scans.scene import WINDOW, Scene
 from steelyard.shape.scans.table_plane import INCIDENCE
 from steelyard.shape.scans.view_steps import moved, steps_together
 from steelyard.spatial import Rotation
@@ -55,7 +53,7 @@ class Seen:
         patches = surfels(scene, region)
         xyz, normal = _model(scene, patches, _NEAR)
         support = settled(scene, xyz, normal, _NEAR, 1)
-        good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+        good = support[:, 0] >= scene.enough
         if not good.any():
             raise no_surface()
         return cls(region, patches, float(np.median(support[good, 2] / _expected(scene, xyz[good], normal[good]))))
@@ -95,7 +93,7 @@ class _Try:
         scene.p = p.copy()
         xyz, normal = surface_of(scene, seen.patches, seen.region, _MODEL)
         on, past = settled(scene, xyz, normal, WINDOW, 0)[xyz[:, 2] > _STANDS_OUT * scene.sigma, :2].sum(0)
-        pixels = images.sampled(*scene.images(), max(1, int(np.sqrt(scene.views.depth.size / _SAMPLES))))[:, :3]
+        pixels = scene.sampled(_SAMPLES)[:, :3]
         pixels = pixels[seen.region.holds(pixels)]
         away, row = cKDTree(xyz).query(pixels, distance_upper_bound=_NEAR)
         pixels, row = pixels[away < _NEAR], row[away < _NEAR]
@@ -201,11 +199,8 @@ def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
 
     CannotAnswer where they give none.
     """
-    order = np.argsort(-patches[:, 6], kind="stable")
-    rows, _ = spread_to(patches[:, :3], patches[:, 3:6], order, _MODEL, 2 * scene.pixel)
-    xyz, normal = patches[rows, :3].copy(), patches[rows, 3:6].copy()
-    support = settled(scene, xyz, normal, window, 1)
-    good = support[:, 0] >= min(LEAST_VIEWS, len(scene.R))
+    xyz, normal, support = settled_patches(scene, patches, _MODEL, 2 * scene.pixel, window, 1)
+    good = support[:, 0] >= scene.enough
     if not good.any():
         raise no_surface()
     return xyz[good], normal[good]

@@ -8,9 +8,8 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from steelyard.check import Array
-from steelyard.shape.scans import depth_images as images
 from steelyard.shape.scans import sight_lines
-from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.shape.scans.scene import WINDOW, Scene
 
 _CLEAR = 3.0  # times the depth noise: what is measured higher than this above the table is not the table
 _TABLE_SAMPLES, _NEARLY_ALL = 20_000, 90  # pixels that tell the table's colour, and per cent of them that have it
@@ -24,12 +23,12 @@ def colours_of(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any,
     if (images_rgb := scene.views.rgb) is None:
         return None, None
     shown, rgb = np.zeros(len(xyz), bool), np.zeros((len(xyz), 3), np.uint8)
-    clear, enough = _CLEAR * scene.sigma, min(LEAST_VIEWS, len(scene.R))
+    clear, enough = _CLEAR * scene.sigma, scene.enough
     rgb[:seen], shown[:seen] = sight_lines.colours(
         images_rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise, clear, enough
     )
     # What lies as low as the table and looks like it may be its fringe.
-    shown &= (xyz[:, 2] > 2 * clear) | ~_like_table(scene, images_rgb, clear, rgb)
+    shown &= (xyz[:, 2] > 2 * clear) | ~_like_table(scene, clear, rgb)
     if not shown.any():
         return rgb, None
     if not shown.all():
@@ -37,14 +36,9 @@ def colours_of(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any,
     return rgb, shown
 
 
-def _like_table(scene: Scene, images_rgb: Any, clear: float, rgb: Any) -> Any:
+def _like_table(scene: Scene, clear: float, rgb: Any) -> Any:
     """Return which colours (N, 3) are as near to the table's median as nearly all of the table is."""
-    depth = scene.views.depth
-    stride = max(1, int(np.sqrt(depth.size / _TABLE_SAMPLES)))
-    shown = images.sampled(depth, *scene.images()[1:], stride)
-    every = (slice(None), slice(stride // 2, None, stride), slice(stride // 2, None, stride))
-    pixels = images_rgb[every][depth[every] > 0].astype(float)
-    table = pixels[np.abs(shown[:, 2]) < clear]
+    table = scene.sampled_rgb(_TABLE_SAMPLES)[np.abs(scene.sampled(_TABLE_SAMPLES)[:, 2]) < clear]
     if not len(table):
         return np.zeros(len(rgb), bool)
     middle = np.median(table, axis=0)

@@ -10,6 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_noise, table_of
 from steelyard.shape.scans.view_mistakes import advice
 from steelyard.shape.views import TablePlane, Views
@@ -63,6 +64,25 @@ class Scene:
         """Return what every pass over the images needs: depth, its unit, the camera and its poses."""
         return self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p
 
+    @property
+    def enough(self) -> int:
+        """How many views must agree before something is believed: of one or two all."""
+        return min(LEAST_VIEWS, len(self.R))
+
+    def sampled(self, pixels: int) -> Array:
+        """Return about so many even pixels as points (N, 5): x, y, z in T, depth [m] and number of the view."""
+        return np.asarray(images.sampled(*self.images(), images.stride_of(self.views.depth, pixels)))
+
+    def sampled_rgb(self, pixels: int) -> Array:
+        """Return the colours (N, 3) of those pixels, 0..255, of views that have colour."""
+        stride = images.stride_of(self.views.depth, pixels)
+        every = (slice(None), slice(stride // 2, None, stride), slice(stride // 2, None, stride))
+        return np.asarray(self.views.rgb)[every][self.views.depth[every] > 0].astype(float)
+
+    def seen_empty(self, points: Array) -> Any:
+        """Return past which of points (N, 3) enough views see."""
+        return sight_lines.seen_past(*self.images(), points, 0.0, self.noise, LEAST_VIEWS) >= self.enough
+
     def held(self, points: Array) -> Array:
         """Return how many images hold each of points (N, 3), and how densely their pixels lie there [1/m^2]: (N, 2)."""
         lens = self.views.intrinsics
@@ -77,7 +97,7 @@ class Scene:
 def scene_of(views: Views) -> Scene:
     """Return the images in the table's frame."""
     R, p = views.X_WC.rotation.matrix, views.X_WC.position
-    stride = max(1, int(np.sqrt(views.depth.size / _SAMPLES)))
+    stride = images.stride_of(views.depth, _SAMPLES)
     sampled = images.sampled(views.depth, views.depth_unit, views.intrinsics.vector, R, p, stride)
     looks = looked_at(R, p)
     distance = float(np.median(np.linalg.norm(p - looks, axis=1)))

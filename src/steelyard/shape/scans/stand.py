@@ -16,7 +16,6 @@ from scipy import ndimage
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
-from steelyard.shape.scans import depth_images as images
 from steelyard.shape.scans.common_table import laid
 from steelyard.shape.scans.region import heights, object_on_table
 from steelyard.shape.scans.scene import Scene
@@ -93,7 +92,7 @@ def _raise(scene: Scene, plane: TablePlane) -> None:
     back = scene.X_WT.inverse()
     normal = back.rotation.apply(plane.normal)
     stated = TablePlane(normal, float(plane.offset - plane.normal @ scene.X_WT.position))
-    points = images.sampled(*scene.images(), max(1, int(np.sqrt(scene.views.depth.size / _PIXELS))))[:, :3]
+    points = scene.sampled(_PIXELS)[:, :3]
     near = points[np.abs(stated.height(points)) < NEAR * scene.distance]
     fitted = find_table(near, scene.p, scene.distance, stated) if len(near) > 2 else stated
     laid(scene, np.array([fitted.offset, *-fitted.normal[:2]]) / fitted.normal[2])
@@ -106,7 +105,7 @@ def _above(scene: Scene, plane: TablePlane) -> bool:
 
 def _has_lower(scene: Scene) -> bool:
     """Whether a lower table shows beside this one."""
-    below = images.sampled(*scene.images(), max(1, int(np.sqrt(scene.views.depth.size / _PIXELS))))[:, 2]
+    below = scene.sampled(_PIXELS)[:, 2]
     return bool((below < -max(2 * _CLEAR[0], _CLEAR[1] * scene.sigma)).mean() > _LOWER)
 
 
@@ -161,12 +160,9 @@ def _face(high: Array) -> float:
 
 def _differ(scene: Scene, inner: Any, low: Array, pitch: float, face: float, thick: float) -> bool:
     """Whether what stands on a face, over cells (I, J), has other colours than it."""
-    if (rgb := scene.views.rgb) is None:
+    if scene.views.rgb is None:
         return False
-    stride = max(1, int(np.sqrt(scene.views.depth.size / _PIXELS)))
-    xyz = images.sampled(*scene.images(), stride)[:, :3]
-    every = (slice(None), slice(stride // 2, None, stride), slice(stride // 2, None, stride))
-    colour = rgb[every][scene.views.depth[every] > 0].astype(float)
+    xyz, colour = scene.sampled(_PIXELS)[:, :3], scene.sampled_rgb(_PIXELS)
     i, j = np.floor((xyz[:, :2] - low) / pitch).astype(int).T
     over = (i >= 0) & (j >= 0) & (i < inner.shape[0]) & (j < inner.shape[1])
     over[over] = inner[i[over], j[over]]

@@ -134,8 +134,7 @@ def _empty_to(scene: Scene, foot: Array, table_seen: Any, top: Array, step: floa
         open_ = open_[top[open_] > height]
         at = foot[open_].copy()
         at[:, 2] = height
-        past = sight_lines.seen_past(*scene.images(), at, 0.0, scene.noise, LEAST_VIEWS) >= LEAST_VIEWS
-        open_ = open_[past]
+        open_ = open_[scene.seen_empty(at)]
         out[open_] = height + step / 2
         out[open_[top[open_] <= height + step]] = np.inf
         height += step

@@ -142,7 +142,7 @@ def advice(views: Views) -> str:
 def table_share(views: Views, given: _Given) -> float:
     """Return the share of the measured points on the plane that has most, all cameras above it; 0 without one."""
     R, p = given.X_WC.rotation.matrix, given.X_WC.position
-    stride = max(1, int(np.sqrt(views.depth.size / _SAMPLES)))
+    stride = images.stride_of(views.depth, _SAMPLES)
     sampled = images.sampled(views.depth, given.unit, given.intrinsics.vector, R, p, stride)
     away = float(np.median(sampled[:, 3])) if len(sampled) else 0.0
     if not NEAREST <= away <= FARTHEST:

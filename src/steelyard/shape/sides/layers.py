@@ -16,6 +16,7 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.shape.mesh import Integers
 from steelyard.shape.points.plane_axis import least_axis
+from steelyard.shape.points.spacing import evenly
 
 _NEIGHBOURS = 20  # that show two layers
 _ROUNDS = 6  # of telling the layers apart and fitting them
@@ -57,7 +58,7 @@ class Layers(NamedTuple):
         spacing  of the points; where it is given, a thin wall of an else thick object counts, too
         """
         near = np.ascontiguousarray(index[:, :_NEIGHBOURS])
-        some = np.linspace(0, len(xyz) - 1, min(_LOOKED_AT, len(xyz))).astype(np.int64)
+        some = evenly(len(xyz), _LOOKED_AT)
         if near.shape[1] < _NEIGHBOURS:
             return None
         first = _layers(xyz, near, some)[0]

@@ -10,26 +10,30 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 from steelyard.shape.points.plane_axis import least_axis
-from steelyard.shape.sides.layers import Layers
 
+_SLOPE = 0.12  # of the line between neighbours on one sheet against its planes, at which their link has fallen to 1/e
 _PARALLEL = 0.7  # cosine between the planes of neighbours on one sheet, at least
+_OPPOSITE = -0.5  # cosine between normals that face opposite ways
+_STEEP = 0.25  # slope of the line to a neighbour on another sheet, at least
+_ALIKE = 0.9  # cosine between normals that look the same way
+_FLAT = 3.0  # links of a point on a flat piece
+_FEW = 3
+_FIRST = 18  # neighbours that give the first plane
+_LEAST = 4.0  # links that a plane needs to be drawn anew
 
 
-def sheet_planes(xyz: Array, index: Integers, slope: float, layers: Layers | None = None) -> tuple[Array, Array]:
+def sheet_planes(xyz: Array, index: Integers) -> tuple[Array, Array]:
     """Return planes (N, 3) through points (N, 3), of either sign, and how much each neighbour is on the same one.
 
-    index   (N, K) neighbours, nearest first
-    slope   of the line to a neighbour against both planes, at which the link has fallen to 1/e
-    layers  of walls thinner than the spacing, where there are any: neighbours across them look the other way
+    index  (N, K) neighbours, nearest first
 
     The second (N, K) is negative where a linked plane has the other sign. Where two sheets of a wall lie close, the
     first plane is that of both; then only neighbours on the point's own sheet shape it.
     """
     normal = _first_planes(xyz, index, min(_FIRST, index.shape[1]))
     for widened in (2.0, 1.4):
-        normal = _own_planes(xyz, normal, index, _links(xyz, normal, index, widened * slope))
-    link = np.asarray(_links(xyz, normal, index, slope))
-    return (normal, link) if layers is None else layers.told(normal, link, index)
+        normal = _own_planes(xyz, normal, index, _links(xyz, normal, index, widened * _SLOPE))
+    return normal, np.asarray(_links(xyz, normal, index, _SLOPE))
 
 
 def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
@@ -48,14 +52,16 @@ def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
     return float((off.sum(1) >= _FEW).mean())
 
 
-def torn(xyz: Array, normals: Array, index: Integers, slope: float) -> float:
+def torn(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
     """Return the share of links between neighbours on one sheet whose normals face opposite ways.
 
-    Arguments as in `sheet_planes`, normals (N, 3) unit vectors. It is next to nothing where normals are right. Through
-    a wall thinner than the spacing links reach its other side: there each point lies behind the other's plane. On one
-    sheet as many lie before it, so that what lies behind and is not matched by such is a wall.
+    index, link  (N, K) neighbours and links of `sheet_planes`; normals (N, 3) unit vectors
+
+    It is next to nothing where normals are right. Through a wall thinner than the spacing links reach its other side:
+    there each point lies behind the other's plane. On one sheet as many lie before it, so that what lies behind and is
+    not matched by such is a wall.
     """
-    link = np.abs(sheet_planes(xyz, index, slope)[1])
+    link = np.abs(link)
     away = xyz[index] - xyz[:, None]
     opposite = link * (np.einsum("nkd,nd->nk", normals[index], normals) < _OPPOSITE)
     here, there = np.einsum("nkd,nd->nk", away, normals), -np.einsum("nkd,nkd->nk", away, normals[index])
@@ -63,15 +69,6 @@ def torn(xyz: Array, normals: Array, index: Integers, slope: float) -> float:
     before = float(opposite[(here > 0) & (there > 0)].sum())
     walls = max(behind - before, 0.0)
     return (float(opposite.sum()) - walls) / max(float(link.sum()), 1e-300)
-
-
-_OPPOSITE = -0.5  # cosine between normals that face opposite ways
-_STEEP = 0.25  # slope of the line to a neighbour on another sheet, at least
-_ALIKE = 0.9  # cosine between normals that look the same way
-_FLAT = 3.0  # links of a point on a flat piece
-_FEW = 3
-_FIRST = 18  # neighbours that give the first plane
-_LEAST = 4.0  # links that a plane needs to be drawn anew
 
 
 @numba.njit(cache=True, nogil=True)
