@@ -109,12 +109,12 @@ def test_separate_bodies_all_stay_and_are_joined_last() -> None:
     mesh = bodies(0, 50, 150)
     tree = cluster(mesh)
     assert np.isinf(tree.cost).tolist() == [False] * (len(mesh) - 3) + [True, True]
-    labels = tree.cut_at(tree.nodes(3))
+    labels = tree.cut(3)
     body = np.digitize(mesh.centroids[:, 0], [25, 100])
     assert [np.unique(labels[body == k]).tolist() for k in range(3)] == [[2], [1], [0]]
     assert tree.volume[tree.root] == pytest.approx(mesh.volume)
     assert tree.hull[tree.root] == pytest.approx(ConvexHull(mesh.vertices).volume)
-    assert np.unique(tree.cut_at(tree.nodes(2))[body < 2]).tolist() == [1]
+    assert np.unique(tree.cut(2)[body < 2]).tolist() == [1]
 
 
 def test_single_tets_and_one_piece() -> None:

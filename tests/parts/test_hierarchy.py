@@ -28,10 +28,10 @@ def tree(count: int, seed: int = 0, volumes: bool = True) -> Hierarchy:
 
 def test_every_cut_has_its_parts_and_refines_the_one_before() -> None:
     one = tree(30)
-    before = one.cut_at(one.nodes(1))
+    before = one.cut(1)
     assert before.tolist() == [0] * 60
     for count in range(2, 31):
-        labels = one.cut_at(one.nodes(count))
+        labels = one.cut(count)
         assert np.unique(labels).tolist() == list(range(count))
         assert len(np.unique(np.stack([labels, before]), axis=1).T) == count
         sizes = [one.volume[n] for n in one.nodes(count)]
@@ -41,8 +41,7 @@ def test_every_cut_has_its_parts_and_refines_the_one_before() -> None:
 
 
 def test_parts_without_volumes_are_numbered_by_first_appearance() -> None:
-    one = tree(9, volumes=False)
-    labels = one.cut_at(one.nodes(5))
+    labels = tree(9, volumes=False).cut(5)
     first = [int(np.argmax(labels == k)) for k in range(5)]
     assert first == sorted(first)
 
@@ -62,17 +61,17 @@ def test_leaves_children_and_depth() -> None:
 def test_one_piece_is_a_tree() -> None:
     one = Hierarchy(np.zeros(4, int), np.zeros((0, 2), int), np.zeros(0), np.ones(1), np.ones(1))
     assert len(one) == 1
-    assert one.cut_at(one.nodes(1)).tolist() == [0, 0, 0, 0]
+    assert one.cut(1).tolist() == [0, 0, 0, 0]
     assert one.nodes_at_depth(2) == [0]
     with pytest.raises(BadValue, match="can be cut into 1 to 1 parts, not 2"):
-        one.cut_at(one.nodes(2))
+        one.cut(2)
 
 
 def test_a_deep_tree_is_cut_quickly() -> None:
     count = 20_000
     chain = np.stack([np.r_[0, count + np.arange(count - 2)], np.arange(1, count)], 1)
     one = Hierarchy(np.arange(count), np.sort(chain, 1), np.ones(count - 1))
-    assert np.unique(one.cut_at(one.nodes(100))).tolist() == list(range(100))
+    assert np.unique(one.cut(100)).tolist() == list(range(100))
 
 
 def test_cuts_that_are_none_are_refused() -> None:

@@ -20,7 +20,7 @@ def grown(points: np.ndarray, first: int, stamp: int = 1, space=None) -> tuple[f
     face = np.full(6 * kept, -1, np.int16)
     if hull > 0:
         face[: 3 * (2 * kept - 4)] = work.stack[: 2 * kept - 4, :3].ravel()
-    rows = np.r_[work.point[:kept, 2], rows[first:]]
+    rows = np.r_[work.kept[:kept], rows[first:]]
     bound = reach(points, rows, kept, len(rows), face, 0, hull, stamp, room() if space is None else space)
     return bound, qhull(points[:first])[0], qhull(points)[0]
 
@@ -90,7 +90,7 @@ def test_room_is_used_again_when_it_is_full() -> None:
         volume, kept = hull_volume(points, hulls.rows, len(rows), TOLERANCE, work)
         gone[[a, b]] = True
         keep(hulls, c, gone, work.point, work.stack, kept, True)
-        truth[c] = np.sort(work.point[:kept, 2])
+        truth[c] = np.sort(work.kept[:kept])
         for k, own in truth.items():
             at, length = hulls.offset[k], hulls.length[k]
             vertices = hulls.vertex[at : at + length]

@@ -22,7 +22,7 @@ def convex_hull(points: np.ndarray) -> tuple[float, np.ndarray]:
     tolerance = TOLERANCE * float(np.ptp(points, axis=0).max())
     volume, vertices = hull_volume(points, np.arange(len(points)), len(points), tolerance, work)
     assert vertices >= 0
-    return volume, np.sort(work.point[:vertices, 2])
+    return volume, np.sort(work.kept[:vertices])
 
 
 KINDS = ("ball", "sphere", "grid", "turned grid", "noisy grid", "thin", "needle", "repeated", "midpoints")

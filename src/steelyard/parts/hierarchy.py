@@ -103,6 +103,10 @@ class Hierarchy:
             found = [n for node in found for n in (self.children(node) or (node,))]
         return sorted(found)
 
+    def cut(self, count: int) -> Integers:
+        """Return the part (T,), 0..count-1, of every tet with the last count - 1 merges undone; see `cut_at`."""
+        return self.cut_at(self.nodes(count))
+
     def cut_at(self, nodes: Iterable[int]) -> Integers:
         """Return the part (T,) of every tet where each of `nodes` is a part; they must share and leave out nothing.
 

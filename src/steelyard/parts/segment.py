@@ -103,6 +103,10 @@ class Segmentation:
     def cut(self, count: int) -> Segmentation:
         """Return the solid in another number of parts: the best cut of the tree into so many."""
         nodes = self.hierarchy.nodes(count) if self.cuts is None else self.cuts.nodes(count)
+        return self.cut_at(nodes)
+
+    def cut_at(self, nodes: Sequence[int]) -> Segmentation:
+        """Return the solid in the parts that are these nodes of the hierarchy."""
         return self._labelled(self.hierarchy.cut_at(nodes))
 
     def with_labels(self, labels: Integers) -> Segmentation:

@@ -41,6 +41,11 @@ class HullWork(NamedTuple):
     stack: Any
     rim: Any
 
+    @property
+    def kept(self) -> Any:
+        """Rows of the vertices of the hull that was made last."""
+        return self.point[:, KEPT]
+
 
 @numba.njit(cache=True, nogil=True)
 def hull_work(points: int) -> HullWork:
