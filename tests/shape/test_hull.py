@@ -4,15 +4,16 @@ from __future__ import annotations
 
 from fractions import Fraction
 
+import numba
 import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 from scipy.spatial import ConvexHull
 
-from steelyard.errors import CannotAnswer
-from steelyard.shape.hull import TOLERANCE, HullWork, hull_volume, hull_work, qhull, sure_hull
+from steelyard.shape.hull import TOLERANCE, HullWork, hull_volume, hull_work, qhull
 from steelyard.shape.hulls.exact_sign import determinant
+from steelyard.shape.stand_ins import sure_hull, with_stand_ins
 from steelyard.spatial import Rotation
 
 
@@ -126,9 +127,31 @@ def cut_room(points: int, faces: int) -> HullWork:
     return work._replace(face=work.face[:faces].copy())
 
 
-def test_a_fault_of_the_kernel_is_an_error_and_no_volume() -> None:
+@numba.njit
+def hulls_of_heads(points, counts, work, known):
+    """Volume and vertices of the hull of the first points, for each of `counts`; the last one's faces."""
+    found = np.empty((len(counts), 2))
+    for k, count in enumerate(counts):
+        volume, kept = sure_hull(points, np.arange(count), count, TOLERANCE, work, known)
+        found[k, 0], found[k, 1] = volume, kept
+    return found, np.sort(work.point[:kept, 2]), work.stack[: 2 * kept - 4, :3].copy()
+
+
+def test_qhull_stands_in_for_every_fault_of_a_loop() -> None:
     points = np.random.default_rng(0).normal(size=(60, 3))
-    assert sure_hull(points, np.arange(60), 60, TOLERANCE, hull_work(60))[0] == pytest.approx(qhull(points)[0])
+    counts, runs = np.array([4, 50, 5, 60, 50]), []
+
+    def loop(work, known):
+        runs.append(len(known.volume))
+        return hulls_of_heads(points, counts, work, known)
+
+    right, rows, faces = with_stand_ins(points, lambda known: loop(hull_work(60), known))
+    assert runs == [0]
+    runs.clear()
     assert hull_volume(points, np.arange(60), 60, TOLERANCE, cut_room(60, 12))[1] == -1
-    with pytest.raises(CannotAnswer, match="fault of the program"):
-        sure_hull(points, np.arange(60), 60, TOLERANCE, cut_room(60, 12))
+    found, same, none = with_stand_ins(points, lambda known: loop(cut_room(60, 12), known))
+    assert runs == [0, 1, 2, 3]
+    np.testing.assert_allclose(found, right, rtol=1e-12)
+    np.testing.assert_array_equal(same, rows)
+    assert (faces >= 0).all()
+    assert (none == -1).all()

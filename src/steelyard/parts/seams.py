@@ -24,6 +24,7 @@ from steelyard.parts.seam_merges import Clusters, merge
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import hull_work
 from steelyard.shape.mesh import Integers
+from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
 
 # Hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them.
@@ -61,9 +62,14 @@ def seam_tree(
     weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
     moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
     centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
-    clusters = Clusters.of(volume, share, colour, centre, contact, touch)
-    hulls = hulls_of(start, member, 2 * count - 1, len(xyz))
-    merges, cost, seam, node_volume, hull = merge(xyz, clusters, hulls, _BLUNT, hull_work(len(xyz)))
+    given = volume, share, colour, centre, contact, touch
+    work = hull_work(len(xyz))
+    merges, cost, seam, node_volume, hull = with_stand_ins(
+        xyz,
+        lambda known: merge(
+            xyz, Clusters.of(*given), hulls_of(start, member, 2 * count - 1, len(xyz)), _BLUNT, work, known
+        ),
+    )
     whole = mesh.volume
     return SeamTree(Hierarchy(piece, merges, cost, node_volume * whole, hull * whole), seam)
 

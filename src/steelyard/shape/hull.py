@@ -3,8 +3,8 @@
 A point is added where it lies more than a tolerance above a face; which faces it sees is then decided by the exact sign
 of a determinant: in double precision with an error bound, in double-double where that cannot tell, and last without any
 rounding. So the surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points
-within the tolerance of the hull are left out. Its topology is checked all the same: a fault, of which none is known, is
-reported, never a wrong volume.
+within the tolerance of the hull are left out. Its topology is checked all the same: a fault is reported, never a wrong
+volume, and Qhull's hull stands in for it (`stand_ins`).
 
 Source: Barber, Dobkin, Huhdanpaa 1996, "The Quickhull algorithm for convex hulls" (outside sets, farthest point first);
 Shewchuk 1997, "Adaptive precision floating-point arithmetic" (error bounds, exact differences and products).
@@ -18,7 +18,6 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import CannotAnswer
 from steelyard.shape.hulls.borrowed import borrowed, integer
 from steelyard.shape.hulls.hull_faces import (
     FAR,
@@ -37,7 +36,7 @@ from steelyard.shape.hulls.hull_faces import (
 )  # fmt: skip
 from steelyard.shape.mesh import Integers
 
-__all__ = ["TOLERANCE", "HullWork", "hull_volume", "hull_work", "qhull", "sure_hull"]
+__all__ = ["TOLERANCE", "HullWork", "hull_volume", "hull_work", "qhull"]
 
 # Of the extent: nearer to the hull, a point is on it. Rounding of turned, coplanar points is a thousandth.
 TOLERANCE = 1e-13
@@ -98,18 +97,6 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
                 return np.nan, -1
             waiting = share_out(xyz, point, plane, face, stack, loose, edges, waiting, used, noise)
     return total(point, plane, face, stack, rows, used)
-
-
-@numba.njit(cache=True, nogil=True, forceinline=True)
-def sure_hull(points: Array, rows: Any, count: int, tolerance: float, work: HullWork) -> tuple[float, int]:
-    """Return what `hull_volume` does; CannotAnswer where that is a fault."""
-    volume, kept = hull_volume(points, rows, count, tolerance, work)
-    if kept < 0:
-        raise CannotAnswer(
-            "the convex hull of some points of the solid came out wrong, which is a fault of the program, not of the "
-            "points: please report it. Meanwhile leave out a few points, or turn the cloud a little."
-        )
-    return volume, kept
 
 
 def qhull(points: Array) -> tuple[float, Integers]:
