@@ -24,7 +24,7 @@ FOOT = 12 * INCH
 # The ratio of two levers is a unit's if it is within this share of one, beside three standard deviations.
 NEAR = 0.02
 # No hand holds a mass this far from its sensor [m]; few hold one farther than the second. Less [kg] is no load of kN.
-FURTHEST_ARM, HELD, LIGHT = 2.0, 0.5, 0.02
+FURTHEST_ARM, HELD, LIGHT = 2.0, 0.3, 0.02
 # A lever that is told by motion this many standard deviations and this share off is another.
 SURE, SHARE = 5.0, 0.05
 
@@ -202,7 +202,7 @@ def _agrees(unit: Unit, moment: Array, felt: Array, std: Array) -> bool:
 
 def _which(where: str, found: StaticFit, likely: list[Unit]) -> str:
     ways = "; ".join(
-        f"if {unit.words}, it is {1e3 * unit.ratio * found.arm:.2g} mm, with {unit.force * abs(found.mass):.3g} kg"
+        f"if {unit.words}, it is {1e3 * unit.ratio * found.arm:.3g} mm, with {unit.force * abs(found.mass):.3g} kg"
         for unit in likely
     )
     return (
