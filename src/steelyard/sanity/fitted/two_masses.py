@@ -103,9 +103,8 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         f"gravity as that of {found.weighed:.3g} kg: "
     )
     # About one axis a lever passes for a mass, and noise of either draws both.
-    share = NOISE * found.noise if planar_finding(log.gravity) else 0.0
-    sure = short > (SHARE + share) * abs(found.mass) or _taken_away(two_masses(log, bending=True), share)
-    if _taken_away(found, share) and sure:
+    least = SHARE + NOISE * found.noise if planar_finding(log.gravity) else SCALED
+    if _taken_away(found, least) and _taken_away(two_masses(log, bending=True), least):
         other = clock_words(found.mass, found.weighed)
         return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
@@ -123,8 +122,8 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
     return ()
 
 
-def _taken_away(found: TwoMasses | None, share: float) -> bool:
-    """Tell whether less is weighed than is accelerated, beyond what noise and scales do, and this share of the mass."""
+def _taken_away(found: TwoMasses | None, least: float) -> bool:
+    """Tell whether less is weighed than is accelerated beyond doubt, and by more than this share of the mass."""
     if found is None:
         return False
-    return float(found.less[0]) > max(TAKEN * float(found.less_std[0]), (SCALED + share) * abs(found.mass))
+    return float(found.less[0]) > max(TAKEN * float(found.less_std[0]), least * abs(found.mass))

@@ -183,5 +183,5 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
     if view.acceleration is None or reading.rotation is None:
         return 0
     masses, spread, _ = both_masses(view, reading.gravity, reading.rotation)
-    sure = abs(masses[0]) > 5 * spread[0] and 0.5 < abs(masses[0] / masses[1]) < 2
+    sure = abs(masses[0]) > 5 * spread[0] and 0.5 * abs(masses[1]) < abs(masses[0]) < 2 * abs(masses[1])
     return int(np.sign(masses[0])) if sure else 0
