@@ -13,7 +13,8 @@ REMEDIES: dict[str, str] = {
     "wrench-sign-flipped": 'Set wrench = "on-sensor" in [log] or the [[robot]] ("on-object" if that is "on-sensor").',
     "gravity-frame": "Check [log] gravity (in the world frame) and that rotation turns S into W, not W into S.",
     "gravity-in-g": 'Set unit = "g" for this channel, or correct [log] gravity to m/s^2.',
-    "weight-compensated": "Set the payload in the controller, or in the sensor's driver, to zero, and record again.",
+    "weight-compensated": "Set the payload in the controller, or in the sensor's driver, to zero, and record again; or "
+    "reckon: mass = set + answered, centre of mass = both centres, weighted by mass.",
     "motion-mismatch": "Check that the position is that of S, its unit, the unit of time, and filters of the force.",
     "wrench-unexplained": "Check order and signs of columns, angles, clocks, and a payload set in the controller.",
     "force-unit": "Check the force and torque units of the wrench stream.",
@@ -35,7 +36,7 @@ REMEDIES: dict[str, str] = {
     "contact": "Keep people and fixtures off the object, then record again; the touched time was left out.",
     "load-changed": "Record one run per load: cut the log where the load changed.",
     "too-few-poses": "Add still poses whose gravity directions in S differ by more than 30 degrees.",
-    "nearly-planar": "Turn the object about a second axis as well, so that gravity visits all axes of S.",
+    "nearly-planar": "Add poses that tilt gravity out of that plane, so that it visits all axes of S.",
     "inertia-not-identified": "Turn the object faster about the weak axes, with stops between the turns.",
     "prior-dominated": "Add faster rotation; the number shown is mostly the assumed prior.",
     "noise-level-off": "Correct [noise], or leave it out so that it is estimated.",

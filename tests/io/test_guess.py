@@ -165,6 +165,7 @@ def test_npz_with_usual_arrays(tmp_path: Path) -> None:
         ("1 2", "the file has no header. It has 2 columns."),
         ("fx[lb] fy fz tx ty tz qw qx qy qz", 'unknown unit "lb" of force; possible are N, kN, kgf, lbf. Columns here: fx[lb], fy, fz, tx, ty, tz, qw, qx, qy, qz.'),
         ("fx[N] fy[kN] fz tx ty tz qw qx qy qz", "the columns of force have different units, N and kN; write them in one. Columns here: fx[N], fy[kN], fz, tx, ty, tz, qw, qx, qy, qz."),
+        ("fx fy fz tx[Ncm] ty tz qw qx qy qz", 'unknown unit "Ncm" of torque; possible are N*m, N*mm, kgf*m, lbf*in; multiply its numbers by 0.01 and declare "N*m". Columns here: fx, fy, fz, tx[Ncm], ty, tz, qw, qx, qy, qz.'),
         ("fx fy fz tx[Nm] ty[N*m] tz[N*mm] qw qx qy qz", "the columns of torque have different units, N*m and N*mm; write them in one. Columns here: fx, fy, fz, tx[Nm], ty[N*m], tz[N*mm], qw, qx, qy, qz."),
         ("fx fy fz tx ty tz gx gy gz", "nothing says where gravity points in the sensor frame. Columns here: fx, fy, fz, tx, ty, tz, gx, gy, gz."),
         ("t fx fy fz tx ty tz qw qx qy qz", "time rises by 2000 per row, which can hardly be seconds. Columns here: t, fx, fy, fz, tx, ty, tz, qw, qx, qy, qz."),

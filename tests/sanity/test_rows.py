@@ -122,6 +122,16 @@ def test_directions() -> None:
     assert len(directions(flat)) >= 4
 
 
+def test_what_is_said_of_a_plane_is_true() -> None:
+    """Rms and the largest angle from it both."""
+    angle = np.linspace(0, 6, 400)
+    up = np.sin(np.radians(np.where(np.arange(400) % 40 == 0, 15.0, 0.0)))
+    down = np.stack([np.cos(angle) * np.sqrt(1 - up**2), np.sin(angle) * np.sqrt(1 - up**2), up], 1) * 9.8
+    (found,) = coverage(down)
+    rms, most = np.degrees(np.arcsin(up.std())), np.degrees(np.arcsin(np.abs(up - up.mean()).max()))
+    assert f"by {rms:.1f} degrees rms, {most:.1f} at most" in found.message
+
+
 def noisy(rows: int = 1000) -> Stream:
     rng, time = np.random.default_rng(0), np.arange(rows) / 100
     return Stream("a.csv", {"force": rng.normal(size=(rows, 3)), "torque": rng.normal(size=(rows, 3))}, time)

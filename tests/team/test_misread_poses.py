@@ -41,8 +41,8 @@ SPOILED: dict[str, tuple[Spoil, str]] = {
     "cm as mm": (scaled(0.1), "10 times too small, as when cm are read as mm"),
     "inches as mm": (scaled(1 / 25.4), "25.4 times too small, as when inches are read as mm"),
     "transposed": (lambda R, p: (turned_back(R), p), "rotation turns W into S, not S into W"),
-    "w last": (lambda R, p: (rolled(R, 1), p), "w first where it is last"),
-    "w first": (lambda R, p: (rolled(R, -1), p), "w last where it is first"),
+    "w last": (lambda R, p: (rolled(R, 1), p), "in the order x, y, z, w, not w, x, y, z"),
+    "w first": (lambda R, p: (rolled(R, -1), p), "in the order w, x, y, z, not x, y, z, w"),
     "inverted": (
         lambda R, p: (turned_back(R), -np.einsum("tji,tj->ti", R, p)),
         "poses are those of its home in its grasp",
@@ -193,5 +193,5 @@ def test_a_large_noisy_team_is_judged_robot_by_robot(monkeypatch: pytest.MonkeyP
 def test_a_misreading_is_named_beside_a_robot_that_lets_go() -> None:
     """Rows in which it holds nothing fit no reading; what fits without them may be called robots that let go."""
     log = made(5, kinds=("motion",), motion_samples=2500, presence=(Presence(3, leaves=12.0),))
-    with pytest.raises(BadValue, match=r"if those of 'robot0' are misread \(.*w last where it is first"):
+    with pytest.raises(BadValue, match=r"if those of 'robot0' are misread \(.*in the order w, x, y, z, not x, y, z, w"):
         JointTeam().identify(spoiled(log, "robot0", SPOILED["w first"][0]))

@@ -30,6 +30,26 @@ UNITS: dict[str, dict[str, float]] = {
     "carrying": {"1": 1.0},
 }
 
+# Units that are not read: quantity -> letters of the unit -> what to multiply by, and the unit that is then declared.
+_OTHERS: dict[str, dict[str, tuple[float, str]]] = {
+    "force": {"mN": (1e-3, "N"), "daN": (10, "N"), "gf": (1e-3, "kgf"), "ozf": (1 / 16, "lbf"), "klbf": (1e3, "lbf")},
+    "torque": {
+        "Ncm": (0.01, "N*m"),
+        "mNm": (1e-3, "N*m"),
+        "cNm": (0.01, "N*m"),
+        "kNm": (1e3, "N*m"),
+        "kgfcm": (0.01, "kgf*m"),
+        "kgfmm": (1e-3, "kgf*m"),
+        "lbfft": (12, "lbf*in"),
+        "ftlbf": (12, "lbf*in"),
+        "ozfin": (1 / 16, "lbf*in"),
+    },
+    "position": {"cm": (0.01, "m"), "in": (INCH, "m"), "inch": (INCH, "m")},
+    "linear_velocity": {"mm/s": (1e-3, "m/s"), "cm/s": (0.01, "m/s")},
+}
+# Pounds or kilograms that mean forces, and plurals.
+_LOOSE = re.compile("[fs]")
+
 _EARTH = (9.76, 9.84)
 # What stands between the letters of a unit, or nothing: N*m, N m, N.m, N·m, Nm; m/s^2, m/s2.
 _BETWEEN = re.compile(r"[\s*·⋅.^-]")
@@ -48,6 +68,24 @@ def spelled(quantity: str, unit: str) -> str:
     """Return the unit of a quantity as it is spelled here: "Nm", "N m" and "N·m" are "N*m". Unknown ones stay."""
     letters = _letters(unit)
     return next((known for known in UNITS[quantity] if _letters(known) == letters), unit)
+
+
+def instead(quantity: str, unit: str) -> str:
+    """Return ' ..' on what to do about a unit that is not read, or nothing: no unit of another size is suggested."""
+    how = converted(quantity, unit)
+    if how:
+        return f" {how[0].upper()}{how[1:]}."
+    loose = _LOOSE.sub("", _letters(unit))
+    near = (known for known in UNITS[quantity] if _LOOSE.sub("", _letters(known)).lower() == loose.lower())
+    return next((f' Did you mean "{known}"?' for known in near), "")
+
+
+def converted(quantity: str, unit: str) -> str:
+    """Return how to write numbers of a unit that is not read in one that is; nothing for a unit that nobody uses."""
+    loose = _LOOSE.sub("", _letters(unit))
+    others = _OTHERS.get(quantity, {}).items()
+    times, known = next((to for other, to in others if _LOOSE.sub("", other) == loose), (0.0, ""))
+    return f'multiply its numbers by {times:g} and declare "{known}"' if known else ""
 
 
 def _letters(unit: str) -> str:

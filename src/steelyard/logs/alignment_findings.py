@@ -140,9 +140,11 @@ def planar_finding(gravity: Array) -> tuple[Finding, ...]:
         return ()
     axis = axes[:, 0] * np.sign(axes[np.abs(axes[:, 0]).argmax(), 0])
     shown = ", ".join(f"{v:.2f}" for v in np.round(axis, 2) + 0.0)
+    across = np.abs((gravity - gravity.mean(0)) @ axes[:, 0]) / size
+    rms, most = np.degrees(np.arcsin(np.minimum([stds[0], across.max()], 1.0)))
     message = (
-        f"Gravity keeps within {np.degrees(np.arcsin(min(stds[0], 1.0))):.1f} degrees of one plane in S; "
-        f"across that plane, along ({shown}), a bias and a load look alike."
+        f"Gravity leaves one plane in S by {rms:.1f} degrees rms, {most:.1f} at most; across that plane, along "
+        f"({shown}), only so much tells a load from a bias."
     )
     return (Finding.of("nearly-planar", message),)
 

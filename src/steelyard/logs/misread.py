@@ -127,11 +127,14 @@ MISREAD = (
     *(
         Misread(
             "quaternion-order",
-            f"the four numbers of each quaternion were read with {order}",
+            f"the four numbers of each quaternion are {order}",
             None,
             lambda R, places=places: rolled(R, places),  # type: ignore[misc]
         )
-        for places, order in ((-1, "w first where it is last"), (1, "w last where it is first"))
+        for places, order in (
+            (-1, "in the order x, y, z, w, not w, x, y, z as was said or assumed"),
+            (1, "in the order w, x, y, z, not x, y, z, w as was said or assumed"),
+        )
     ),
     Misread(
         "gravity-frame",

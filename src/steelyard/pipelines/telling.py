@@ -31,6 +31,8 @@ FOLLOWS_NOT = (
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}
 # Findings of what a load and a bias share: a tared sensor has no bias.
 OF_BIAS = {"nearly-planar"}
+# Bars so small, of the mass as a share of it and of the centre of mass [m], do not suffer from that.
+SMALL_BARS = (0.002, 1e-4)
 # A gain of the forces that no calibration rules out, and the share of it below which a bar of the mass says too much.
 GAIN, TIGHT = 0.01, 0.5
 # Units that are named after the fit, and so were not put right before it.
@@ -84,8 +86,15 @@ def told(estimate: Estimate, noticed: Noticed, rows: FitRows, load: Load, parts:
     # In a wrong unit that was left in, rows only seem touched.
     touched = () if any(f.code in OF_UNITS for f in late) else rows.touched
     found = (*before, *late, *of_sensor, *estimate.findings, *rows.aligned.findings, *touched)
-    found = tuple(f for f in found if load.bias.free or f.code not in OF_BIAS)
+    shared = load.bias.free and _suffers(estimate)
+    found = tuple(f for f in found if shared or f.code not in OF_BIAS)
     return replace(estimate, findings=()).with_findings(*found)
+
+
+def _suffers(estimate: Estimate) -> bool:
+    """Tell whether bars of mass or centre of mass are so wide that what a load and a bias share may be why."""
+    share, far = SMALL_BARS
+    return bool(estimate.std[0] > share * estimate.mass or (estimate.std[1:4] > far).any())
 
 
 def uncalibrated(estimate: Estimate) -> tuple[str, ...]:

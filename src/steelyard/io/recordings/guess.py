@@ -34,7 +34,7 @@ from steelyard.io.streams.usual_names import (
 )
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table
-from steelyard.io.units import UNITS
+from steelyard.io.units import UNITS, converted
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 _UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
@@ -135,7 +135,8 @@ def _vector_spec(
         raise cannot_tell(table, reason, own_lines(table, names))
     unit = said[0] if said else None
     if unit is not None and unit not in UNITS[quantity]:
-        reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}'
+        how = converted(quantity, unit)
+        reason = f'unknown unit "{unit}" of {quantity}; possible are {listed(list(UNITS[quantity]))}{how and "; "}{how}'
         raise cannot_tell(table, reason, own_lines(table, names))
     if unit is None:
         unit = unit_by_size(quantity, np.stack([cells[n] for n in numbers], -1))

@@ -11,7 +11,7 @@ from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, listed
 from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
 from steelyard.io.table_header import Column
-from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, spelled
+from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, instead, spelled
 from steelyard.logs.recording import QUANTITIES, Mount
 from steelyard.spatial import Rotation
 
@@ -160,7 +160,10 @@ def _quantity(stream: Entry, name: str, arm: bool) -> QuantitySpec:
     units = list(UNITS[name])
     said = entry.values.get("unit", units[0])
     if isinstance(said, str):
-        entry = Entry({**entry.values, "unit": spelled(name, said)}, entry.where)
+        unit = spelled(name, said)
+        if unit not in units:
+            raise entry.error(f'unknown unit "{said}".{instead(name, said)} Possible here: {listed(units)}.')
+        entry = Entry({**entry.values, "unit": unit}, entry.where)
     unit = entry.choice("unit", units, units[0])
     frame = entry.choice("frame", ("S", "W"), "S") if framed else "W" if name == "position" else "S"
     of_arm = name == "joint_position" and arm

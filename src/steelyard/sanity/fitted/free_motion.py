@@ -7,15 +7,13 @@ a factor of its own. Noise does not go with them in stretches of the log that we
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.findings import Finding, codes
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import FEWEST_BLOCKS, Rows
-from steelyard.sanity.fitted.seen_motion import CALM, noise_share
+from steelyard.sanity.fitted.seen_motion import CALM, at_rest, noise_share
 from steelyard.sanity.fitted.two_masses import ELSEWHERE
 
 # It is said where accelerations explain so much of what is left, in stretches that were left out, and that is so much
@@ -57,9 +55,7 @@ def following(log: MotionLog) -> dict[str, float]:
     left = (rows.values - rows.columns @ fit.solution)[moving]
     motion = np.concatenate([rows.log.angular_acceleration, rows.log.acceleration], 1)[moving]
     predicted = _unseen(np.concatenate([motion, np.ones((len(motion), 1))], 1), left, block)
-    nothing = np.zeros_like(rows.log.gravity)
-    at_rest = replace(rows.log, acceleration=nothing, angular_velocity=nothing, angular_acceleration=nothing)
-    made = (rows.log.predicted(fit.phi) - at_rest.predicted(fit.phi))[moving]
+    made = (rows.log.predicted(fit.phi) - at_rest(rows.log).predicted(fit.phi))[moving]
     out = {}
     for kind, part in _KINDS.items():
         before, after = _square(left[:, part]), _square(left[:, part] - predicted[:, part])

@@ -19,7 +19,8 @@ from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
 from steelyard.sanity.fitted.two_masses import ELSEWHERE, two_masses
-from steelyard.sanity.readings.torques import UNITS, compared
+from steelyard.sanity.readings.levers import UNITS, compared
+from steelyard.sanity.readings.torques import opposed
 from steelyard.spatial import cross_matrix
 
 # A point this far [m] from S is worth a word, if it is so many standard deviations from none, by leaving out stretches,
@@ -91,7 +92,7 @@ class Misplaced:
     @property
     def of_a_unit(self) -> bool:
         """Whether it lies where the wrong unit of force or torque, or the other sign of torques, puts it."""
-        ways = np.array([1 - factor for factor in (*(factor for factor, _ in UNITS), 1e3, 1e-3)])
+        ways = np.array([1 - unit.ratio for unit in UNITS])
         gaps = np.linalg.norm(self.place - ways[:, None] * self.com, axis=1)
         return self._of_a_sign or bool((gaps < NEAR * np.linalg.norm(self.place)).any())
 
@@ -212,7 +213,7 @@ def examine_place(
         return None, ()
     ratio, std = found.larger
     # A point at the centre of mass itself has no ratio that tells.
-    return None, compared(ratio, std) if std < TOLD * abs(ratio) else ()
+    return None, (opposed(ratio, std) or compared(ratio, std)) if std < TOLD * abs(ratio) else ()
 
 
 def _lever(log: MotionLog) -> Array:

@@ -16,7 +16,7 @@ from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import ROUNDED_GRAVITY
-from steelyard.sanity.readings.torques import UNITS
+from steelyard.sanity.readings.levers import UNITS
 
 # Chi-square per degree of freedom above which no body explains a wrench, and what another unit must bring it down to:
 # of 150 made logs of sound sensors, on arms that bend and drift, none has more than 1.6.
@@ -49,7 +49,7 @@ def examine_wrench_unit(
     chi2 = estimate.evidence.chi2_per_dof
     if chi2 is None or chi2 <= UNEXPLAINED or codes((*before, *late)) & ELSEWHERE:
         return late
-    larger = [(1 / factor, words) for factor, words in UNITS if 1 < 1 / factor < LARGEST]
+    larger = [(1 / u.ratio, u.words) for u in UNITS if 1 < 1 / u.ratio < LARGEST]
     explain = sorted((times, words) for times, words in larger if _left(identify, log, times) < SOUND)
     if not explain:
         return late

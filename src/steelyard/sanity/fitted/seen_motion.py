@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from steelyard.logs.log import MotionLog
@@ -15,6 +17,12 @@ _FEWEST_ROWS = 50
 def moves(log: MotionLog) -> bool:
     """Tell whether all channels measure, and enough rows are seen to be accelerated."""
     return not log.dead.any() and (~log.still).sum() >= _FEWEST_ROWS and bool(log.acceleration.any())
+
+
+def at_rest(log: MotionLog) -> MotionLog:
+    """Return the log as if nothing moved: gravity alone is left."""
+    nothing = np.zeros_like(log.gravity)
+    return replace(log, acceleration=nothing, angular_velocity=nothing, angular_acceleration=nothing)
 
 
 def noise_share(log: MotionLog) -> float:

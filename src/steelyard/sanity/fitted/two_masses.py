@@ -6,7 +6,7 @@ of length or time, or a force behind a slow filter give accelerations that the l
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -15,7 +15,8 @@ from steelyard.findings import Finding, codes
 from steelyard.logs.alignment_findings import planar_finding
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
+from steelyard.sanity.fitted.seen_motion import CALM, NOISE, at_rest, moves, noise_share
+from steelyard.sanity.fitted.slow_sensor import taken_away
 from steelyard.sanity.readings.both_masses import TAKEN_AWAY, clock_words
 from steelyard.spatial import cross_matrix
 
@@ -23,8 +24,11 @@ from steelyard.spatial import cross_matrix
 # distance [m], and leaves less of the squared residual.
 SURE, SHARE, APART, LEFT = 5.0, 0.1, 0.02, 0.99
 # A cable pulls back in the rhythm of a motion, as a mass that is not weighed would: a controller is blamed beyond so
-# many.
-TAKEN = 8.0
+# many, and beyond this share, which a scale of lengths or clocks may make of accelerations.
+TAKEN, SCALED = 8.0, 0.02
+# An arm that bends, or poses through a filter, are told by what goes with the square of the frequency, as of a filter
+# of this delay [s].
+BENDING = 0.005
 # No tool's tip is farther [m] from the sensor.
 FARTHEST = 5.0
 # Below this share a controller has not only taken a weight away.
@@ -60,15 +64,22 @@ class TwoMasses:
         return np.asarray(self.less[1:] - self.less[0] * self.first_moment / self.mass) / self.weighed
 
 
-def two_masses(log: MotionLog) -> TwoMasses | None:
-    """Return both masses; None for too few moving rows or channels that do not measure."""
+def two_masses(log: MotionLog, bending: bool = False) -> TwoMasses | None:
+    """Return both masses; None for too few moving rows or channels that do not measure.
+
+    bending  whether quick accelerations may be larger or smaller than was read
+    """
     if log.noise is None or not moves(log):
         return None
-    rows, _ = Rows.of(log)
-    once = rows.solve()
-    fit = rows.solve(_weight(rows.log.gravity), jackknife=True)
+    rows, pick = Rows.of(log)
+    once, extra = rows.solve(), _weight(rows.log.gravity)
+    if bending and log.time is not None:
+        still = at_rest(log)
+        made = replace(still, acceleration=log.acceleration).predicted(once.phi) - still.predicted(once.phi)
+        extra = np.concatenate([extra, taken_away(log.time, made, BENDING)[pick, :, None]], 2)
+    fit = rows.solve(extra, jackknife=True)
     phi, left = fit.phi, fit.beside(once)
-    return TwoMasses(float(phi[0]), phi[1:4], fit.extra, fit.extra_std, left, noise_share(log))
+    return TwoMasses(float(phi[0]), phi[1:4], fit.extra[:4], fit.extra_std[:4], left, noise_share(log))
 
 
 def _weight(gravity: Array) -> Array:
@@ -92,8 +103,8 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         f"gravity as that of {found.weighed:.3g} kg: "
     )
     # About one axis a lever passes for a mass, and noise of either draws both.
-    share = SHARE + (NOISE * found.noise if planar_finding(log.gravity) else 0.0)
-    if short > max(TAKEN * spread, share * abs(found.mass)):
+    least = SHARE + NOISE * found.noise if planar_finding(log.gravity) else SCALED
+    if _taken_away(found, least) and _taken_away(two_masses(log, bending=True), least):
         other = clock_words(found.mass, found.weighed)
         return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
@@ -109,3 +120,10 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
         )
         return (Finding.of("motion-mismatch", text),)
     return ()
+
+
+def _taken_away(found: TwoMasses | None, least: float) -> bool:
+    """Tell whether less is weighed than is accelerated beyond doubt, and by more than this share of the mass."""
+    if found is None:
+        return False
+    return float(found.less[0]) > max(TAKEN * float(found.less_std[0]), least * abs(found.mass))

@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, about
 from steelyard.sanity.readings.glance import Glance
-from steelyard.sanity.readings.static_fit import beside, solve
+from steelyard.sanity.readings.static_fit import beside, solve, varies
 
 # The weight is that of less than this share of the mass that is accelerated, beyond so many standard deviations.
 SHARE, SURE = 0.8, 5.0
@@ -56,7 +56,7 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
 
     gravity (3,) [m/s^2] in W and rotation (N, 3, 3) as the log is read.
     """
-    if view.acceleration is None or rotation is None:
+    if view.acceleration is None or rotation is None or not varies(view, gravity, rotation):
         return ()
     masses, spread, left = both_masses(view, gravity, rotation)
     moved, weighed = float(masses[0]), float(np.sign(masses[0]) * masses[1])

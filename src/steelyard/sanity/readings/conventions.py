@@ -17,8 +17,9 @@ from steelyard.findings import REMEDIES, Finding, percent
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.blind_tilt import blind_tilt
 from steelyard.sanity.readings.both_masses import both_masses, examine_both_masses
-from steelyard.sanity.readings.glance import Glance, glance, stream_of
+from steelyard.sanity.readings.glance import Glance, glance
 from steelyard.sanity.readings.level import examine_level
+from steelyard.sanity.readings.levers import far_away
 from steelyard.sanity.readings.rivals import (
     GOOD,
     MUCH_BETTER,
@@ -32,14 +33,11 @@ from steelyard.sanity.readings.rivals import (
 from steelyard.sanity.readings.swapped import examine_swapped
 from steelyard.sanity.readings.tilt import blind_axis
 from steelyard.sanity.readings.torques import examine_torques
-from steelyard.sanity.readings.units import scaled
 from steelyard.sanity.readings.weightless import require_weight
 from steelyard.sanity.rows.leaps import examine_leaps
 
 # So many mistakes of one description are put right.
 MOST_MISTAKES = 4
-# No hand holds a mass this far from its sensor [m].
-FURTHEST_ARM = 2.0
 
 
 def examine_conventions(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -79,7 +77,7 @@ def _judged(recording: Recording, view: Glance) -> tuple[Recording, tuple[Findin
     read, findings = (recording, ()) if left_over else _signs(recording, view, reading)
     if findings:
         return read, findings
-    for step in (_lengths if named else _units_of, examine_level):
+    for step in (far_away if named else _units_of, examine_level):
         read, findings = step(recording, view, reading)
         if read is not recording:
             return read, findings
@@ -95,7 +93,7 @@ def _judged(recording: Recording, view: Glance) -> tuple[Recording, tuple[Findin
 def _units_of(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording with torques that belong to the forces, and what is said of those that do not."""
     read, findings = examine_torques(recording, view, reading)
-    return (read, findings) if findings else _lengths(recording, view, reading)
+    return (read, findings) if findings else far_away(recording, view, reading)
 
 
 def examine_turns(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -185,27 +183,5 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
     if view.acceleration is None or reading.rotation is None:
         return 0
     masses, spread, _ = both_masses(view, reading.gravity, reading.rotation)
-    sure = abs(masses[0]) > 5 * spread[0] and 0.5 < abs(masses[0] / masses[1]) < 2
+    sure = abs(masses[0]) > 5 * spread[0] and 0.5 * abs(masses[1]) < abs(masses[0]) < 2 * abs(masses[1])
     return int(np.sign(masses[0])) if sure else 0
-
-
-def _lengths(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording with torques in N m where the centre of mass lies metres away."""
-    found = reading.fit
-    size, spread = float(np.linalg.norm(found.moment)), float(np.linalg.norm(found.moment_std))
-    if not found.sign or found.arm < FURTHEST_ARM or size < 5 * spread or found.torque_share > 0.7:
-        return recording, ()
-    where = f"The centre of mass comes out {found.arm:.3g} m from the sensor, with a mass of {abs(found.mass):.3g} kg"
-    stream = stream_of(recording, "force", "torque")
-    if stream is None:
-        return recording, ()
-    if found.arm / 1000 < FURTHEST_ARM and abs(found.mass) < 0.02:
-        message = (
-            f"{where}: the force is a thousand times too small, as when kN are read as N; it was multiplied by 1000."
-        )
-        return scaled(recording, stream, "force", 1e3), (Finding.of("force-unit", message),)
-    if found.arm / 1000 < FURTHEST_ARM:
-        message = f"{where}: the torque is in N mm; it was divided by 1000."
-        return scaled(recording, stream, "torque", 1e-3), (Finding.of("length-in-mm", message),)
-    message = f"{where}: the units of force and torque do not belong together."
-    return recording, (replace(Finding.of("force-unit", message), left_in=True),)

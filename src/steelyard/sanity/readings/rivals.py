@@ -22,7 +22,7 @@ from steelyard.findings import Finding, percent
 from steelyard.logs.misread import INVERTED, MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
-from steelyard.sanity.readings.static_fit import StaticFit, better_fit
+from steelyard.sanity.readings.static_fit import StaticFit, better_fit, varies
 from steelyard.sanity.readings.tilt import GlanceTilt, tilt_of, turned_sensor
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
@@ -92,7 +92,7 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
             if r.fit.force_share < min(bar, 0.5)
             and r.fit.torque_share < 1.2 * given.fit.torque_share + 1e-3
             and r.fit.sign != 0
-            and _varies(view, r)
+            and varies(view, r.gravity, r.rotation)
             and _beats_tilt(r, free)
             and (r.view is None or r.fit.torque_share < TORQUES_TOO)
         ]
@@ -217,12 +217,6 @@ def _beats_tilt(rival: Reading, free: GlanceTilt | None) -> bool:
     if rival.misread is not None or rival.view is not None:
         return rival.fit.force_share < 0.5 * free.force_share
     return rival.fit.force_share < 2 * free.force_share + 1e-3
-
-
-def _varies(view: Glance, reading: Reading) -> bool:
-    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size."""
-    pull = view.still.seen(reading.gravity, reading.rotation).pull
-    return float(np.sqrt(pull.var(0).sum())) > 0.05 * float(np.linalg.norm(reading.gravity))
 
 
 def rival_findings(best: Reading, given: Reading) -> tuple[Finding, ...]:

@@ -12,6 +12,8 @@ from steelyard.spatial import cross_matrix
 
 # A fit that leaves less than this share of the variance is as good as perfect: no rival can be better.
 LEAST_SHARE = 1e-4
+# Gravity that moves about in S by less than this share of its size tells no weight from a bias.
+TURNING = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -63,6 +65,15 @@ def better_fit(view: Glance, gravity: Array, rotation: Array | None) -> StaticFi
     """
     views = (view,) if view.acceleration is None else (view, view.still)
     return min((fit(v.seen(gravity, rotation), v.block) for v in views), key=lambda found: found.force_share)
+
+
+def varies(view: Glance, gravity: Array, rotation: Array | None) -> bool:
+    """Tell whether gravity, so read, moves about in S by more than a twentieth of its size.
+
+    gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
+    """
+    pull = view.still.seen(gravity, rotation).pull
+    return float(np.sqrt(pull.var(0).sum())) > TURNING * float(np.linalg.norm(gravity))
 
 
 def columns(seen: Seen) -> tuple[Array, Array]:

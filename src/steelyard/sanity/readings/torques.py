@@ -13,12 +13,12 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding, percent
-from steelyard.logs.recording import STANDARD_GRAVITY, Recording
+from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, Seen, in_axes
+from steelyard.sanity.readings.levers import by_motion
 from steelyard.sanity.readings.mirrored import REFLECTIONS, in_words
 from steelyard.sanity.readings.rivals import BESIDE, Reading, misread_rotations
 from steelyard.sanity.readings.static_fit import columns, solve
-from steelyard.sanity.readings.units import scaled
 
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
 # second share, and fit well where they leave less than the third.
@@ -30,19 +30,6 @@ MUCH_BETTER = 0.1
 _FEWEST_ROWS = 6
 # The ratio of both first moments must be known so well, and they lie so nearly along one line.
 SURE, ALONG = 0.05, 0.2
-# It is a unit's if it is within this share of one, beside three standard deviations.
-NEAR = 0.02
-# What forces read too large by beside torques, and what explains it. Thousands show by where the centre of mass lies.
-UNITS = (
-    (4.44822, "forces in N are read as lbf"),
-    (1 / 4.44822, "forces in lbf are read as N"),
-    (STANDARD_GRAVITY, "forces in N are read as kgf, or torques in kgf*m as N*m"),
-    (1 / STANDARD_GRAVITY, "forces in kgf are read as N, or torques in N*m as kgf*m"),
-    (1 / 0.112985, "torques in N*m are read as lbf*in"),
-    (0.112985, "torques in lbf*in are read as N*m"),
-    (100.0, "torques in N*m are read as N*cm"),
-    (0.01, "torques in N*cm are read as N*m"),
-)
 REMEDY = "Check order and signs of the torque columns in the description."
 WHICH = "Check order, form, unit and sense of the rotation, and the frame of the torque."
 ABOUT_S = "Take position x force away from the torques, all in the axes of W, or log the wrench at the sensor."
@@ -73,20 +60,8 @@ def examine_torques(recording: Recording, view: Glance, reading: Reading) -> tup
     ratio = _ratio(felt, float(np.linalg.norm(force_std[1:4])), moment[:3])
     if ratio is None:
         return recording, ()
-    if abs(ratio[0] / 1000 - 1) < NEAR + 3 * ratio[1] / 1000:
-        return _in_newton_metres(recording, *ratio)
     # The other sign looks like positions of a tip as far behind the centre of mass: all rows tell them apart later.
-    return recording, () if ratio[0] < 0 else compared(*ratio)
-
-
-def _in_newton_metres(recording: Recording, ratio: float, std: float) -> tuple[Recording, tuple[Finding, ...]]:
-    """Return the recording with torques a thousand times larger, and what is said of it."""
-    stream = next(s for s in recording.streams if "torque" in s.channels)
-    text = (
-        f"What turns shows the centre of mass {ratio:.0f} ± {std:.1g} times as far from S as the torques do: they are "
-        "in N m, not in N mm, and were multiplied by 1000."
-    )
-    return scaled(recording, stream, "torque", 1e3), (Finding.of("length-in-mm", text),)
+    return by_motion(recording, view, reading.fit, *ratio)
 
 
 def _elsewhere(
@@ -163,20 +138,12 @@ def _ratio(felt: Array, spread: float, moment: Array) -> tuple[float, float] | N
     return (ratio, spread / size) if along else None
 
 
-def compared(ratio: float, std: float) -> tuple[Finding, ...]:
-    """Return what the ratio of first moments by force and by torque says of each other's sign and unit, if anything."""
-    if abs(ratio + 1) < 0.1 + 3 * std:
-        text = (
-            "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
-            "other side of S. The answer does not assume this."
-        )
-        return (Finding("force-unit", text, REMEDY, left_in=True),)
-    for factor, words in UNITS:
-        if abs(ratio / factor - 1) < NEAR + 3 * std / abs(ratio) and abs(ratio - 1) > 5 * std:
-            much, way = ((ratio, std), "large") if ratio > 1 else ((1 / ratio, std / ratio**2), "small")
-            text = (
-                f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {words}. The "
-                "answer does not assume this: mass or centre of mass is wrong by as much."
-            )
-            return (replace(Finding.of("force-unit", text), left_in=True),)
-    return ()
+def opposed(ratio: float, std: float) -> tuple[Finding, ...]:
+    """Return what is said where first moments by force and by torque, in this ratio, have opposite signs."""
+    if abs(ratio + 1) >= 0.1 + 3 * std:
+        return ()
+    text = (
+        "The torques have the sign opposite to that of the forces: what turns shows the centre of mass on the "
+        "other side of S. The answer does not assume this."
+    )
+    return (Finding("force-unit", text, REMEDY, left_in=True),)
