@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from steelyard.errors import BadDescription, BadValue
+from steelyard.errors import BadDescription, BadValue, NoDescription
 from steelyard.io import read_pendant, read_recording
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation
@@ -239,6 +239,21 @@ def test_the_example_for_a_controller_says_what_its_columns_are(
     assert stream.channels["position"][0].tolist() == [0.5, -0.2, 0.3]
     assert [*stream.channels["force"][0], *stream.channels["torque"][0]] == W
     assert {stream.frames.get(part, "S") for part in ("force", "torque")} == {frame}
+    assert "\n# the payload that is set in the controller is taken away from this wrench" in str(caught.value)
+
+
+def test_a_controllers_columns_are_not_said_to_be_unknown(tmp_path: Path) -> None:
+    """The words say what is the matter, without a list of columns that the description below them has in it."""
+    names, row = CONTROLLERS["UR"][:2]
+    with pytest.raises(NoDescription) as caught:
+        bare(tmp_path, names, [0.0, *row], [0.002, *row])
+    assert caught.value.words == (
+        f"{tmp_path / 'data.csv'}: needs a description: force and torque are a controller's, whose axes, units and "
+        "settings only you can confirm. Check this one, made of its names:"
+    )
+    assert caught.value.example.startswith("[log]\n")
+    assert "\n# the TCP that is set in the controller must be S" in caught.value.example
+    assert str(caught.value) == f"{caught.value.words}\n{caught.value.example}"
 
 
 def test_the_example_for_a_file_without_header_counts_columns(tmp_path: Path) -> None:
