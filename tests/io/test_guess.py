@@ -275,7 +275,7 @@ def test_a_file_that_does_not_say_gravity_has_a_note_of_what_was_assumed(tmp_pat
     wrench = ["t", "fx", "fy", "fz", "tx", "ty", "tz"]
     bare(tmp_path, [*wrench, "qw", "qx", "qy", "qz"], [0, *W, *Q], [0.01, *W, *Q])
     assert read_recording(tmp_path / "data.csv").notes == (
-        "the file does not say gravity: 9.80665 ± 0.015 m/s² along -z of the world was assumed ([log] gravity of a description)",
+        "the file does not say gravity: 9.80665 ± 0.015 m/s² along -z of the world was assumed, the spread from equator to pole, which the bar of the mass holds (that of your place, in [log] gravity of a description, narrows it)",
     )
     bare(tmp_path, [*wrench, "gx", "gy", "gz"], [0, *W, 0, 0, -9.82], [0.01, *W, 0, 0, -9.82])
     assert read_recording(tmp_path / "data.csv").notes == ()

@@ -90,7 +90,7 @@ class TextTable:
         if len(first) != len(cells) and not (len(first) == len(cells) + 1 and not first[-1]):
             raise BadFile(
                 f"{path}: the header has {len(cells)} names, but its rows have {len(first)} cells. "
-                f"{_WITH_COMMAS if delimiter == ',' and len(cells) < len(first) <= 2 * len(cells) else ''}"
+                f"{_WITH_COMMAS if delimiter == ',' and 1.5 * len(cells) < len(first) <= 2 * len(cells) else ''}"
                 "Write one name per column, or a description with column numbers and no header."
             )
         names, groups = spread_names(cells, first) if len(first) == len(cells) else (cells, {})
