@@ -431,7 +431,7 @@ def test_a_description_to_start_from_can_be_saved(tmp_path: Path) -> None:
     """It alone is on stdout, and reads as it stands; with --json nothing is there but an answer."""
     path = tmp_path / "ur.csv"
     names = [f"actual_TCP_{what}_{k}" for what in ("pose", "force") for k in range(6)]
-    path.write_text(",".join(["timestamp", *names]) + "\n" + "".join(f"{t},{'0,' * 11}1\n" for t in range(3)))
+    path.write_text(",".join(["timestamp", *names]) + "\n" + "".join(f"{t},{'0,' * 6}1,2,3,4,5,6\n" for t in range(3)))
     run = steelyard("identify", path)
     assert run.status == 2
     assert run.err.startswith(f"steelyard: {path}: needs a description: ")
@@ -442,8 +442,9 @@ def test_a_description_to_start_from_can_be_saved(tmp_path: Path) -> None:
     assert run.out in as_json.err
 
 
-def test_a_shape_without_a_place_is_refused_before_it_is_read(made: Path, tmp_path: Path) -> None:
-    text = steelyard("identify", made, "--scan", tmp_path / "none.ply").failed(2)
+def test_a_shape_without_a_place_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    log = write_recording(replace(hammer.recording(1).recording, object_pose=None), tmp_path)
+    text = steelyard("identify", log, "--scan", tmp_path / "none.ply").failed(2)
     assert text == (
         "parts and scans need the place of the object in the sensor: give --pose-in-sensor (in Python "
         "pose_in_sensor=), or [object] pose_in_sensor in the description."

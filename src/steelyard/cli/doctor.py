@@ -47,9 +47,8 @@ def doctor(as_json: bool) -> None:
             click.echo(f"  {name:10s} {versions[name] or f'not installed (optional: {extra})'}")
         missing = sorted({extra for name, extra in EXTRAS.items() if versions[name] is None})
         if missing:
-            click.echo(
-                f"  to add one: {sys.executable} -m pip install 'steelyard[{missing[0]}]', or '.[{missing[0]}]' in a clone"
-            )
+            extra = missing[0]
+            click.echo(f"  to add one: {sys.executable} -m pip install 'steelyard[{extra}]' (in a clone '.[{extra}]')")
         click.echo(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
     if not healthy:
         raise CannotAnswer(

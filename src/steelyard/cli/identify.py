@@ -105,7 +105,7 @@ def _show_example(error: NoDescription) -> NoReturn:
     """Print the description to start from on stdout, so that it can be sent to a file; what is said of it on stderr."""
     say(f"steelyard: {error.words}")
     click.echo(error.example, nl=False)
-    say("This description alone goes to stdout: save it beside the data with > log.toml, check it, and identify log.toml.")
+    say("The description alone is on standard output: save it beside the data with > log.toml, and identify that.")
     sys.exit(error.exit_status)
 
 

@@ -86,7 +86,10 @@ _KNOWN = (
 
 
 def known_lines(names: Names) -> Iterator[tuple[str, tuple[int, ...], str, str]]:
-    """Yield quantity, column numbers, rest of the line and remark (of one line or two) of each that is there, also behind one prefix."""
+    """Yield quantity, column numbers, rest of the line and remark of each that is there, also behind one prefix.
+
+    A remark may have a second line, which is a comment of its own.
+    """
     told = set()
     for quantity, wanted, rest, remark in _KNOWN:
         columns = () if quantity in told else names.all_of(wanted, short(wanted))

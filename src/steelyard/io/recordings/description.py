@@ -92,6 +92,8 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
             "arm": lambda: _arm(top) if "robot" in top else None,
         }
     )
+    if not found["streams"]:
+        raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
     _require_arm_for_joints(found["streams"], found["arm"])
     told = "gravity" in log or measures_gravity(found["streams"])
     return Description(
@@ -159,7 +161,5 @@ def _streams(top: Entry) -> tuple[StreamSpec, ...]:
     value = top.values.get("stream", [])
     if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
         raise top.error("streams are written as sections that start with [[stream]].")
-    if not value:
-        raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
     entries = [Entry(item, f"{top.where}, [[stream]] {i}") for i, item in enumerate(value, 1)]
     return tuple(gathered({entry.where: partial(parse_stream, entry) for entry in entries}).values())
