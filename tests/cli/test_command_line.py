@@ -510,6 +510,8 @@ def test_doctor() -> None:
     table = steelyard("doctor")
     assert table.status == 0
     assert "identification of a known body: worst error" in table.out
+    # The pip is named that belongs to this installation; another would fetch a stranger of this name, or nothing.
+    assert (f"{sys.executable} -m pip install 'steelyard[" in table.out) == ("not installed" in table.out)
 
 
 def test_demo(tmp_path: Path) -> None:
