@@ -20,6 +20,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.parts.parts import Parts
 from steelyard.pipelines import held_object
+from steelyard.pipelines.load import require_place
 from steelyard.pipelines.options import DEFAULTS, Options
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
@@ -72,6 +73,8 @@ def identify(
     recording = _recording(log, data)
     if place is not None:
         recording = replace(recording, object_pose=place.pose, object_pose_std=place.std)
+    if parts is not None or scan is not None:
+        require_place(recording.object_pose)  # before the work, which takes seconds
     known = _tool(recording.tool if tool is None else tool, data)
     seen, notes = _parts(parts) if scan is None else (shape_of(scan), ())
     return held_object.identify(recording, options, known, seen).noted(*notes)

@@ -4,6 +4,7 @@ SteelyardError
  ├─ BadInput              what was given cannot be read or makes no sense   (exit status 2)
  │   ├─ BadFile           a file is missing, unreadable or of another kind
  │   ├─ BadDescription    a log or team description says something impossible
+ │   │   └─ NoDescription  data cannot be read without one; holds one to start from
  │   └─ BadValue          an argument or a column holds wrong numbers
  ├─ CannotAnswer          the data are sound but do not determine an answer (exit status 3)
  │   └─ NoMasses          a given shape cannot follow the data, which may well answer without it
@@ -29,6 +30,19 @@ class BadFile(BadInput):
 
 class BadDescription(BadInput):
     """A log or team description with an impossible entry."""
+
+
+class NoDescription(BadDescription):
+    """Data that only a description can tell how to read.
+
+    words    what is the matter
+    example  the text of a description to start from
+    """
+
+    def __init__(self, words: str, example: str = "") -> None:
+        super().__init__(f"{words}\n{example}" if example else words)
+        self.words = words
+        self.example = example
 
 
 class BadValue(BadInput):

@@ -19,7 +19,7 @@ import pytest
 
 from steelyard.cli.main import VERBS, main
 from steelyard.inertia import InertialParameters
-from steelyard.io import read_result
+from steelyard.io import read_recording, read_result
 from steelyard.io.recordings.recording_files import write_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.simulate import hammer
@@ -427,6 +427,30 @@ def test_what_was_noticed_in_the_tools_run_is_said(made: Path, tmp_path: Path) -
     assert told.startswith("In the tool's run: ")
 
 
+def test_a_description_to_start_from_can_be_saved(tmp_path: Path) -> None:
+    """It alone is on stdout, and reads as it stands; with --json nothing is there but an answer."""
+    path = tmp_path / "ur.csv"
+    names = [f"actual_TCP_{what}_{k}" for what in ("pose", "force") for k in range(6)]
+    path.write_text(",".join(["timestamp", *names]) + "\n" + "".join(f"{t},{'0,' * 6}1,2,3,4,5,6\n" for t in range(3)))
+    run = steelyard("identify", path)
+    assert run.status == 2
+    assert run.err.startswith(f"steelyard: {path}: needs a description: ")
+    (tmp_path / "log.toml").write_text(run.out)
+    assert len(read_recording(tmp_path / "log.toml").streams[0]) == 3
+    as_json = steelyard("identify", path, "--json")
+    assert (as_json.status, as_json.out) == (2, "")
+    assert run.out in as_json.err
+
+
+def test_a_shape_without_a_place_is_refused_before_it_is_read(tmp_path: Path) -> None:
+    log = write_recording(replace(hammer.recording(1).recording, object_pose=None), tmp_path)
+    text = steelyard("identify", log, "--scan", tmp_path / "none.ply").failed(2)
+    assert text == (
+        "parts and scans need the place of the object in the sensor: give --pose-in-sensor (in Python "
+        "pose_in_sensor=), or [object] pose_in_sensor in the description."
+    )
+
+
 def test_what_the_tools_run_cannot_answer_is_said_of_it(made: Path, tmp_path: Path) -> None:
     run = gripper()
     short = tuple(replace(s, channels={k: v[:5] for k, v in s.channels.items()}, time=s.time[:5]) for s in run.streams)
@@ -486,6 +510,8 @@ def test_doctor() -> None:
     table = steelyard("doctor")
     assert table.status == 0
     assert "identification of a known body: worst error" in table.out
+    # The pip is named that belongs to this installation; another would fetch a stranger of this name, or nothing.
+    assert (f"{sys.executable} -m pip install 'steelyard[" in table.out) == ("not installed" in table.out)
 
 
 def test_demo(tmp_path: Path) -> None:

@@ -127,6 +127,9 @@ TABLES: list[tuple[str, str | bytes, type[BadInput], str]] = [
     ("decimal comma", CSV.replace(",", ";").replace("0.1", "0,1"), BadFile, 'DIR/a.csv: line 2, column "tx" holds "0,1", which is not a number. Write decimals with a point.'),
     ("short row", third("2,1,2,3\n"), BadFile, "DIR/a.csv: line 4 has 4 cells, the rows before it have 11. Complete or delete that line."),
     ("long row", third("2,1,2,3,1,1,1,1,0,0,0,0\n"), BadFile, "DIR/a.csv: line 4 has 12 cells, the rows before it have 11. Complete or delete that line."),
+    ("UTF-16 without its mark", CSV.encode("utf-16-le"), BadFile, "DIR/a.csv: the text is in UTF-16. Save it in UTF-8."),
+    ("UTF-16, large end first, without its mark", CSV.encode("utf-16-be"), BadFile, "DIR/a.csv: the text is in UTF-16. Save it in UTF-8."),
+    ("decimal commas between commas", HEADER + ",".join(["0,5"] * 10) + ",1\n", BadFile, "DIR/a.csv: the header has 11 names, but its rows have 21 cells. If its decimals have commas (0,5), save it with points, or with semicolons between cells. Write one name per column, or a description with column numbers and no header."),
     ("short header", swap(CSV, ",qz", ""), BadFile, "DIR/a.csv: the header has 10 names, but its rows have 11 cells. Write one name per column, or a description with column numbers and no header."),
     ("no header", CSV.removeprefix(HEADER), BadDescription, f'{STREAM}, time: there is no column "t", because the file has no header. Give column numbers from 0 to 10.'),
     ("name twice", swap(CSV, "fy", "fx"), BadDescription, f'{STREAM}, force: the name "fx" stands over 2 columns. Rename all but one, or give column numbers.'),
@@ -391,3 +394,14 @@ def test_parquet_without_pyarrow(tmp_path: Path, monkeypatch: pytest.MonkeyPatch
     assert str(caught.value) == (
         "Reading .parquet files needs the package 'pyarrow'. Install it with: pip install 'steelyard[parquet]'"
     )
+
+
+def test_all_mistakes_of_a_description_are_told_at_once(tmp_path: Path) -> None:
+    text = swap(swap(TOML, "[0, 0, -9.81]", '[0, 0, -9.81]\nwrench = "sensor"'), '"N*m"', '"N*cm"')
+    text = swap(text, "quaternion-wxyz", "wxyz")
+    assert message(write(tmp_path, text), BadDescription).splitlines() == [
+        'log.toml, [log]: unknown wrench "sensor". Did you mean "on-sensor"? Possible here: on-sensor, on-object.',
+        f'{STREAM}, torque: unknown unit "N*cm". Did you mean "N*m"? Possible here: N*m, N*mm, kgf*m, lbf*in.',
+        f'{STREAM}, rotation: unknown form "wxyz". Possible here: matrix, quaternion-wxyz, quaternion-xyzw, rpy, '
+        "rotation-vector.",
+    ]

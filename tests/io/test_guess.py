@@ -9,7 +9,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from steelyard.errors import BadDescription, BadValue
+from steelyard.errors import BadDescription, BadValue, NoDescription
 from steelyard.io import read_pendant, read_recording
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation
@@ -240,6 +240,21 @@ def test_the_example_for_a_controller_says_what_its_columns_are(
     assert stream.channels["position"][0].tolist() == [0.5, -0.2, 0.3]
     assert [*stream.channels["force"][0], *stream.channels["torque"][0]] == W
     assert {stream.frames.get(part, "S") for part in ("force", "torque")} == {frame}
+    assert "\n# the payload that is set in the controller is taken away from this wrench" in str(caught.value)
+
+
+def test_a_controllers_columns_are_not_said_to_be_unknown(tmp_path: Path) -> None:
+    """The words say what is the matter, without a list of columns that the description below them has in it."""
+    names, row = CONTROLLERS["UR"][:2]
+    with pytest.raises(NoDescription) as caught:
+        bare(tmp_path, names, [0.0, *row], [0.002, *row])
+    assert caught.value.words == (
+        f"{tmp_path / 'data.csv'}: needs a description: force and torque are a controller's, whose axes, units and "
+        "settings only you can confirm. Check this one, made of its names:"
+    )
+    assert caught.value.example.startswith("[log]\n")
+    assert "\n# the TCP that is set in the controller must be S" in caught.value.example
+    assert str(caught.value) == f"{caught.value.words}\n{caught.value.example}"
 
 
 def test_the_example_for_a_file_without_header_counts_columns(tmp_path: Path) -> None:
@@ -261,7 +276,7 @@ def test_a_file_that_does_not_say_gravity_has_a_note_of_what_was_assumed(tmp_pat
     wrench = ["t", "fx", "fy", "fz", "tx", "ty", "tz"]
     bare(tmp_path, [*wrench, "qw", "qx", "qy", "qz"], [0, *W, *Q], [0.01, *W, *Q])
     assert read_recording(tmp_path / "data.csv").notes == (
-        "the file does not say gravity: 9.80665 ± 0.015 m/s² along -z of the world was assumed ([log] gravity of a description)",
+        "the file does not say gravity: 9.80665 ± 0.015 m/s² along -z of the world was assumed, the spread from equator to pole, which the bar of the mass holds (that of your place, in [log] gravity of a description, narrows it)",
     )
     bare(tmp_path, [*wrench, "gx", "gy", "gz"], [0, *W, 0, 0, -9.82], [0.01, *W, 0, 0, -9.82])
     assert read_recording(tmp_path / "data.csv").notes == ()

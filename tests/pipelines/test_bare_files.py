@@ -1,4 +1,4 @@
-"""What a user of a bare data file is told: it has no description to be corrected."""
+"""What a user of a bare data file is told: it has no description to be corrected, and said no sign."""
 
 from __future__ import annotations
 
@@ -18,12 +18,8 @@ rotation = { columns = ["r11", "r12", "r13", "r21", "r22", "r23", "r31", "r32", 
 """
 
 
-def sign_remedy(path: Path) -> str:
-    """The remedy of the wrong sign in a table of poses of a sensor that reads what the object does to it."""
-    return next(f.remedy for f in sy.identify(path).findings if f.code == "wrench-sign-flipped")
-
-
-def test_a_bare_file_is_not_told_to_correct_its_description(tmp_path: Path) -> None:
+def test_a_sign_that_nobody_said_is_found_and_no_mistake(tmp_path: Path) -> None:
+    """A bare file says no sign, so a note says which was found; a description that says the wrong one is told so."""
     turns = Rotation.exp(TURNS).matrix
     force = 2.1 * np.einsum("nji,j->ni", turns, [0.0, 0.0, -9.81])
     readings = np.column_stack([force, np.cross([0.01, -0.02, 0.08], force)])
@@ -32,6 +28,14 @@ def test_a_bare_file_is_not_told_to_correct_its_description(tmp_path: Path) -> N
     rows = np.column_stack([readings, turns.reshape(-1, 9)])
     np.savetxt(tmp_path / "data.csv", rows, delimiter=",", header=",".join(names), comments="")
     (tmp_path / "log.toml").write_text(HEAD + COLUMNS)
-    bare, described = sign_remedy(tmp_path / "data.csv"), sign_remedy(tmp_path / "log.toml")
-    assert "write a description" in bare
-    assert described.startswith("Set wrench =")
+    bare, described = sy.identify(tmp_path / "data.csv"), sy.identify(tmp_path / "log.toml")
+    note = (
+        'the file does not say the sign of the wrench: it was found to be "on-sensor", z of the world taken as up '
+        "(wrench in [log] of a description)"
+    )
+    assert note in bare.notes
+    assert "wrench-sign-flipped" not in bare.codes()
+    (flipped,) = (f for f in described.findings if f.code == "wrench-sign-flipped")
+    assert flipped.remedy.startswith("Set wrench =")
+    assert note not in described.notes
+    assert bare.mass == described.mass > 0

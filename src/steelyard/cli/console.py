@@ -49,15 +49,12 @@ def require_output(output: Path | None, what: str, suffixes: Sequence[str], *inp
         raise BadFile(f"{output}: cannot be written: there is no folder {output.parent}. Make it first.")
 
 
-def say_if_compiling() -> None:
-    """Have it said once on a terminal that kernels are compiled, when one is; nothing where all come from the cache."""
-    if sys.stderr.isatty():
-        _listen_for_compiling()
-
-
 @cache
-def _listen_for_compiling() -> None:
-    """Ask numba itself: it tells of each kernel that it compiles, and of none that it loads."""
+def say_if_compiling() -> None:
+    """Have it said once that kernels are compiled, when one is; nothing where all come from the cache.
+
+    numba itself is asked: it tells of each kernel that it compiles, and of none that it loads.
+    """
     from numba.core import event
 
     class Once(event.Listener):
@@ -66,7 +63,7 @@ def _listen_for_compiling() -> None:
         def on_start(self, event: Any) -> None:
             if not self.said:
                 self.said = True
-                say("Compiling numerical kernels (first run only, about a minute) ...")
+                say("Compiling numerical kernels, each the first time it is used (up to some minutes) ...")
 
         def on_end(self, event: Any) -> None:
             """Nothing is said at the end."""

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import sys
 from importlib import metadata
 
 import click
@@ -43,8 +44,11 @@ def doctor(as_json: bool) -> None:
         for name in CORE:
             click.echo(f"  {name:10s} {versions[name]}")
         for name, extra in EXTRAS.items():
-            hint = versions[name] or f"not installed (optional: pip install 'steelyard[{extra}]')"
-            click.echo(f"  {name:10s} {hint}")
+            click.echo(f"  {name:10s} {versions[name] or f'not installed (optional: {extra})'}")
+        missing = sorted({extra for name, extra in EXTRAS.items() if versions[name] is None})
+        if missing:
+            extra = missing[0]
+            click.echo(f"  to add one: {sys.executable} -m pip install 'steelyard[{extra}]' (in a clone '.[{extra}]')")
         click.echo(f"  identification of a known body: worst error {error:.1e} of its size in {seconds:.2f} s")
     if not healthy:
         raise CannotAnswer(

@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import sys
 from pathlib import Path
-from typing import Any, cast
+from typing import Any, NoReturn, cast
 
 import click
 
 from steelyard.cli.console import STYLED, print_json, require_output, say, say_if_compiling
 from steelyard.cli.options import HELP, RESULT_AS_JSON, RESULT_FILE, STREAM_FOLDER
-from steelyard.errors import BadValue
+from steelyard.errors import BadValue, NoDescription
 
 METHODS = ("auto", "noise-aware", "least-squares", "geodesic")
 
@@ -86,7 +86,12 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     recording = read_pendant(_typed()) if pendant else cast(Path, log)
     given = {"tool": tool, "parts": parts, "scan": scan, "pose_in_sensor": pose_in_sensor, "data": data}
     options = Options(**chosen, materials=() if materials is None else materials_of(materials))
-    estimate = api.identify(recording, options, **given)  # type: ignore[arg-type]
+    try:
+        estimate = api.identify(recording, options, **given)  # type: ignore[arg-type]
+    except NoDescription as error:
+        if as_json or not error.example:
+            raise
+        _show_example(error)
     if output is not None:
         write_result(estimate, output)
     if as_json:
@@ -94,6 +99,14 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     else:
         title = f"{log or 'pendant'}: what the robot holds, in the sensor frame"
         click.echo(estimate_table(estimate, title, marks=STYLED))
+
+
+def _show_example(error: NoDescription) -> NoReturn:
+    """Print the description to start from on stdout, so that it can be sent to a file; what is said of it on stderr."""
+    say(f"steelyard: {error.words}")
+    click.echo(error.example, nl=False)
+    say("The description alone is on standard output: save it beside the data with > log.toml, and identify that.")
+    sys.exit(error.exit_status)
 
 
 def _typed() -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import difflib
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -29,6 +29,19 @@ def close_match(wrong: str, right: Sequence[str]) -> str:
     folded = {name.lower(): name for name in reversed(right)}
     near = difflib.get_close_matches(wrong.lower(), list(folded), n=1)
     return f' Did you mean "{folded[near[0]]}"?' if near else ""
+
+
+def gathered(steps: Mapping[Any, Callable[[], Any]]) -> dict[Any, Any]:
+    """Return what every step returns, by its key; raises one BadDescription with a line for each that fails."""
+    found, mistakes = {}, []
+    for key, step in steps.items():
+        try:
+            found[key] = step()
+        except BadDescription as error:
+            mistakes.append(str(error))
+    if mistakes:
+        raise BadDescription("\n".join(mistakes))
+    return found
 
 
 @dataclass(frozen=True)

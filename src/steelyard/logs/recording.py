@@ -144,6 +144,7 @@ class Recording:
     dead          channels of the wrench [tau, f] in S that do not measure: nothing may be concluded from them
     findings      what reading it already showed: rows that missed a number and were left out
     notes         what reading it had to assume, in words
+    sign_said     whether anything says the sign of the wrench; else it is found from the weight, and no mistake
     described     whether a description says sign, gravity and units; bare data files and typed rows have none
     """
 
@@ -159,6 +160,7 @@ class Recording:
     findings: tuple[Finding, ...] = ()
     notes: tuple[str, ...] = ()
     described: bool = True
+    sign_said: bool = True
     gravity_std: float = 0.0
 
     def __post_init__(self) -> None:

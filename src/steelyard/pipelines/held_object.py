@@ -21,7 +21,7 @@ from steelyard.pipelines.load import Load, looked_at, placed
 from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import rows_to_fit
-from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, told, uncalibrated
+from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
 from steelyard.sanity import examine
 from steelyard.spatial import Pose
 
@@ -49,6 +49,7 @@ def identify(
     known = None if known is None else _with_bias_as(known, recording)
     recording, before = examine(recording)
     rows = rows_to_fit(recording, before, options)
+    before, of_sign = sign_found(before, recording)
     before = noticed_before(before, recording, rows)
     shape = placed(parts, recording.object_pose, recording.object_pose_std)
     load = Load(rows.log, Bias(options.bias, drift=options.drift), options, shape, known)
@@ -68,7 +69,7 @@ def identify(
     delays_s = {name: late + moved.get(name, 0.0) for name, late in rows.aligned.delays_s.items()}
     estimate = replace(remedied(estimate, rows), delays_s=delays_s).with_findings(*of_tool).by_cause()
     aligning = () if rows.unmeasured else rows.aligned.notes
-    return _with_bias_as(estimate.noted(*recording.notes, *aligning, *uncalibrated(estimate)), recording)
+    return _with_bias_as(estimate.noted(*recording.notes, *of_sign, *aligning, *uncalibrated(estimate)), recording)
 
 
 def _of_tool(tool: Recording, options: Options) -> Estimate:

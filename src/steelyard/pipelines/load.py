@@ -135,6 +135,16 @@ class Load:
         return shared.noted(f"one sensor bias is shared with the tool's run (p = {p:.2g})")
 
 
+def require_place(pose: Pose | None) -> Pose:
+    """Return the pose of a shape in the sensor, X_SO; raises BadValue where there is none."""
+    if pose is None:
+        raise BadValue(
+            "parts and scans need the place of the object in the sensor: give --pose-in-sensor (in Python "
+            "pose_in_sensor=), or [object] pose_in_sensor in the description."
+        )
+    return pose
+
+
 def placed(parts: Parts | Shape | None, pose: Pose | None, std: tuple[float, float] | None) -> Placed | None:
     """Return the object's shape in the sensor's frame; None without one.
 
@@ -142,10 +152,7 @@ def placed(parts: Parts | Shape | None, pose: Pose | None, std: tuple[float, flo
     """
     if parts is None:
         return None
-    if pose is None:
-        raise BadValue(
-            "parts need the place of the object in the sensor: give [object] pose_in_sensor in the description."
-        )
+    pose = require_place(pose)
     places = PLACES if std is None else (std,)
     if isinstance(parts, Parts):
         _require_metres(parts)

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.findings import AT_REST, BARE, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
+from steelyard.findings import AT_REST, BARE, REMEDIES, UNEXPLAINED, UNMEASURED, WEIGHED, Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import ADD_POSES
 from steelyard.logs.recording import Recording
@@ -52,6 +52,22 @@ def noticed_before(found: tuple[Finding, ...], recording: Recording, rows: FitRo
     """Return what was found before the fit, in words for who has no description, and what the rows to fit show."""
     found = found if recording.described else tuple(finding.instead(BARE) for finding in found)
     return (*found, *rows.units, *(() if rows.place is None else (rows.place.finding,)))
+
+
+def sign_found(found: tuple[Finding, ...], recording: Recording) -> tuple[tuple[Finding, ...], tuple[str, ...]]:
+    """Return what was found without the sign of a wrench that nothing said, and a note on that: it is no mistake.
+
+    Where gravity was turned round with it, the finding has a remedy of its own and stays.
+    """
+    code = "wrench-sign-flipped"
+    rest = tuple(f for f in found if f.code != code or f.remedy != REMEDIES[code])
+    if recording.sign_said or len(rest) == len(found):
+        return found, ()
+    sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
+    return rest, (
+        f'the file does not say the sign of the wrench: it was found to be "{sign}", z of the world taken as up '
+        f"(wrench in [log] of a description)",
+    )
 
 
 @contextmanager

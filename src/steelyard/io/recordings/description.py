@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
-from steelyard.io.entries import Entry
+from steelyard.io.entries import Entry, gathered
 from steelyard.io.example import EXAMPLE
 from steelyard.io.object_pose import ObjectPose, parse_object_pose
 from steelyard.io.streams.entries import StreamSpec, parse_stream
@@ -74,30 +75,37 @@ class Description:
 
 
 def parse_description(values: Mapping[str, Any], name: str) -> Description:
-    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription."""
+    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription with all that is wrong."""
     top = Entry(values, name)
     if "team" in top:
         raise top.error("[team] makes this a team description. Use it with: steelyard team")
     top.only(*_SECTIONS)
     log = top.section("log")
-    log.only("gravity", "wrench", "tool")
-    gravity = parse_gravity(log) if "gravity" in log else default_gravity()
-    placed = parse_object_pose(top.section("object"))
-    streams = _streams(top)
-    arm = _arm(top) if "robot" in top else None
-    _require_arm_for_joints(streams, arm)
-    told = "gravity" in log or measures_gravity(streams)
+    found = gathered(
+        {
+            "gravity": lambda: _gravity(log),
+            "wrench_sign": lambda: SIGNS[log.choice("wrench", ("on-sensor", "on-object"), "on-object")],
+            "tool": lambda: log.text("tool"),
+            "noise": lambda: parse_noise(top.section("noise")),
+            "placed": lambda: parse_object_pose(top.section("object")),
+            "streams": lambda: _streams(top),
+            "arm": lambda: _arm(top) if "robot" in top else None,
+        }
+    )
+    if not found["streams"]:
+        raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
+    _require_arm_for_joints(found["streams"], found["arm"])
+    told = "gravity" in log or measures_gravity(found["streams"])
     return Description(
-        streams=streams,
-        gravity=gravity,
-        wrench_sign=SIGNS[log.choice("wrench", ("on-sensor", "on-object"), "on-object")],
-        noise=parse_noise(top.section("noise")),
-        tool=log.text("tool"),
-        placed=placed,
-        arm=arm,
+        **found,
         notes=() if told else (LEVEL_BASE,),
         gravity_std=0.0 if told else ASSUMED_GRAVITY_STD,
     )
+
+
+def _gravity(log: Entry) -> Array:
+    log.only("gravity", "wrench", "tool")
+    return parse_gravity(log) if "gravity" in log else default_gravity()
 
 
 def parse_gravity(entry: Entry) -> Array:
@@ -153,7 +161,5 @@ def _streams(top: Entry) -> tuple[StreamSpec, ...]:
     value = top.values.get("stream", [])
     if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
         raise top.error("streams are written as sections that start with [[stream]].")
-    if not value:
-        raise top.error(f"no [[stream]] is given, so there are no data. A complete description:\n{EXAMPLE}")
-    streams = [parse_stream(Entry(item, f"{top.where}, [[stream]] {i}")) for i, item in enumerate(value, 1)]
-    return tuple(streams)
+    entries = [Entry(item, f"{top.where}, [[stream]] {i}") for i, item in enumerate(value, 1)]
+    return tuple(gathered({entry.where: partial(parse_stream, entry) for entry in entries}).values())

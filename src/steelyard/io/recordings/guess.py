@@ -165,7 +165,8 @@ def _gravity(specs: Sequence[QuantitySpec], cells: Columns) -> tuple[Array, tupl
             return np.array([0.0, 0.0, -median_size(values)]), ()
     way = " along -z of the world" if any(spec.name == "rotation" for spec in specs) else ""
     return default_gravity(), (
-        f"the file does not say gravity: {ASSUMED}{way} was assumed ([log] gravity of a description)",
+        f"the file does not say gravity: {ASSUMED}{way} was assumed, the spread from equator to pole, which "
+        "the bar of the mass holds (that of your place, in [log] gravity of a description, narrows it)",
     )
 
 

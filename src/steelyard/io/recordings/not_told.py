@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 
-from steelyard.errors import BadDescription
+from steelyard.errors import NoDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
 from steelyard.io.recordings.controllers import known_lines
@@ -24,28 +24,34 @@ from steelyard.io.streams.usual_names import (
 from steelyard.io.tables.files import Table
 from steelyard.io.units import ANGLE, UNITS
 
+ATTITUDES = {"rotation", "gravity", "specific_force"}
 _ORDERS = ("quaternion-xyzw", "quaternion-wxyz")
 
 
 def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
-    """Raise BadDescription where the wrench or the direction of gravity is not among the quantities found."""
+    """Raise NoDescription where the wrench or the direction of gravity is not among the quantities found."""
     missing = [name for name in ("force", "torque") if name not in found]
     if missing:
+        lines = own_lines(table, names)
         reason = f"no {' and no '.join(missing)} was recognised"
         if all(len(vectors_named(names, name)) > 1 for name in missing):
             reason = f"several columns may be the {' and the '.join(missing)}"
-        raise cannot_tell(table, reason, own_lines(table, names))
-    if not {"rotation", "gravity", "specific_force"} & set(found):
+        elif set(missing) <= set(lines):
+            reason = f"{' and '.join(missing)} are a controller's, whose axes, units and settings only you can confirm"
+        raise _to_check(table, reason, lines)
+    if not ATTITUDES & set(found):
         lines = own_lines(table, names)
         reason = "nothing says where gravity points in the sensor frame"
         if "rotation" in lines:
             reason = "only a description can say how the columns of the orientation turn the sensor"
+        if "joint_position" in lines:
+            reason = "its joints turn the sensor, but only a description can name the URDF of their arm"
         if three := next((three for three in ANGLES if names.all_of(three, False)), None):
             reason = (
                 f"{', '.join(three)} turn the sensor, but only a description can say in which form (rpy or "
                 "rotation-vector) and unit (deg or rad)"
             )
-        raise cannot_tell(table, reason, lines)
+        raise _to_check(table, reason, lines)
 
 
 def left_out(table: Table, names: Names) -> tuple[str, ...]:
@@ -57,15 +63,24 @@ def left_out(table: Table, names: Names) -> tuple[str, ...]:
     return (f"an orientation was left out, which only a description can say how to read: rotation = {shown}",)
 
 
-def cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> BadDescription:
+def cannot_tell(table: Table, reason: str, lines: Mapping[str, str]) -> NoDescription:
     """Return the error; `lines` are those of a description that the names of the file do tell."""
-    names = table.header.names
-    shown = f"Columns here: {listed(_shown(table))}." if names else f"It has {table.header.count} columns."
-    example = example_of(table.path.name, lines, None if names else table.header.count)
-    return BadDescription(
+    count = None if table.header.names else table.header.count
+    example = example_of(table.path.name, lines, count)
+    shown = f"Columns here: {listed(_shown(table))}." if count is None else f"It has {count} columns."
+    return NoDescription(
         f"{table.path}: cannot tell what the columns are: {reason}. {shown}{_lying(table)} "
-        f"Write a description that says it, for example:\n{example}"
+        "Write a description that says it, for example:",
+        example,
     )
+
+
+def _to_check(table: Table, reason: str, lines: Mapping[str, str]) -> NoDescription:
+    """Return the error where a description can be made of the names; one that must be filled in is `cannot_tell`."""
+    if not ({"force", "torque"} <= set(lines) and {"rotation", "joint_position"} & set(lines)):
+        return cannot_tell(table, reason, lines)
+    words = f"{table.path}: needs a description: {reason}.{_lying(table)} Check this one, made of its names:"
+    return NoDescription(words, example_of(table.path.name, lines))
 
 
 def _shown(table: Table) -> list[str]:
@@ -104,7 +119,7 @@ def own_lines(table: Table, names: Names) -> dict[str, str]:
         )
     for quantity, columns, rest, remark in known_lines(names):
         lines[quantity] = f"{{ columns = {_columns(table, columns)}, {rest} }}   # {remark}"
-    if not {"rotation", "gravity", "specific_force"} & set(lines) and (found := joints(names)):
+    if not ATTITUDES & set(lines) and (found := joints(names)):
         unit = angle_unit(values(table, found)) or "rad"
         lines["joint_position"] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}   # from base to sensor'
     return lines

@@ -3,12 +3,13 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from functools import partial
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.io.entries import Entry, listed
+from steelyard.io.entries import Entry, gathered, listed
 from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
 from steelyard.io.table_header import Column
 from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, instead, spelled
@@ -95,41 +96,54 @@ class StreamSpec:
 
 
 def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamSpec:
-    """Check one [[stream]] table, which in a team's `robot` may also hold what ROBOT names; raises BadDescription.
+    """Check one [[stream]] table, which in a team's `robot` may also hold what ROBOT names.
 
     arm  joints are those of an arm, of any number, and not an Omnid's
+
+    Raises BadDescription with all that is wrong in it.
     """
-    entry.only(*_KEYS, *(ROBOT if robot else _JOINT))
+    bare = entry
     entry.require("path", 'path = "log.csv"')
     path = str(entry.text("path"))
     entry = Entry(entry.values, f'{entry.where} ("{path}")')
     if not robot and "joint_torque" in entry:
         raise entry.error('"joint_torque" is of use for an Omnid of a team only. Leave it out: the sensor measures.')
     zero = entry.values.get("torque") == "zero"
-    quantities = tuple(
-        _quantity(entry, name, arm)
-        for name in (*QUANTITIES, *ROBOT)
-        if name in entry and not (zero and name == "torque")
+    names = [name for name in (*QUANTITIES, *ROBOT) if name in entry and not (zero and name == "torque")]
+    found = gathered(
+        {
+            "keys": lambda: bare.only(*_KEYS, *(ROBOT if robot else _JOINT)),
+            "time": lambda: _time(entry),
+            **{name: partial(_quantity, entry, name, arm) for name in names},
+            "kind": lambda: _kind(entry),
+            "delay": lambda: _delay(entry),
+            "mount": lambda: _mount(entry, set(names)),
+            "frames": lambda: _frames(entry),
+        }
     )
-    if not quantities:
+    if not names:
         raise entry.error('no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }')
-    kind = entry.text("kind")
-    if kind not in (None, "poses"):
-        raise entry.error(f'unknown kind "{kind}". Leave it out, or write kind = "poses" for a table of still poses.')
-    if kind == "poses" and "time" in entry:
-        raise entry.error('kind = "poses" is a table of still poses without time; leave out "time" or "kind".')
     return StreamSpec(
         path,
-        quantities,
+        tuple(found[name] for name in names),
         entry.where,
-        _time(entry) or _stamped(entry, kind),
-        kind == "poses",
+        found["time"] or _stamped(entry, found["kind"]),
+        found["kind"] == "poses",
         zero,
-        _delay(entry),
-        _mount(entry, {quantity.name for quantity in quantities}),
+        found["delay"],
+        found["mount"],
         entry.text("topic"),
-        _frames(entry),
+        found["frames"],
     )
+
+
+def _kind(stream: Entry) -> str | None:
+    kind = stream.text("kind")
+    if kind not in (None, "poses"):
+        raise stream.error(f'unknown kind "{kind}". Leave it out, or write kind = "poses" for a table of still poses.')
+    if kind == "poses" and "time" in stream:
+        raise stream.error('kind = "poses" is a table of still poses without time; leave out "time" or "kind".')
+    return kind
 
 
 def _stamped(stream: Entry, kind: str | None) -> TimeSpec | None:

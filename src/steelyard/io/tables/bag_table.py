@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadDescription, BadFile
+from steelyard.errors import BadDescription, BadFile, NoDescription
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.bounds import require_bounded
 from steelyard.io.table_header import Columns, Header
@@ -193,10 +193,11 @@ def _labels(message: Any) -> tuple[str, ...]:
     return tuple(map(str, names)) if isinstance(names, list) else ()
 
 
-def _which_topic(bag: Bag) -> BadDescription:
+def _which_topic(bag: Bag) -> NoDescription:
     wrench = first_wrench(bag.topics)
     example = bag_example(bag.path.name, bag.topics, frames_of(bag, wrench.name if wrench else None))
-    return BadDescription(
+    return NoDescription(
         f"{bag.path}: a bag needs a description that says which topic is what. {bag.told()} "
-        f"Write one beside the bag, for example:\n{example}"
+        "Write one beside the bag, for example:",
+        example,
     )

@@ -62,10 +62,18 @@ def decoded(text: bytes) -> str:
 
 
 def _require_text(path: Path, block: bytes) -> None:
-    if block.startswith((b"\xff\xfe", b"\xfe\xff")):
+    if block.startswith((b"\xff\xfe", b"\xfe\xff")) or _every_other_is_zero(block[:_HEAD]):
         raise BadFile(f"{path}: the text is in UTF-16. Save it in UTF-8.")
     if b"\0" in block or _CONTROL.search(block, 0, _HEAD):
         raise BadFile(f"{path}: expected a text table; found binary data. Readable are text tables, .npz and .parquet.")
+
+
+def _every_other_is_zero(block: bytes) -> bool:
+    """Whether a text has two bytes per character, one of them zero: UTF-16 without its mark."""
+    return any(
+        len(zeros) > 1 and not zeros.strip(b"\0") and b"\0" not in text and not _CONTROL.search(text)
+        for zeros, text in ((block[1::2], block[::2]), (block[::2], block[1::2]))
+    )
 
 
 def blocks(path: Path, skip: int) -> Iterator[str]:

@@ -40,6 +40,7 @@ from steelyard.io.tables.text_cells import (
     with_points,
 )
 
+_WITH_COMMAS = "If its decimals have commas (0,5), save it with points, or with semicolons between cells. "
 _INTEGER = re.compile(r"[+-]?\d+")
 
 
@@ -89,6 +90,7 @@ class TextTable:
         if len(first) != len(cells) and not (len(first) == len(cells) + 1 and not first[-1]):
             raise BadFile(
                 f"{path}: the header has {len(cells)} names, but its rows have {len(first)} cells. "
+                f"{_WITH_COMMAS if delimiter == ',' and 1.5 * len(cells) < len(first) <= 2 * len(cells) else ''}"
                 "Write one name per column, or a description with column numbers and no header."
             )
         names, groups = spread_names(cells, first) if len(first) == len(cells) else (cells, {})
