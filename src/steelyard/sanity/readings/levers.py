@@ -108,22 +108,22 @@ UNITS = (
 )
 
 
-def unit_of(ratio: float, std: float) -> Unit | None:
-    """Return the unit that makes a lever by force so many times one by torque; None where no unit does."""
+def units_of(ratio: float, std: float) -> list[Unit]:
+    """Return the units that may make a lever by force so many times one by torque."""
     if not ratio > 0 or abs(ratio - 1) <= 5 * std:
-        return None
-    unit = min(UNITS, key=lambda u: abs(np.log(ratio / u.ratio)))
-    return unit if abs(ratio / unit.ratio - 1) < NEAR + 3 * std / ratio else None
+        return []
+    return [unit for unit in UNITS if abs(ratio / unit.ratio - 1) < NEAR + 3 * std / ratio]
 
 
 def compared(ratio: float, std: float) -> tuple[Finding, ...]:
     """Return what the ratio of first moments by force and by torque says of each other's unit, if anything."""
-    unit = unit_of(ratio, std)
-    if unit is None:
+    likely = units_of(ratio, std)
+    if not likely:
         return ()
+    words, unit = ", or when ".join(u.words for u in likely), likely[0]
     much, way = ((ratio, std), "large") if ratio > 1 else ((1 / ratio, std / ratio**2), "small")
     text = (
-        f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {unit.words}. The "
+        f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {words}. The "
         f"answer does not assume this: mass or centre of mass is wrong by as much.{unit.alike}"
     )
     return (Finding("force-unit", text, unit.remedy, left_in=True),)
@@ -139,7 +139,7 @@ def by_motion(
     Where nothing measures how S is accelerated, what turns shows the centre of mass only about. Positions of a tip that
     lies at the centre of mass look like a small unit, but leave it near.
     """
-    unit = unit_of(ratio, std)
+    unit = next(iter(units_of(ratio, std)), None)
     if unit is None or (unit in SMALL and found.arm < HELD) or (view.acceleration is None and found.arm > FURTHEST_ARM):
         return recording, ()
     if unit is MILLIMETRES and abs(found.mass) < LIGHT:
