@@ -15,7 +15,7 @@ from steelyard.pipelines.held_object import identify
 from steelyard.sanity import examine
 
 LBF, INCH = 4.4482216, 0.0254
-POUNDS = {"lbf*in": (1 / LBF, 1 / (LBF * INCH)), "lbf*ft": (1 / LBF, 1 / (12 * LBF * INCH))}
+INCHES, FEET = (1 / LBF, 1 / (LBF * INCH)), (1 / LBF, 1 / (12 * LBF * INCH))
 PLAIN = recorded("paper", 0)
 
 
@@ -34,13 +34,21 @@ def poses(arm: float) -> Recording:
     return Recording((Stream("poses", channels),), np.array([0, 0, -9.81]), 1)
 
 
-@pytest.mark.parametrize("unit", POUNDS)
-def test_pounds_with_inches_or_feet_are_put_right(unit: str) -> None:
-    found, right = identify(read_as(PLAIN, *POUNDS[unit])), identify(PLAIN)
+def test_pounds_with_inches_are_put_right() -> None:
+    found, right = identify(read_as(PLAIN, *INCHES)), identify(PLAIN)
     assert found.codes() == right.codes() | {"force-unit"}
-    assert f"forces in lbf and torques in {unit} are read as N and N*m" in found.findings[0].message
+    assert "forces in lbf and torques in lbf*in are read as N and N*m" in found.findings[0].message
     assert found.mass == pytest.approx(BODY.mass, rel=0.002)
     np.testing.assert_allclose(found.com, right.com, atol=2e-5)
+
+
+def test_pounds_with_feet_are_named() -> None:
+    """A tip of a tool on the way to the centre of mass would look the same."""
+    found = identify(read_as(PLAIN, *FEET))
+    (unit,) = (f for f in found.findings if f.code == "force-unit")
+    assert "forces in lbf and torques in lbf*ft are read as N and N*m" in unit.message
+    assert "does not assume this" in unit.message
+    assert "motion-mismatch" not in found.codes()
 
 
 @pytest.mark.parametrize("kgf", [False, True])
@@ -68,7 +76,7 @@ def test_a_tip_in_the_positions_is_no_unit() -> None:
 
 def test_still_poses_do_not_tell_millimetres_from_inches() -> None:
     with pytest.raises(CannotAnswer, match=r"does not tell which: .*N\*mm.* 2\.04 mm.*lbf\*in.* 51\.8 mm, with 2 kg"):
-        examine(read_as(poses(0.052), *POUNDS["lbf*in"]))
+        examine(read_as(poses(0.052), *INCHES))
 
 
 def test_still_poses_tell_millimetres_where_all_else_is_far_away() -> None:
@@ -88,3 +96,8 @@ def test_a_weight_taken_away_is_not_told_where_gravity_does_not_turn() -> None:
     channels["rotation"] = np.broadcast_to(start, stream.channels["rotation"].shape).copy()
     still = replace(PLAIN, streams=(replace(stream, channels=channels),))
     assert "weight-compensated" not in {f.code for f in examine(still)[1]}
+
+
+def test_a_tip_at_the_centre_of_mass_is_no_inch() -> None:
+    found = identify(of_the_tip(PLAIN, tuple(float(v) for v in (1 - INCH) * BODY.com)))
+    assert found.mass == pytest.approx(BODY.mass, rel=0.01)

@@ -17,9 +17,7 @@ from steelyard.spatial import Rotation
 
 MISREADINGS: dict[str, Callable[[Rotation], Rotation]] = {
     "turns W into S": lambda R: R.inverse(),
-    "in the order x, y, z, w, not w, x, y, z as was said or assumed": lambda R: Rotation.from_quaternion_wxyz(
-        np.roll(R.quaternion_wxyz(), 1, -1)
-    ),
+    "order x, y, z, w, not w, x, y, z": lambda R: Rotation.from_quaternion_wxyz(np.roll(R.quaternion_wxyz(), 1, -1)),
     "moving axes": lambda R: Rotation.from_rpy(-R.inverse().rpy()),
     "a rotation vector, not roll": lambda R: Rotation.from_rpy(R.log()),
 }

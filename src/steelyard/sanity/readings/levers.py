@@ -68,7 +68,6 @@ class Unit:
         return Finding("force-unit", f"{why}; {done}.{self.alike}", self.remedy)
 
 
-_POUNDS = "The inch or foot is seen, not the pound: give units to be sure of the mass."
 MILLIMETRES = Unit(1e-3, "torques in N*mm are read as N*m", torque=1e-3)
 KILONEWTONS = Unit(1e-3, "forces in kN are read as N", force=1e3)
 CENTIMETRES = Unit(
@@ -84,17 +83,12 @@ INCHES = Unit(
     "forces in lbf and torques in lbf*in are read as N and N*m",
     POUND_FORCE,
     POUND_FORCE * INCH,
-    f'Set unit = "lbf" in the force and unit = "lbf*in" in the torque. {_POUNDS}',
+    'Set unit = "lbf" in the force and unit = "lbf*in" in the torque. The inch is seen, not the pound: give units to '
+    "be sure of the mass.",
 )
-FEET = Unit(
-    FOOT,
-    "forces in lbf and torques in lbf*ft are read as N and N*m",
-    POUND_FORCE,
-    POUND_FORCE * FOOT,
-    f'Set unit = "lbf" in the force; multiply the torques by 12 and set unit = "lbf*in". {_POUNDS}',
-)
-# Torques in a smaller unit of length put the centre of mass far away.
-SMALL = (MILLIMETRES, CENTIMETRES, INCHES, FEET)
+# Torques in a small unit of length put the centre of mass far away. Feet look like positions of a tip at 70 % of the
+# way to the centre of mass, and are only named.
+SMALL = (MILLIMETRES, CENTIMETRES, INCHES)
 UNITS = (
     Unit(4.44822, "forces in N are read as lbf"),
     Unit(1 / 4.44822, "forces in lbf are read as N"),
@@ -103,27 +97,33 @@ UNITS = (
     Unit(1 / 0.112985, "torques in N*m are read as lbf*in"),
     Unit(0.112985, "torques in lbf*in are read as N*m"),
     Unit(100.0, "torques in N*m are read as N*cm"),
+    Unit(
+        FOOT,
+        "forces in lbf and torques in lbf*ft are read as N and N*m",
+        remedy='Set unit = "lbf" in the force; multiply the torques by 12 and set unit = "lbf*in". Units that are '
+        "right leave positions of the tip of a tool, not of S.",
+    ),
     Unit(1e3, "torques in N*m are read as N*mm", torque=1e3),
     *SMALL,
 )
 
 
-def unit_of(ratio: float, std: float) -> Unit | None:
-    """Return the unit that makes a lever by force so many times one by torque; None where no unit does."""
+def units_of(ratio: float, std: float) -> list[Unit]:
+    """Return the units that may make a lever by force so many times one by torque."""
     if not ratio > 0 or abs(ratio - 1) <= 5 * std:
-        return None
-    unit = min(UNITS, key=lambda u: abs(np.log(ratio / u.ratio)))
-    return unit if abs(ratio / unit.ratio - 1) < NEAR + 3 * std / ratio else None
+        return []
+    return [unit for unit in UNITS if abs(ratio / unit.ratio - 1) < NEAR + 3 * std / ratio]
 
 
 def compared(ratio: float, std: float) -> tuple[Finding, ...]:
     """Return what the ratio of first moments by force and by torque says of each other's unit, if anything."""
-    unit = unit_of(ratio, std)
-    if unit is None:
+    likely = units_of(ratio, std)
+    if not likely:
         return ()
+    words, unit = ", or when ".join(u.words for u in likely), likely[0]
     much, way = ((ratio, std), "large") if ratio > 1 else ((1 / ratio, std / ratio**2), "small")
     text = (
-        f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {unit.words}. The "
+        f"Forces are {much[0]:.3g} ± {much[1]:.2g} times too {way} beside the torques, as when {words}. The "
         f"answer does not assume this: mass or centre of mass is wrong by as much.{unit.alike}"
     )
     return (Finding("force-unit", text, unit.remedy, left_in=True),)
@@ -136,10 +136,11 @@ def by_motion(
 
     ratio, std  how many times a first moment by force is that by torque, with its standard deviation
 
-    Where nothing measures how S is accelerated, what turns shows the centre of mass only about.
+    Where nothing measures how S is accelerated, what turns shows the centre of mass only about. Positions of a tip that
+    lies at the centre of mass look like a small unit, but leave it near.
     """
-    unit = unit_of(ratio, std)
-    if unit is None or (view.acceleration is None and found.arm > FURTHEST_ARM):
+    unit = next(iter(units_of(ratio, std)), None)
+    if unit is None or (unit in SMALL and found.arm < HELD) or (view.acceleration is None and found.arm > FURTHEST_ARM):
         return recording, ()
     if unit is MILLIMETRES and abs(found.mass) < LIGHT:
         unit = KILONEWTONS
