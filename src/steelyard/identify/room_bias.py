@@ -22,8 +22,10 @@ from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.logs.log import MotionLog
 
-# [N] the sizes that are tried beside none, for torques at this arm [m]. None is so many times as likely as any.
-SIZES, ARM, NONE = (0.0, 0.03, 0.1, 0.3, 1.0, 3.0), 0.1, 100.0
+# [N] the sizes that are tried, alike beforehand; for torques at this arm [m].
+SIZES, ARM = (0.01, 0.03, 0.1, 0.3, 1.0, 3.0), 0.1
+# What acceleration says of a mass may be off by this share: of filters, delays, and arms that bend.
+OF_ACCELERATION = 0.02
 # Noise, and with it what is told, is judged anew without the bias found.
 ROUNDS = 3
 
@@ -52,20 +54,25 @@ def without(bias: Array, log: MotionLog, rotation: Array) -> MotionLog:
     return replace(log, wrench=log.wrench - in_sensor.reshape(-1, 6))
 
 
-def room_bias(log: MotionLog, rotation: Array, bias: Bias) -> RoomBias:
-    """Return the bias in W that a log shows; rotation (N, 3, 3) turns S into W, `bias` is that of the sensor."""
+def room_bias(log: MotionLog, rotation: Array, gravity: Array, bias: Bias) -> RoomBias:
+    """Return the bias in W that a log shows.
+
+    rotation  (N, 3, 3) S to W at the rows     gravity  (3,) [m/s^2] in W     bias  that of the sensor
+    """
+    weight = np.concatenate([np.zeros(3), OF_ACCELERATION * gravity])
     found = RoomBias(np.zeros(6), np.zeros((6, 6)))
     for _ in range(ROUNDS):
         left, problem = prepared(found.put_right(log, rotation), bias)
         solution = NoiseAware(bias=bias).solution(problem)
-        found = _drawn(*_told(left, problem.with_room(left, rotation), solution, found.mean))
+        found = _drawn(*_told(left, problem.with_room(left, rotation), solution, found.mean, weight))
     return found
 
 
-def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array) -> tuple[Array, Array]:
+def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array, weight: Array) -> tuple[Array, Array]:
     """Return the information (6, 6) that the rows hold of the bias, and the right side (6,) that goes with it.
 
-    taken  (6,) what of it was taken out of the log before
+    taken   (6,) what of it was taken out of the log before
+    weight  (6,) what a kilogram weighs too much or too little where acceleration tells it
     """
     own = len(solution.linear)
     wide = replace(solution, linear=np.concatenate([solution.linear, np.zeros(6)]))
@@ -79,7 +86,8 @@ def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array) ->
     follow = solution.chain @ inverse_scaled(solution.with_prior(H[:own, :own])) @ solution.chain.T @ H[:own, own:]
     across = np.concatenate([-follow.T, np.eye(6)], 1)
     F = H[own:, own:] - H[own:, :own] @ follow
-    heard = F @ inverse_scaled(across @ V @ across.T)
+    off = F @ weight * solution.linear[0]
+    heard = F @ inverse_scaled(across @ V @ across.T + np.outer(off, off))
     return heard @ F, heard @ (F @ taken - gradient[own:] / 2)
 
 
@@ -90,7 +98,7 @@ def _drawn(F: Array, g: Array) -> RoomBias:
     A = np.eye(6) + S[:, :, None] * F * S[:, None, :]
     covariance = S[:, :, None] * np.linalg.inv(A) * S[:, None, :]
     means = covariance @ g
-    chance = (means @ g - np.linalg.slogdet(A)[1]) / 2 + np.log(NONE) * ((torque == 0).astype(float) + (force == 0))
+    chance = (means @ g - np.linalg.slogdet(A)[1]) / 2
     share = np.exp(chance - chance.max())
     share /= share.sum()
     mean = share @ means
