@@ -12,7 +12,7 @@ from typing import Literal
 
 import numpy as np
 
-from steelyard.check import Mask
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding, codes
 from steelyard.identify.fit import Bias
@@ -114,6 +114,22 @@ def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Opti
     if rows.delayed and (turn := turn_of(rows.log, recording, before, options.drift)) is not None:
         rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place, maybe=rows.maybe)
     return rows
+
+
+def rows_as_given(
+    gravity: Array, recording: Recording, before: tuple[Finding, ...], options: Options
+) -> tuple[Recording, tuple[Finding, ...], FitRows]:
+    """Return recording, findings before the fit, and rows; with gravity as given where a bias passed for a tilt of it.
+
+    gravity  (3,) [m/s^2] in W as given, before the recording was examined
+    """
+    rows = rows_to_fit(recording, before, options)
+    if "base-tilted" not in codes(before):
+        return recording, before, rows
+    level = replace(recording, gravity=gravity)
+    others = tuple(f for f in before if f.code != "base-tilted")
+    again = rows_to_fit(level, others, options)
+    return (recording, before, rows) if again.room is None else (level, others, again)
 
 
 def _placed(

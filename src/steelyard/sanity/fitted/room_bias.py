@@ -18,6 +18,8 @@ from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
 # It is seen beyond so many standard deviations, by leaving out stretches, and where it leaves so much less of what
 # lasts for a second: sound made logs keep 0.96, a real sensor's errors with the pose 0.57.
 SURE, SLOWLY = 8.0, 0.5
+# ... and so much less of that than another direction of gravity, which has fewer numbers.
+BETTER = 0.8
 # Axes of it that a body and a bias of the sensor mimic to this share of their squares are not told.
 TOLD = 1e-3
 REMEDY = (
@@ -80,14 +82,14 @@ def _seen(log: MotionLog, rotation: Array, gravity: Array, drift: bool) -> bool:
         return False
     columns = columns @ told
     fit = rows.solve(columns, jackknife=True)
-    sure = (np.abs(fit.extra) > SURE * fit.extra_std).any()
-    if not sure or rows.slowly(fit, columns) > SLOWLY * slow:
+    slowly = rows.slowly(fit, columns)
+    if not (np.abs(fit.extra) > SURE * fit.extra_std).any() or slowly > SLOWLY * slow:
         return False
     tilting = rows.tilting(once.phi, rotation[pick], gravity) @ level
-    others = rows.solve(tilting), sensor_matrix(log, drift), misplaced(log, drift)
-    return fit.beside(once) < min(
-        others[0].beside(once), *(other.left for other in others[1:] if other is not None), 1.0
-    )
+    if slowly > BETTER * rows.slowly(rows.solve(tilting), tilting):
+        return False
+    left = fit.beside(once)
+    return all(other is None or left < other.left for other in (sensor_matrix(log, drift), misplaced(log, drift)))
 
 
 def _numbers(vector: Array) -> str:
