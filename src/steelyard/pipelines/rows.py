@@ -208,7 +208,9 @@ def _room_bias(
     if options.gravity != "given" or codes(before) & ELSEWHERE or any(f.left_in for f in before):
         return None
     bias = Bias(options.bias, drift=options.drift)
-    for some in (rows.log, log)[: 1 + bool(rows.touched)]:
+    # Noise that aligning judged with the bias in is not kept.
+    everything = without_dead(with_declared(log, recording.noise))
+    for some in (rows.log, everything)[: 1 + bool(rows.touched)]:
         rotation = rotation_of(some, rows.aligned)
         found = examine_room_bias(some, rotation, recording.gravity, recording.wrench_sign, bias)
         if found is not None:
