@@ -87,17 +87,6 @@ def test_a_tilted_base_is_none() -> None:
     assert "bias-drift" not in codes
 
 
-def test_a_hand_beside_it_is_still_found() -> None:
-    sound = biased(hammer.recording(1).recording)
-    wrench, poses = sound.streams
-    at = (wrench.time > 8) & (wrench.time < 14)
-    force = wrench.channels["force"] + at[:, None] * np.array([3.0, -4.0, 2.0])
-    touched = replace(wrench, channels={**wrench.channels, "force": force})
-    found = sy.identify(replace(sound, streams=(touched, poses)))
-    assert {"contact", "bias-drift"} <= found.codes()
-    assert np.abs(misses(found)).max() < 4
-
-
 def test_residuals_are_those_without_it() -> None:
     recording = biased(hammer.recording(0).recording)
     found = sy.identify(recording)

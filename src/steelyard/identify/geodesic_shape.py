@@ -38,6 +38,7 @@ class ShapeGeodesic(Estimator):
     weighted: bool = False
 
     def solution(self, problem: Problem) -> Solution:
+        """Return the solution of a problem."""
         if not self.weighted:
             problem = replace(problem, wrench=np.ones_like(problem.wrench))
         weights = problem.wrench_weights

@@ -44,6 +44,7 @@ class LeastSquares(Estimator):
             raise BadValue(f"kind must be one of {', '.join(KINDS)}; got {self.kind!r}.")
 
     def solution(self, problem: Problem) -> Solution:
+        """Return the solution of a problem."""
         if self.kind == "total":
             return Solution.unconstrained(_total(problem))
         if self.kind == "weighted":
