@@ -401,7 +401,8 @@ def test_all_mistakes_of_a_description_are_told_at_once(tmp_path: Path) -> None:
     text = swap(text, "quaternion-wxyz", "wxyz")
     assert message(write(tmp_path, text), BadDescription).splitlines() == [
         'log.toml, [log]: unknown wrench "sensor". Did you mean "on-sensor"? Possible here: on-sensor, on-object.',
-        f'{STREAM}, torque: unknown unit "N*cm". Did you mean "N*m"? Possible here: N*m, N*mm, kgf*m, lbf*in.',
+        f'{STREAM}, torque: unknown unit "N*cm". Multiply its numbers by 0.01 and declare "N*m". Possible here: N*m, '
+        "N*mm, kgf*m, lbf*in.",
         f'{STREAM}, rotation: unknown form "wxyz". Possible here: matrix, quaternion-wxyz, quaternion-xyzw, rpy, '
         "rotation-vector.",
     ]

@@ -94,11 +94,11 @@ class Estimator(ABC):
 
         def rested(steady: MotionLog) -> MotionLog:
             steady = without_noise_of_rest(steady)
-            first = self._fit(_problem(steady, replace(bias, drift=False), by_block=False))
+            first = self.solution(_problem(steady, replace(bias, drift=False), by_block=False))
             return at_rest(steady, first.linear[:10], first.bias)
 
         log, problem = prepared(log, bias, rested if self.verify_rest and log.still.any() else None)
-        solution = self._fit(problem)
+        solution = self.solution(problem)
         score = score_in_time(log, problem, solution)
         return conclude(problem, solution, self.method, score).noted(*score.notes)
 
@@ -106,10 +106,10 @@ class Estimator(ABC):
     def solve(self, moments: Moments) -> Estimate:
         """Return the estimate from a statistic that carries its noise."""
         problem = problem_of(moments, Bias.of(self.bias))
-        return conclude(problem, self._fit(problem), self.method)
+        return conclude(problem, self.solution(problem), self.method)
 
     @abstractmethod
-    def _fit(self, problem: Problem) -> Solution:
+    def solution(self, problem: Problem) -> Solution:
         """Return the solution of a problem."""
 
 

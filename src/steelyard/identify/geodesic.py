@@ -48,7 +48,7 @@ class Geodesic(Estimator):
         if self.distance not in ("entropic", "riemannian"):
             raise BadValue(f"distance must be entropic or riemannian; got {self.distance!r}.")
 
-    def _fit(self, problem: Problem) -> Solution:
+    def solution(self, problem: Problem) -> Solution:
         """Newton's method on the cone: the cost is convex in the parameters (entropic) or along geodesics."""
         weights = problem.wrench_weights
         H, g = problem.normal_equations(weights)

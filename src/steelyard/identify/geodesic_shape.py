@@ -37,7 +37,8 @@ class ShapeGeodesic(Estimator):
     alpha: float = 1e-5
     weighted: bool = False
 
-    def _fit(self, problem: Problem) -> Solution:
+    def solution(self, problem: Problem) -> Solution:
+        """Return the solution of a problem."""
         if not self.weighted:
             problem = replace(problem, wrench=np.ones_like(problem.wrench))
         weights = problem.wrench_weights
@@ -47,7 +48,7 @@ class ShapeGeodesic(Estimator):
                 f"Least squares finds a mass of {mass:.3g} kg, so there is no prior body. Check the sign of the wrench."
             )
         prior = InertialParameters(self.shape.vector * (mass / self.shape.mass))
-        return Geodesic(prior, alpha=self.alpha, bias="none")._fit(problem)
+        return Geodesic(prior, alpha=self.alpha, bias="none").solution(problem)
 
 
 def published_prior(points: ArrayLike) -> InertialParameters:

@@ -43,7 +43,8 @@ class LeastSquares(Estimator):
         if self.kind not in KINDS:
             raise BadValue(f"kind must be one of {', '.join(KINDS)}; got {self.kind!r}.")
 
-    def _fit(self, problem: Problem) -> Solution:
+    def solution(self, problem: Problem) -> Solution:
+        """Return the solution of a problem."""
         if self.kind == "total":
             return Solution.unconstrained(_total(problem))
         if self.kind == "weighted":

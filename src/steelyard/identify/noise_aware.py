@@ -54,7 +54,8 @@ class NoiseAware(Estimator):
         if self.iterations < 1:
             raise BadValue(f"iterations must be 1 or more; got {self.iterations}.")
 
-    def _fit(self, problem: Problem) -> Solution:
+    def solution(self, problem: Problem) -> Solution:
+        """Return the solution of a problem."""
         rows = newton.Rows(problem.T, problem.scatter, problem.acceleration, problem.wrench)
         bias = problem.bias_prior
         priors = newton.Priors(self.prior, float(np.log(self.size)), self.size_spread**-2, bias.mean, bias.precision)

@@ -43,7 +43,7 @@ class PointMasses(Estimator):
             raise BadValue(f"at least {FEWEST} points (K, 3) inside the object are needed; got {points.shape}.")
         object.__setattr__(self, "points", points)
 
-    def _fit(self, problem: Problem) -> Solution:
+    def solution(self, problem: Problem) -> Solution:
         """Return the best masses m >= 0: |R (B m - phi)|^2 with R^T R the weighted normal matrix of phi."""
         weights = problem.wrench_weights
         H, g = problem.normal_equations(weights)

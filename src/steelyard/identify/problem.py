@@ -42,6 +42,7 @@ class Problem:
     The linear parameters are phi (10), then the bias (6) unless the sensor is tared, then its drift (6) where asked.
 
     classes       (C,) number of each class in the log
+    columns       (N, Z - 19) what z has beside the features of a log's rows, in order of time; None for nothing
     blocks        (B, Z, Z) the same rows by still pose or time block, with class and number (B,), for hold-out
     """
 
@@ -55,6 +56,7 @@ class Problem:
     block_number: Integers
     still_samples: float = 0.0
     bias_prior: BiasPrior = NOTHING_KNOWN
+    columns: Array | None = None
 
     @property
     def heard(self) -> Mask:
@@ -100,17 +102,32 @@ class Problem:
 
         Time is scaled to -1..1 over the log, so that the drift's unit is half the change from start to end.
         """
-        z = np.column_stack([features(log), scaled_time(log)])
+        return self._with_columns(log, scaled_time(log)[:, None], -np.eye(6)[:, :, None])
+
+    def with_room(self, log: MotionLog, rotation: Array) -> Problem:
+        """Return the problem with a bias (6,) in W as well; rotation (N, 3, 3) turns S into W at the rows of `log`."""
+        T = np.zeros((2, 3, 2, 3, 3, 3))
+        for k in range(3):
+            T[0, k, 0, :, k] = T[1, k, 1, :, k] = -np.eye(3)
+        return self._with_columns(log, rotation.reshape(-1, 9), T.reshape(6, 6, 9))
+
+    def _with_columns(self, log: MotionLog, columns: Array, design: Array) -> Problem:
+        """Return the problem with columns (N, k) beside the features of the rows of `log`, and a design (q, 6, k)."""
+        if log.time is not None:
+            order = np.argsort(log.time, kind="stable")
+            log, columns = log.rows(order), columns[order]
+        wider = replace(self, columns=columns if self.columns is None else np.column_stack([self.columns, columns]))
+        z = wider.features(log)
         key = np.stack([log.noise_class, log.still.astype(np.int64), log.pose], 1)
         groups, label = np.unique(key, axis=0, return_inverse=True)
         blocks = np.stack([z[label == g].T @ z[label == g] for g in range(len(groups))])
         block_class = np.searchsorted(self.classes, groups[:, 0])
-        scatter = np.zeros((len(self.classes), 20, 20))
+        scatter = np.zeros((len(self.classes), *blocks.shape[1:]))
         np.add.at(scatter, block_class, blocks)
-        T = np.zeros((len(self.T) + 6, 6, 20))
-        T[: len(self.T), :, :19] = self.T
-        T[len(self.T) :, :, 19] = -np.eye(6)
-        return replace(self, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2])
+        (count, _, width), more = self.T.shape, design.shape
+        T = np.zeros((count + more[0], 6, width + more[2]))
+        T[:count, :, :width], T[count:, :, width:] = self.T, design
+        return replace(wider, scatter=scatter, T=T, blocks=blocks, block_class=block_class, block_number=groups[:, 2])
 
     def residual_map(self, linear: Array) -> Array:
         """Return K (6, Z), so that the wrench residual of a row is K z."""
@@ -168,9 +185,9 @@ class Problem:
         return float(self.scatter[:, 18, 18].sum())
 
     def features(self, log: MotionLog) -> Array:
-        """Return z (N, Z) of the rows of a log, as wide as this problem's statistic."""
+        """Return z (N, Z) of all rows of the log in order of time, as wide as this problem's statistic."""
         z = features(log)
-        return np.column_stack([z, scaled_time(log)]) if self.T.shape[2] == 20 else z
+        return z if self.columns is None else np.column_stack([z, self.columns])
 
 
 def require_rows(rows: int) -> None:

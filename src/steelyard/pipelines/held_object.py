@@ -18,9 +18,9 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import KNOWN_PLACE, Recording
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.load import Load, looked_at, placed
-from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body
+from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body, room_bias_allowed
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
-from steelyard.pipelines.rows import rows_to_fit
+from steelyard.pipelines.rows import rows_as_given
 from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
 from steelyard.sanity import examine
 from steelyard.spatial import Pose
@@ -47,8 +47,9 @@ def identify(
     known = _of_tool(tool, options) if isinstance(tool, Recording) else tool
     of_tool = () if known is None else of_tools_run(known)
     known = None if known is None else _with_bias_as(known, recording)
+    given = recording.gravity
     recording, before = examine(recording)
-    rows = rows_to_fit(recording, before, options)
+    recording, before, rows = rows_as_given(given, recording, before, options)
     before, of_sign = sign_found(before, recording)
     before = noticed_before(before, recording, rows)
     shape = placed(parts, recording.object_pose, recording.object_pose_std)
@@ -56,6 +57,7 @@ def identify(
     with beside(before, rows.log.gravity):
         load, estimate = load.followed()
     load, estimate, late = looked_back(load, estimate, rows, recording, before)
+    estimate = room_bias_allowed(load, estimate, rows)
     estimate = load.without_tool(estimate).noted(*rows.notes, *[f"{DRIFT_ALLOWED}, as asked"] * options.drift)
     estimate = estimate if rows.place is None else rows.place.widened(estimate)
     estimate = estimate if rows.maybe is None else rows.maybe.allowed(estimate)

@@ -10,7 +10,7 @@ from steelyard.identify.problem import scaled_time
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.options import DRIFT_ALLOWED, Options
-from steelyard.pipelines.rows import GRAVITY_FOUND, rows_to_fit, since_start
+from steelyard.pipelines.rows import GRAVITY_FOUND, rows_as_given, since_start
 from steelyard.sanity import examine
 
 # Residuals this many times those of the answer are not what it was made from.
@@ -28,9 +28,14 @@ def left_over(recording: Recording, estimate: Estimate, tool: Estimate | None = 
 
     tool  what was taken away from the answer, and is in the log
     """
+    gravity = recording.gravity
     recording, before = examine(recording)
     found = any(note.startswith(GRAVITY_FOUND) for note in estimate.notes)
-    log = rows_to_fit(recording, before, Options(gravity="unknown" if found else "given")).aligned.log
+    options = Options(gravity="unknown" if found else "given")
+    recording, _, rows = rows_as_given(gravity, recording, before, options)
+    log = rows.aligned.log
+    if rows.room is not None and rows.aligned.rotation is not None:
+        log = rows.room.put_right(log, rows.aligned.rotation.matrix)
     vector = estimate.parameters.vector + (0.0 if tool is None else tool.parameters.vector)
     left = log.wrench - log.predicted(vector) - recording.wrench_sign * estimate.wrench_bias
     if any(note.startswith(DRIFT_ALLOWED) for note in estimate.notes) and log.time is not None:

@@ -6,6 +6,7 @@ import numpy as np
 
 from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
+from steelyard.identify.room_bias import without
 from steelyard.identify.scale import allow_scale
 from steelyard.identify.tool import shares_bias
 from steelyard.logs.alignment import Aligned
@@ -27,6 +28,7 @@ from steelyard.sanity import (
     of_rows,
     row_noise,
 )
+from steelyard.sanity.after import rotation_of
 
 # A sensor that is said to be tared is not where chance gives such a bias less often than this.
 UNTARED = 1e-6
@@ -58,6 +60,15 @@ def looked_back(
         # With a cause left in, rows only seem to lie in one plane.
         late = tuple(f for f in late if f.code != "nearly-planar")
     return load, estimate, late
+
+
+def room_bias_allowed(load: Load, estimate: Estimate, rows: FitRows) -> Estimate:
+    """Return the estimate with bars that hold how well a bias that keeps its direction in the room is known."""
+    rotation = rotation_of(load.log, rows.aligned)
+    if rows.room is None or rotation is None:
+        return estimate
+    again = (load.of(without(error, load.log, rotation)) for error in rows.room.bias.errors())
+    return estimate.allowing(*(one.parameters.vector - estimate.parameters.vector for one in again))
 
 
 def not_tared(load: Load, estimate: Estimate) -> tuple[Finding, ...]:

@@ -12,9 +12,10 @@ from typing import Literal
 
 import numpy as np
 
-from steelyard.check import Mask
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding, codes
+from steelyard.identify.fit import Bias
 from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.logs.alignment import Aligned, align
 from steelyard.logs.log import MotionLog
@@ -23,11 +24,13 @@ from steelyard.logs.recording import Recording
 from steelyard.logs.runs import runs
 from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options
-from steelyard.sanity import examine_place, fitted_gravity, levelled, one_body
+from steelyard.sanity import examine_place, examine_room_bias, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
 from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
+from steelyard.sanity.fitted.room_bias import SeenRoomBias
 from steelyard.sanity.fitted.sensor_matrix import turn_of
+from steelyard.sanity.fitted.two_masses import ELSEWHERE
 from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
 from steelyard.sanity.holding.small_slip import small_slip
@@ -62,6 +65,7 @@ class FitRows:
     left_out    that time, (start, end) [s] on the wrench clock, where its rows were left out
     place       the point whose positions the recording has, where it is not the origin of S
     maybe       the same where that is not beyond doubt: the rows are those of the origin
+    room        a bias that keeps its direction in the room, which the rows are without
     units       findings that forces and torques do not belong together, where such a point would be no point
     """
 
@@ -74,6 +78,7 @@ class FitRows:
     place: Misplaced | None = None
     maybe: Misplaced | None = None
     units: tuple[Finding, ...] = ()
+    room: SeenRoomBias | None = None
 
     @property
     def kept(self) -> float:
@@ -109,6 +114,22 @@ def rows_to_fit(recording: Recording, before: tuple[Finding, ...], options: Opti
     if rows.delayed and (turn := turn_of(rows.log, recording, before, options.drift)) is not None:
         rows = replace(_rows(recording, before, options, replace(how, turn=turn)), place=rows.place, maybe=rows.maybe)
     return rows
+
+
+def rows_as_given(
+    gravity: Array, recording: Recording, before: tuple[Finding, ...], options: Options
+) -> tuple[Recording, tuple[Finding, ...], FitRows]:
+    """Return recording, findings before the fit, and rows; with gravity as given where a bias passed for a tilt of it.
+
+    gravity  (3,) [m/s^2] in W as given, before the recording was examined
+    """
+    rows = rows_to_fit(recording, before, options)
+    if "base-tilted" not in codes(before):
+        return recording, before, rows
+    level = replace(recording, gravity=gravity)
+    others = tuple(f for f in before if f.code != "base-tilted")
+    again = rows_to_fit(level, others, options)
+    return (recording, before, rows) if again.room is None else (level, others, again)
 
 
 def _placed(
@@ -167,13 +188,43 @@ def _cost(rows: FitRows) -> float:
 
 
 def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Options, how: AlignOptions) -> FitRows:
-    """Return the rows to fit, aligned as said."""
+    """Return the rows to fit, aligned as said, and without a bias that keeps its direction in the room."""
     aligned, level = levelled_as(options.gravity, _aligned(recording, how), recording)
     log, unmeasured = with_known_acceleration(aligned.log, aligned, "motion-mismatch" in codes(before))
+    rows = _held(FitRows(log, aligned, level, unmeasured, ()), recording, before, options)
+    room = _room_bias(rows, log, recording, before, options)
+    rotation = rotation_of(log, aligned)
+    if room is None or rotation is None:
+        return rows
+    # Such a bias looks like a hand in some poses: whether there is one shows without it.
+    whole = FitRows(room.put_right(log, rotation), aligned, level, unmeasured, ())
+    return replace(_held(whole, recording, before, options), room=room)
+
+
+def _room_bias(
+    rows: FitRows, log: MotionLog, recording: Recording, before: tuple[Finding, ...], options: Options
+) -> SeenRoomBias | None:
+    """Return the bias that keeps its direction in the room in the rows that are kept, or in all of `log`; else None."""
+    if options.gravity != "given" or codes(before) & ELSEWHERE or any(f.left_in for f in before):
+        return None
+    bias = Bias(options.bias, drift=options.drift)
+    # Noise that aligning judged with the bias in is not kept.
+    everything = without_dead(with_declared(log, recording.noise))
+    for some in (rows.log, everything)[: 1 + bool(rows.touched)]:
+        rotation = rotation_of(some, rows.aligned)
+        found = examine_room_bias(some, rotation, recording.gravity, recording.wrench_sign, bias)
+        if found is not None:
+            return found
+    return None
+
+
+def _held(rows: FitRows, recording: Recording, before: tuple[Finding, ...], options: Options) -> FitRows:
+    """Return the rows in which the robot alone held one body, and findings about the others."""
+    log = rows.log
     keep: slice | Mask = slice(None)
     touched: tuple[Finding, ...] = ()
     # Where a cause is left in, nothing fits one body: rows that are left out as touched would be chance.
-    whole = not unmeasured and not any(f.left_in for f in before)
+    whole = not rows.unmeasured and not any(f.left_in for f in before)
     if whole:
         keep, touched = one_body(since_start(log, recording), recording, options.bias == "free", options.drift)
     if codes(before) & UNLIKE_ONE_BODY:
@@ -182,11 +233,11 @@ def _as_aligned(recording: Recording, before: tuple[Finding, ...], options: Opti
     log = without_dead(with_declared(log.rows(keep), recording.noise))
     if whole and not touched:
         since = since_start(log, recording)
-        slip = small_slip(since, rotation_of(log, aligned), recording.gravity)
+        slip = small_slip(since, rotation_of(log, rows.aligned), recording.gravity)
         if slip is not None:
             keep, finding = slip.longer_side(since)
             log, touched = log.rows(keep), (finding,)
-    return FitRows(log, aligned, level, unmeasured, touched, left_out)
+    return replace(rows, log=log, touched=touched, left_out=left_out)
 
 
 def _times_of(log: MotionLog, keep: slice | Mask) -> Spans:

@@ -8,6 +8,7 @@ from steelyard.sanity.fitted.free_motion import examine_motion
 from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
 from steelyard.sanity.fitted.misplaced import examine_place
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.fitted.room_bias import examine_room_bias
 from steelyard.sanity.fitted.sagging import allow_sag
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
 from steelyard.sanity.fitted.slow_sensor import allow_filter
@@ -27,6 +28,7 @@ __all__ = [
     "examine_masses",
     "examine_motion",
     "examine_place",
+    "examine_room_bias",
     "examine_sensor",
     "examine_wrench_unit",
     "fitted_gravity",
