@@ -161,8 +161,6 @@ class Rotation:
 
     def _turned(self, vector: Array) -> Array:
         """Return vectors (..., 3) that are known to be finite, expressed in A."""
-        if self.matrix.ndim == 2:
-            return np.asarray(vector @ self.matrix.T)
         return np.asarray(np.einsum("...ij,...j->...i", self.matrix, vector))
 
     def angle(self) -> Array:
