@@ -173,7 +173,8 @@ class _Told:
         against = np.kron(np.diag([1.0, 1 / self.half]), np.eye(some) - np.eye(some)[self.base])
         late, rate = (against @ size).reshape(2, some)
         noise = [((against @ V) * against).sum(1) for V in covariances]
-        late_std, rate_std = np.sqrt(np.maximum(*noise)).reshape(2, some)
+        # Of a fit that went nowhere variances are rounding, and may be below zero.
+        late_std, rate_std = np.sqrt(np.maximum(np.maximum(*noise), 0.0)).reshape(2, some)
         return {
             names[i]: ClockError(float(late[k]), float(rate[k]), self.middle, float(late_std[k]), float(rate_std[k]))
             for k, i in enumerate(self.robots)
