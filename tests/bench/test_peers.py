@@ -5,7 +5,7 @@ import pytest
 
 from steelyard import evaluate
 from steelyard.bench.logs import peers
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.simulate import bounds, simulate_log
 
 METHODS, NOTES = peers.peer_methods()

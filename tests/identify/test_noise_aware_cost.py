@@ -9,8 +9,8 @@ from hypothesis import given, settings
 
 from steelyard.identify.cost import newton, noise_cost
 from steelyard.identify.problem import Problem
-from steelyard.identify.regressor import basis, design, motion_map
 from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia.regressor import basis, design, motion_map
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 from strategies import log_choleskys

@@ -15,8 +15,8 @@ from made_teams import HINGE
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue, CannotAnswer
-from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia.regressor import basis
 from steelyard.io.result_files import result_dict, write_result
 from steelyard.io.result_reading import read_result
 from steelyard.report import render

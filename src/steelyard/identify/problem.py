@@ -12,7 +12,7 @@ from steelyard.findings import counted
 from steelyard.identify.cost.linear import normal_equations, reweighted, solve_scaled
 from steelyard.identify.cost.noise_cost import information, residual_map_of, weights_at
 from steelyard.identify.noise_levels import DEAF, EVERYDAY
-from steelyard.identify.regressor import design
+from steelyard.inertia.regressor import design
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
 

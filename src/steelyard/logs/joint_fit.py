@@ -11,6 +11,7 @@ from steelyard.check import Array
 from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import regressor
 from steelyard.logs.noise import block_sums, huber, robust_std
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -141,8 +142,8 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     return Clocks(found, spread, mounting, theta[layout.slices["body"]], residual)
 
 
-def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
-    """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
+def _rows(question: Question, layout: _Layout, theta: Array) -> tuple[MotionLog, list[Array]]:
+    """Return the rows by the clocks and the mount in theta, and what the accelerometer leaves, (N, 3) if any."""
     motion, wrench, raw = question.seen(layout.delays(theta, question))
     zero = np.zeros_like(motion.omega)
     gravity = motion.gravity
@@ -158,16 +159,23 @@ def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
             # one).
             extra = [(own - shift + pull) / mounting.scale]
         pull = -own
-    log = MotionLog(wrench, pull, zero, motion.omega, motion.alpha)
+    return MotionLog(wrench, pull, zero, motion.omega, motion.alpha), extra
+
+
+def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
+    """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
+    log, extra = _rows(question, layout, theta)
     body, bias = theta[layout.slices["body"]], theta[layout.slices["wrench_bias"]]
-    return np.concatenate([wrench - bias - log.predicted(body), *extra], 1)
+    return np.concatenate([log.wrench - bias - log.predicted(body), *extra], 1)
 
 
 def _jacobian(question: Question, layout: _Layout, theta: Array) -> tuple[Array, Array]:
-    """Return residuals (N, k) and their derivative (N, k, P) by forward differences."""
+    """Return residuals (N, k) and their derivative (N, k, P), forward differences where it is not linear."""
     base = _residual(question, layout, theta)
-    out = np.empty((*base.shape, len(theta)))
-    for i in range(len(theta)):
+    out = np.zeros((*base.shape, len(theta)))
+    out[:, :6, layout.slices["body"]] = -regressor(_rows(question, layout, theta)[0])
+    out[:, :6, layout.slices["wrench_bias"]] = -np.eye(6)
+    for i in range(layout.slices["body"].start):
         moved = theta.copy()
         moved[i] += _STEP
         out[..., i] = (_residual(question, layout, moved) - base) / _STEP

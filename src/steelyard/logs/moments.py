@@ -17,6 +17,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.inertia.regressor import basis
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 
 SIZE = 19
@@ -176,6 +177,11 @@ def features(log: MotionLog) -> Array:
         out,
     )
     return out.T
+
+
+def regressor(log: MotionLog) -> Array:
+    """Return A (N, 6, 10), so that the wrench of row n without bias is A[n] phi."""
+    return np.asarray(np.einsum("kij,nj->nik", basis(), features(log)[:, MOTION]))
 
 
 def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:

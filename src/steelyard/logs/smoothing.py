@@ -55,9 +55,7 @@ class Smooth:
         held)."""
         times = np.clip(time, self.time[0], self.time[-1])
         left = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.time) - 2)
-        states = _quintic(self.time, self.states, times, left)
-        variance = np.stack([np.interp(times, self.time, v) for v in self.variance.T], 1)
-        return states, variance
+        return _quintic(self.time, self.states, self.variance, times, left)  # type: ignore[no-any-return]
 
 
 def smooth(time: Array, values: Array, noise_dof: int | None = None, cutoff_hz: float | None = None) -> Smooth:
@@ -161,16 +159,23 @@ def smooth_rotations(time: Array, rotation: Rotation, cutoff_hz: float | None = 
 
 def _conjugate_times(q: Array, p: Array) -> Array:
     """Return the vector part of q* p for quaternions (N, 4), scalar first."""
-    return np.asarray(q[:, :1] * p[:, 1:] - p[:, :1] * q[:, 1:] - np.cross(q[:, 1:], p[:, 1:]))
+    w, x, y, z = q.T
+    a, b, c, d = p.T
+    return np.stack([w * b - x * a - y * d + z * c, w * c - y * a - z * b + x * d, w * d - z * a - x * c + y * b], 1)
 
 
 @njit(cache=True, error_model="numpy")
-def _quintic(knots: Any, states: Any, times: Any, left: Any) -> Any:
-    """Return states (M, 3, D) at times (M,), each right of its knot `left`, from states (N, 3, D) at the knots."""
-    out = np.empty((len(times), 3, states.shape[2]))
+def _quintic(knots: Any, states: Any, variance: Any, times: Any, left: Any) -> Any:
+    """Return states (M, 3, D) and variances (M, 3) at times (M,), each right of its knot `left`.
+
+    The states (N, 3, D) at the knots are met by quintics, the variances (N, 3) by straight lines.
+    """
+    out, between = np.empty((len(times), 3, states.shape[2])), np.empty((len(times), 3))
     for k in range(len(times)):
         a, b, h = states[left[k]], states[left[k] + 1], knots[left[k] + 1] - knots[left[k]]
         s = (times[k] - knots[left[k]]) / h
+        for d in range(3):
+            between[k, d] = variance[left[k], d] + s * (variance[left[k] + 1, d] - variance[left[k], d])
         for c in range(states.shape[2]):
             gap = b[0, c] - a[0, c] - a[1, c] * h - a[2, c] * h**2 / 2
             slope = (b[1, c] - a[1, c] - a[2, c] * h) * h
@@ -180,7 +185,7 @@ def _quintic(knots: Any, states: Any, times: Any, left: Any) -> Any:
             out[k, 0, c] = a[0, c] + a[1, c] * h * s + a[2, c] * (h * s) ** 2 / 2 + s**3 * (c3 + s * (c4 + s * c5))
             out[k, 1, c] = a[1, c] + a[2, c] * h * s + s**2 * (3 * c3 + s * (4 * c4 + s * 5 * c5)) / h
             out[k, 2, c] = a[2, c] + s * (6 * c3 + s * (12 * c4 + s * 20 * c5)) / h**2
-    return out
+    return out, between
 
 
 def _best_ratio(clock: Array, values: Array, order: int) -> tuple[float, int, float]:

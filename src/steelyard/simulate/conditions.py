@@ -4,18 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.identify.regressor import basis
 from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import MOTION, features
+from steelyard.logs.moments import regressor
 
 # Entries of the regressor that change by less than this share of its largest do not change at all.
 CONSTANT = 1e-12
-
-
-def regressor(log: MotionLog) -> Array:
-    """Return A (N, 6, 10), so that the wrench of row n without bias is A[n] phi."""
-    return np.asarray(np.einsum("kij,nj->nik", basis(), features(log)[:, MOTION]))
 
 
 def condition(log: MotionLog) -> float:

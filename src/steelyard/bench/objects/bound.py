@@ -12,8 +12,8 @@ from steelyard import evaluate
 from steelyard.check import Array
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
 from steelyard.identify.cost.noise_cost import residual_map_of, weight
-from steelyard.identify.regressor import design
 from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia.regressor import design
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments
 from steelyard.parts.parts import Parts

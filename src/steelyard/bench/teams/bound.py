@@ -17,8 +17,8 @@ from steelyard.bench.asked import Progress
 from steelyard.bench.teams.intervals import errors
 from steelyard.check import Array
 from steelyard.identify.people import people_jacobian
-from steelyard.identify.regressor import basis, motion_map
 from steelyard.inertia.parameters import frame_change
+from steelyard.inertia.regressor import basis, motion_map
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene
 from steelyard.team.adjoint import adjoint_inverse

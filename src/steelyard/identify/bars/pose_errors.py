@@ -17,8 +17,8 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
 from steelyard.identify.problem import Problem
-from steelyard.identify.regressor import motion_map
 from steelyard.identify.solution import Solution
+from steelyard.inertia.regressor import motion_map
 
 # Gravity must spread by this along an axis of S [m/s^2], some three degrees.
 SPREAD = 0.5

@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.identify.cost.linear import inverse_scaled
-from steelyard.identify.regressor import design, motion_map
+from steelyard.inertia.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
 from steelyard.logs.noise import robust_std

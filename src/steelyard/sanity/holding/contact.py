@@ -10,7 +10,7 @@ from scipy.special import chdtrc
 
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
-from steelyard.identify.regressor import design
+from steelyard.inertia.regressor import design
 from steelyard.logs.clock import median_step
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features

@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.identify.regressor import motion_map
+from steelyard.inertia.regressor import motion_map
 from steelyard.team.payload.fit import PayloadFit, fit_payload
 from steelyard.team.payload.model import Group, weight
 from steelyard.team.payload.spectra import Spectra

@@ -15,7 +15,7 @@ from scipy.ndimage import uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.identify.regressor import motion_map
+from steelyard.inertia.regressor import motion_map
 from steelyard.logs.log import Mask
 from steelyard.spatial import unit_vectors
 from steelyard.team.changes.touched import MEAN_S, around

@@ -14,7 +14,7 @@ from scipy.ndimage import binary_dilation, uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.identify.regressor import motion_map
+from steelyard.inertia.regressor import motion_map
 from steelyard.logs.log import Mask
 from steelyard.team.payload.body_rows import BodyRows, Run
 from steelyard.team.payload.model import weight

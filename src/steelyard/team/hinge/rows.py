@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.hinge.poses import Hinged
 from steelyard.team.payload.body_rows import BodyRows, Run, from_poses, summing

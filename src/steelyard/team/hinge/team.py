@@ -11,9 +11,9 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import Evidence
 from steelyard.findings import Finding
-from steelyard.identify.regressor import basis
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.parameters import frame_change
+from steelyard.inertia.regressor import basis
 from steelyard.logs.log import Integers, Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, cross_matrix

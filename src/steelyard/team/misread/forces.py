@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding, percent
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.logs.log import Integers, Mask
 from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
 from steelyard.team.misread.signs import sign_finding

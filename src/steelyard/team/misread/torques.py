@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.logs.log import Integers
 from steelyard.team.payload.leftover import scatter, unexplained
 from steelyard.team.payload.model import Group

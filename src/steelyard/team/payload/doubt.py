@@ -7,7 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.identify.regressor import motion_map
+from steelyard.inertia.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
 from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.model import (

@@ -14,7 +14,7 @@ from functools import cached_property
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.logs.log import Integers, Mask
 from steelyard.team.payload.spectra import Spectra
 

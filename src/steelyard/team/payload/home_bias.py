@@ -18,7 +18,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.regressor import basis
+from steelyard.inertia.regressor import basis
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.bias_models import Models, ladder_of, shares
 from steelyard.team.payload.fit import PayloadFit

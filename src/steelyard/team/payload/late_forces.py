@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, with_bar
-from steelyard.identify.regressor import motion_map
+from steelyard.inertia.regressor import motion_map
 from steelyard.logs.conditioning import FILTERED, taken_by_filter
 from steelyard.logs.curve import Curve
 from steelyard.team.payload.body_rows import BodyRows, Run

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.identify.regressor import basis, motion_map
+from steelyard.inertia.regressor import basis, motion_map
 from steelyard.logs.log import Mask
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.payload.gain_sight import GainSight, gain_columns, gain_sight, of_force
