@@ -33,7 +33,8 @@ REMEDIES: dict[str, str] = {
     "channel-saturated": "Lower the load, move more gently, or take a sensor with a wider range.",
     "bias-drift": "Warm the sensor up, tare just before the run, or record shorter runs.",
     "outliers": "Nothing to do if knocks were expected; the rows were left out.",
-    "contact": "Keep people and fixtures off the object, then record again; the touched time was left out.",
+    "contact": "Keep people and fixtures off the object, then record again; the touched time was left out. An arm that "
+    "estimates its wrench from the torques of its joints may err as much by itself.",
     "load-changed": "Record one run per load: cut the log where the load changed.",
     "too-few-poses": "Add still poses whose gravity directions in S differ by more than 30 degrees.",
     "nearly-planar": "Add poses that tilt gravity out of that plane, so that it visits all axes of S.",

@@ -30,7 +30,7 @@ def together(log: TeamLog) -> tuple[TeamLog, ClockErrors]:
     Recordings at rest show no lag: they have that of the robot's motions, where these are of one mind.
     """
     found = [{name: _late(recording, log.reference, name) for name in recording.tracks} for recording in log.recordings]
-    usual = {name: _usual([late[name] for late in found if late.get(name) is not None]) for name in log.names}
+    usual = {name: _usual([own for late in found if (own := late.get(name)) is not None]) for name in log.names}
     errors = [
         {name: ClockError(late) for name, own in each.items() if (late := usual[name] if own is None else own)}
         for each in found
