@@ -86,8 +86,8 @@ def _with_clocks(found: TeamEstimate, apart: ClockErrors, log: TeamLog) -> TeamE
         return found
     found = clocked(found, apart.first(log))
     others = (finding for finding in found.findings if finding.code != "clock-offset")
-    late = late_clocks(found.clock_offsets_s, found.clock_offset_std_s)
-    return replace(found, findings=(*apart.findings(log), *late, *others))
+    said = (*apart.findings(log), *late_clocks(found.clock_offsets_s, found.clock_offset_std_s), *others)
+    return replace(found, findings=tuple(sorted(said, key=lambda finding: finding.code != "robot-excluded")))
 
 
 def _remedied(found: TeamEstimate) -> TeamEstimate:
