@@ -33,7 +33,8 @@ REMEDIES: dict[str, str] = {
     "channel-saturated": "Lower the load, move more gently, or take a sensor with a wider range.",
     "bias-drift": "Warm the sensor up, tare just before the run, or record shorter runs.",
     "outliers": "Nothing to do if knocks were expected; the rows were left out.",
-    "contact": "Keep people and fixtures off the object, then record again; the touched time was left out.",
+    "contact": "Keep people and fixtures off the object, then record again; the touched time was left out. An arm that "
+    "estimates its wrench from the torques of its joints may err as much by itself.",
     "load-changed": "Record one run per load: cut the log where the load changed.",
     "too-few-poses": "Add still poses whose gravity directions in S differ by more than 30 degrees.",
     "nearly-planar": "Add poses that tilt gravity out of that plane, so that it visits all axes of S.",
@@ -68,7 +69,7 @@ REMEDIES: dict[str, str] = {
     "grasp-slipped": "Clamp this grasp tighter; record again if you need its pose after the slip.",
     "robot-left": "Nothing to do if the robot was meant to let go; its rows after that were left out.",
     "robot-joined": "Nothing to do if the robot was meant to join; its rows before that were left out.",
-    "robot-excluded": "Check this robot's clock (to within 2 s), encoders, kinematics and columns, or leave it out.",
+    "robot-excluded": "Check whether its file is of this run, its clock, encoders and columns, or leave it out.",
     "turning-gains": "Calibrate the gyros against each other, or take twists from poses where a base stands.",
     "common-gain-unseen": "Weigh a known mass with the team once; a gain error that all robots share looks like mass.",
     "payload-jointed": "Weigh one body by itself to know each mass; lock the hinge to weigh both as one.",

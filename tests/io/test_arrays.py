@@ -98,6 +98,7 @@ def test_rows_with_nan_are_left_out_as_of_files(tmp_path: Path) -> None:
         (np.roll(TURN.quaternion_wxyz(), -1, axis=1), "quaternion-xyzw"),
         (TURN.rpy(), "rpy"),
         (TURN.log(), "rotation-vector"),
+        (ScipyRotation.from_matrix(TURN.matrix).as_euler("ZYZ"), "zyz"),
     ],
 )
 def test_every_form_of_rotation_is_the_same_rotation(rotation: Any, form: str | None) -> None:
@@ -155,7 +156,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     (
         {"rotation": TURN.log()},
         "recording, rotation: shape (40, 3) does not say what the numbers are. "
-        'Say form="rpy" or "rotation-vector"; it turns S into W.',
+        'Say form="rpy" or "rotation-vector" or "zyz"; it turns S into W.',
     ),
     (
         {"rotation": TURN.matrix, "form": "rpy"},

@@ -68,9 +68,9 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
     ("unit that nobody uses", '"N*m"', '"daN*km"', f'{STREAM}, torque: unknown unit "daN*km". Possible here: N*m, N*mm, kgf*m, lbf*in.'),
     ("unknown unit", '"N"', '"lb"', f'{STREAM}, force: unknown unit "lb". Did you mean "lbf"? Possible here: N, kN, kgf, lbf.'),
     ("unknown time unit", '"s"', '"minutes"', f'{STREAM}, time: unknown unit "minutes". Possible here: s, ms, us, ns.'),
-    ("unknown form", '"quaternion-wxyz"', '"quaternion"', f'{STREAM}, rotation: unknown form "quaternion". Did you mean "quaternion-xyzw"? Possible here: matrix, quaternion-wxyz, quaternion-xyzw, rpy, rotation-vector.'),
-    ("no form", ', form = "quaternion-wxyz"', "", f'{STREAM}, rotation: "form" is missing. Example: form = "matrix"; one of matrix, quaternion-wxyz, quaternion-xyzw, rpy, rotation-vector'),
-    ("unit of matrix", 'form = "quaternion-wxyz"', 'form = "matrix", unit = "deg"', f'{STREAM}, rotation: "unit" belongs to form = "rpy" and "rotation-vector"; a matrix has none.'),
+    ("unknown form", '"quaternion-wxyz"', '"quaternion"', f'{STREAM}, rotation: unknown form "quaternion". Did you mean "quaternion-xyzw"? Possible here: matrix, quaternion-wxyz, quaternion-xyzw, rpy, rotation-vector, zyz.'),
+    ("no form", ', form = "quaternion-wxyz"', "", f'{STREAM}, rotation: "form" is missing. Example: form = "matrix"; one of matrix, quaternion-wxyz, quaternion-xyzw, rpy, rotation-vector, zyz'),
+    ("unit of matrix", 'form = "quaternion-wxyz"', 'form = "matrix", unit = "deg"', f'{STREAM}, rotation: "unit" belongs to form = "rpy", "rotation-vector" and "zyz"; a matrix has none.'),
     ("two columns", '["fx", "fy", "fz"]', '["fx", "fy"]', f"{STREAM}, force: \"columns\" must have 3 entries; got 2: ['fx', 'fy']."),
     ("column twice", '["fx", "fy", "fz"]', '["fx", "fy", "fy"]', f"{STREAM}, force: \"columns\" names a column twice: ['fx', 'fy', 'fy']."),
     ("column of wrong kind", '["fx", "fy", "fz"]', "[-1, 1, 2]", f'{STREAM}, force: "columns" must be a list of names or of numbers from 0; got [-1, 1, 2].'),
@@ -87,7 +87,7 @@ DESCRIPTIONS: list[tuple[str, str, str, str]] = [
     ("mount too long", 'path     = "a.csv"', 'path = "a.csv"\nmount = { rotation = [1,1,0,0], form = "quaternion-wxyz" }', f"{STREAM}, mount: the quaternion must have norm 1: norm 1.414. Check the four numbers."),
     ("unit of no position", 'path     = "a.csv"', 'path = "a.csv"\nmount = { rotation = [0,0,90], form = "rpy", unit = "deg" }', f'{STREAM}, mount: "unit" belongs to "position", which is left out; angles have "angle_unit".'),
     ("form of no rotation", 'path     = "a.csv"', 'path = "a.csv"\nmount = { position = [0,0,1], form = "rpy" }', f'{STREAM}, mount: "form" belongs to "rotation", which is left out.'),
-    ("angle unit of a matrix", 'path     = "a.csv"', 'path = "a.csv"\nmount = { rotation = [1,0,0,0,1,0,0,0,1], form = "matrix", angle_unit = "deg" }', f'{STREAM}, mount: "angle_unit" belongs to a rotation of form = "rpy" or "rotation-vector".'),
+    ("angle unit of a matrix", 'path     = "a.csv"', 'path = "a.csv"\nmount = { rotation = [1,0,0,0,1,0,0,0,1], form = "matrix", angle_unit = "deg" }', f'{STREAM}, mount: "angle_unit" belongs to a rotation of form = "rpy", "rotation-vector" or "zyz".'),
     ("mount in degrees", 'path     = "a.csv"', 'path = "a.csv"\nmount = { rotation = [0,0,90], form = "rpy" }', f'{STREAM}, mount: roll, pitch or yaw reaches 90 rad, which is 14.3 turns: it looks like degrees. Set angle_unit = "deg".'),
     ("mount of poses", "rotation =", '[[stream]]\npath = "a.csv"\ntime = { columns = ["t"], unit = "s" }\nmount = { position = [0,0,0.1], unit = "m" }\nrotation =', 'log.toml, [[stream]] 2 ("a.csv"), mount: of use beside force, torque or specific_force only; this stream has none of them. If its poses are those of another frame, call that frame S: then the mount of the wrench\'s stream is the sensor\'s pose in it.'),
     ("empty mount", 'path     = "a.csv"', 'path = "a.csv"\nmount = { }', f'{STREAM}, mount: give "rotation", "position" or both.'),
@@ -404,5 +404,5 @@ def test_all_mistakes_of_a_description_are_told_at_once(tmp_path: Path) -> None:
         f'{STREAM}, torque: unknown unit "N*cm". Multiply its numbers by 0.01 and declare "N*m". Possible here: N*m, '
         "N*mm, kgf*m, lbf*in.",
         f'{STREAM}, rotation: unknown form "wxyz". Possible here: matrix, quaternion-wxyz, quaternion-xyzw, rpy, '
-        "rotation-vector.",
+        "rotation-vector, zyz.",
     ]

@@ -21,6 +21,7 @@ from steelyard.spatial import Pose, Rotation
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)
 WRENCH, POSE, TF = "geometry_msgs/msg/WrenchStamped", "geometry_msgs/msg/PoseStamped", "tf2_msgs/msg/TFMessage"
+IMU = "sensor_msgs/msg/Imu"
 START = 1_700_000_000_000_000_000  # ns since 1970
 Message = tuple[str, str, int, Any]  # topic, type, time of receipt, message
 
@@ -45,6 +46,11 @@ class Maker:
     def wrench(self, stamp: int, force: Sequence[float], torque: Sequence[float]) -> Any:
         both = self.types["geometry_msgs/msg/Wrench"](self.vector(force), self.vector(torque))
         return self.types["geometry_msgs/msg/WrenchStamped"](self.header(stamp, "ft"), both)
+
+    def imu(self, stamp: int) -> Any:
+        no, turn = np.zeros(9), self.quaternion(Rotation.identity())
+        rate, felt = self.vector([0, 0, 0]), self.vector([0, 0, 9.81])
+        return self.types[IMU](self.header(stamp, "imu"), turn, no, rate, no, felt, no)
 
     def pose(self, stamp: int, pose: Pose) -> Any:
         kind = self.types["geometry_msgs/msg/Pose"]
@@ -440,3 +446,13 @@ def test_messages_of_another_type_are_not_read(tmp_path: Path) -> None:
     assert 'topic "/s" holds own_msgs/msg/Strange, a type of message that is not read.' in message(
         describe(tmp_path, "run", text)
     )
+
+
+def test_a_bare_bag_with_an_accelerometer_alone_is_read_by_it(tmp_path: Path) -> None:
+    maker = Maker(ROS2)
+    out = [m for m in log_of(maker, 20)[0] if m[0] == "/ft"]
+    out += [("/imu", IMU, stamp, maker.imu(stamp)) for _, _, stamp, _ in out]
+    write_bag(tmp_path / "run", out)
+    said = message(tmp_path / "run")
+    assert 'topic    = "/imu"\nspecific_force = { columns = ["linear_acceleration"], unit = "m/s^2" }' in said
+    assert "/tf" not in said

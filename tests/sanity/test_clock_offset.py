@@ -9,7 +9,7 @@ import pytest
 
 from sanity.held_poses import recorded, swaying
 from sanity.traps import edited
-from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
 from steelyard.sanity.readings.clock_offset import examine_offset
 from steelyard.spatial import Rotation
@@ -34,6 +34,16 @@ def test_clocks_are_brought_together(late: float) -> None:
     assert f"{'late' if late > 0 else 'early'} by {abs(late):.1f} s" in found.findings[0].message
     assert found.codes() == right.codes() | {"stream-delayed"}
     assert found.delays_s["poses.csv"] == pytest.approx(late, abs=0.01)
+    np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=2e-3, atol=1e-4)
+
+
+def test_a_mount_that_is_given_turns_the_wrench() -> None:
+    recording, turn = recorded("paper", 0), Rotation.exp([0.0, 0.0, 0.6])
+    own = turn.inverse().apply
+    felt, posed = apart(edited(recording, force=own, torque=own), 1.7e9).streams
+    found = identify(replace(recording, streams=(replace(felt, mount=Mount(turn)), posed)))
+    right = identify(apart(recording, 0.0))
+    assert found.delays_s["poses.csv"] == pytest.approx(1.7e9, abs=0.01)
     np.testing.assert_allclose(found.parameters.vector[:4], right.parameters.vector[:4], rtol=2e-3, atol=1e-4)
 
 

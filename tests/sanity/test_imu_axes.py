@@ -103,3 +103,32 @@ def test_a_gyroscope_whose_axes_are_turned(tmp_path: Path) -> None:
 
 def test_a_gyroscope_along_s_is_left_alone(tmp_path: Path) -> None:
     assert examine(with_gyroscope(tmp_path, "S", Rotation.exp([0.0, 0.0, 0.1])))[1] == ()
+
+
+def in_one_unit(folder: Path, mount: Rotation, gyroscope: Rotation) -> Recording:
+    """A log without orientations: an accelerometer in axes turned by `mount`, a gyroscope turned by `gyroscope`."""
+    made, turning = by_accelerometer(folder, False, mount), with_gyroscope(folder, "S", gyroscope).streams[-1]
+    (imu,) = (s for s in made.streams if "specific_force" in s.channels)
+    assert imu.time is not None
+    assert turning.time is not None
+    clock, values = turning.time - (turning.delay or 0.0), turning.channels["angular_velocity"]
+    omega = np.stack([np.interp(imu.time - (imu.delay or 0.0), clock, v) for v in values.T], 1)
+    whole = replace(imu, channels={**imu.channels, "angular_velocity": omega})
+    return replace(made, streams=tuple(whole if s is imu else s for s in made.streams))
+
+
+@pytest.mark.parametrize("turn", [[0.4, -1.1, 2.0], [0.0, 0.0, 0.8]])
+def test_a_gyroscope_in_the_axes_of_its_accelerometer_is_turned_with_it(tmp_path: Path, turn: list[float]) -> None:
+    mount = Rotation.exp(turn)
+    read, findings = examine(in_one_unit(tmp_path, mount, mount))
+    assert [f.code for f in findings] == ["imu-rotated"]
+    assert "is in the axes of its accelerometer, turned by" in findings[0].message
+    right, _ = examine(in_one_unit(tmp_path, mount, Rotation.identity()))
+    both = [next(s for s in r.streams if "angular_velocity" in s.channels) for r in (read, right)]
+    gap, meant = both[0].channels["angular_velocity"], both[1].channels["angular_velocity"]
+    assert np.sqrt(((gap - meant) ** 2).mean()) < 0.05 * np.sqrt((meant**2).mean())
+
+
+@pytest.mark.parametrize("mount", MOUNTS, ids=["along", "turned"])
+def test_a_gyroscope_in_s_beside_an_accelerometer_is_left_alone(tmp_path: Path, mount: Rotation) -> None:
+    assert examine(in_one_unit(tmp_path, mount, Rotation.identity()))[1] == ()

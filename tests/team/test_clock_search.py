@@ -10,9 +10,12 @@ import numpy as np
 import pytest
 from made_teams import HINGE, NOISY_TWISTS
 
+from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog
+from steelyard.pipelines.shared_payload import identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.team.clocks.apart import together
 from steelyard.team.clocks.errors import NOTHING
 from steelyard.team.clocks.search import far_lags, searched
 from steelyard.team.joint import JointTeam
@@ -53,6 +56,39 @@ def test_several_late_clocks_and_missing_rows() -> None:
     found = JointTeam().identify(late(made.log, robot1=1.1, robot3=-0.6))
     for name, seconds in (("robot1", 1.1), ("robot2", 0.0), ("robot3", -0.6)):
         assert found.clock_offsets_s[name] == pytest.approx(seconds, abs=2e-3)
+
+
+@pytest.mark.parametrize("sensing", ["poses", "twists"])
+@pytest.mark.parametrize("seconds", [5.0, -700.0, 1.7e9])
+def test_clocks_that_count_from_different_moments(sensing: str, seconds: float) -> None:
+    made = trial(sensing=sensing, bases_move=sensing == "twists")
+    right, found = identify_team(made.log), identify_team(late(made.log, robot1=seconds, robot2=-3.0))
+    assert found.clock_offsets_s["robot1"] == pytest.approx(seconds, abs=2e-3)
+    assert found.clock_offsets_s["robot2"] == pytest.approx(-3.0, abs=2e-3)
+    assert found.codes() == {"clock-offset"}
+    assert found.mass == pytest.approx(right.mass, abs=0.05)
+    assert np.linalg.norm(found.com - right.com) < 1e-3
+
+
+def test_clocks_that_nothing_tells_apart_are_refused() -> None:
+    made, other = trial(), trial(seed=1)
+    moved = late(made.log, robot1=500.0)
+    mixed = moved.with_recordings(
+        *(
+            replace(r, tracks={**r.tracks, "robot1": o.tracks["robot1"].shifted(500.0)})
+            for r, o in zip(moved.recordings, other.log.recordings, strict=True)
+        )
+    )
+    with pytest.raises(BadValue, match=r"must overlap; they do not: robot0 0 to .* robot1 500 to"):
+        identify_team(mixed)
+    with pytest.raises(BadValue, match="must overlap; they do not"):
+        identify_team(moved, method="paper")
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_clocks_that_a_fit_brings_together_are_left_to_it(seed: int) -> None:
+    for log in (trial(seed=seed).log, late(trial(seed=seed).log, robot1=1.7), trial(robots=4, hinge=HINGE).log):
+        assert together(log) == (log, NOTHING)
 
 
 @pytest.mark.parametrize("case", CASES)

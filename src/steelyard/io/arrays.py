@@ -44,7 +44,7 @@ class Arrays(TypedDict, total=False):
     time       (N,) [s] or datetime64; or `rate` [Hz] without stamps; or poses=True for a table of still poses
     force, torque    (N, 3) [N], [N m]; torque="zero" declares a wrist that passes no moment
     rotation   of S in W: a Rotation, SciPy's, matrices (N, 3, 3) or (N, 9); or (N, 4) and (N, 3) with their `form`:
-               "quaternion-wxyz", "quaternion-xyzw", "rpy" [rad], "rotation-vector" [rad]
+               "quaternion-wxyz", "quaternion-xyzw", "rpy", "rotation-vector", "zyz" [rad]
     position   (N, 3) [m] of the S origin in W
     linear_velocity, angular_velocity, linear_acceleration, angular_acceleration    (N, 3) [m, rad, s], classical,
                of the S origin, gravity not included

@@ -1,4 +1,5 @@
-"""Rotations as files write them: matrices row by row, quaternions in both orders, roll pitch yaw, rotation vectors."""
+"""Rotations as files write them: matrices row by row, quaternions in both orders, roll pitch yaw, rotation vectors,
+and angles about z, y, z."""
 
 from __future__ import annotations
 
@@ -10,8 +11,9 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.spatial import Rotation
 
-FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4, "rpy": 3, "rotation-vector": 3}
-ANGULAR = ("rpy", "rotation-vector")  # forms whose numbers have a unit
+# Forms whose numbers have a unit, and what reads them in radians.
+ANGULAR = {"rpy": Rotation.from_rpy, "rotation-vector": Rotation.exp, "zyz": Rotation.from_zyz}
+FORMS: dict[str, int] = {"matrix": 9, "quaternion-wxyz": 4, "quaternion-xyzw": 4, **dict.fromkeys(ANGULAR, 3)}
 
 ROUNDING = 5e-3  # how far R^T R may be from 1: a matrix written with three digits after the point
 NORM = 0.05  # how far the length of a quaternion may be from 1
@@ -29,7 +31,7 @@ def rotation_of(values: Array, form: str, angle: float = 1.0, unit_key: str = "u
     """
     if form in ANGULAR:
         _check_angles(values * angle, form, unit_key)
-        return Rotation.from_rpy(values * angle) if form == "rpy" else Rotation.exp(values * angle)
+        return ANGULAR[form](values * angle)
     if form == "matrix":
         return _of_matrix(values.reshape(*values.shape[:-1], 3, 3))
     _check_norm(values)
@@ -80,7 +82,7 @@ def _check_angles(angles: Array, form: str, unit_key: str) -> None:
     """Raise BadValue where a wrist would have turned round more often than any does: degrees read as radians."""
     most = float(np.nanmax(np.abs(angles), initial=0.0))
     if most > TURNS:
-        what = "roll, pitch or yaw" if form == "rpy" else "the rotation vector"
+        what = {"rpy": "roll, pitch or yaw", "zyz": "an angle about z or y"}.get(form, "the rotation vector")
         raise BadValue(
             f"{what} reaches {most:.4g} rad, which is {most / (2 * np.pi):.1f} turns: it looks like "
             f'degrees. Set {unit_key} = "deg".'

@@ -168,7 +168,8 @@ def _rows(given: Prepared) -> tuple[Array, Felt]:
             f"the wrench runs from {given.clock[0]:.13g} to {given.clock[-1]:.13g} s, "
             f"the others together from {start:.13g} to {end:.13g} s. "
             "Check the time units and that all are of one run. Clocks of separate files that count from different "
-            "moments are brought together only where the force turns with the poses: check the rotation, too."
+            "moments are brought together only where the force turns with the poses: check the rotation, its form and "
+            "unit, and the mount of the wrench, too."
         )
     if shared.sum() < _FEWEST_ROWS:
         first, last = max(start, float(given.clock[0])), min(end, float(given.clock[-1]))

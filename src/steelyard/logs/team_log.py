@@ -9,7 +9,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from types import MappingProxyType
-from typing import Literal, TypeVar, get_args
+from typing import ClassVar, Literal, TypeVar, get_args
 
 import numpy as np
 
@@ -36,7 +36,12 @@ class TeamRecording:
 
     kind  "grasp" (free motion), "still" (held at rest) or "motion" (with wrenches)
     away  robots known to hold nothing during the whole recording; others without a track are merely missing
+
+    Raises BadValue where clocks have no time in common and tracks in motion are too short (LONG_S) to show how far they
+    are apart.
     """
+
+    LONG_S: ClassVar[float] = 5.0
 
     kind: Kind
     tracks: Mapping[str, Track]
@@ -51,6 +56,11 @@ class TeamRecording:
         object.__setattr__(self, "tracks", MappingProxyType(dict(self.tracks)))
         object.__setattr__(self, "away", frozenset(self.away))
         require_one_clock_unit(self.name, self.tracks)
+        if self.kind != "still" and min(float(np.ptp(t.time)) for t in self.tracks.values()) < self.LONG_S:
+            self.require_overlap()
+
+    def require_overlap(self) -> None:
+        """Raise BadValue where the tracks have no time in common."""
         begin, end = self.span
         if len(self.tracks) > 1 and begin > end:
             ranges = "; ".join(f"{n} {t.time[0]:.6g} to {t.time[-1]:.6g} s" for n, t in self.tracks.items())

@@ -27,6 +27,8 @@ from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
 from steelyard.pipelines.telling import MISREAD
 from steelyard.team.clipped import without_clipped
+from steelyard.team.clocks.apart import together
+from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.frozen import without_frozen
 from steelyard.team.joint import JointTeam
@@ -35,6 +37,8 @@ from steelyard.team.misread.length_units import require_one_length_unit
 from steelyard.team.misread.same_numbers import require_own_numbers, stuck_forces
 from steelyard.team.published import PublishedTeam
 from steelyard.team.really_still import with_moves_as_motion
+from steelyard.team.team_findings import late_clocks
+from steelyard.team.weighed import clocked
 
 Method = Literal["joint", "paper"]
 METHODS: tuple[Method, ...] = get_args(Method)
@@ -64,13 +68,26 @@ def identify_team(log: TeamLog, method: Method = "joint") -> TeamEstimate:
     require_one_length_unit(log)
     require_own_numbers(log)
     log, moving = with_moves_as_motion(log)
+    log, apart = together(log) if method == "joint" else (log, NOTHING)
+    for recording in log.recordings:
+        recording.require_overlap()
     live, frozen = without_frozen(log)
     whole, clipped = without_clipped(live)
-    found = ESTIMATORS[method].identify(whole)
+    found = _with_clocks(ESTIMATORS[method].identify(whole), apart, log)
     lost = (*_repeated_rows(log), *_missing_rows(log), *_missing_wrenches(log, method))
     seen = (*stuck_forces(log), *frozen, *clipped, *found.findings, *lost)
     found = replace(found, findings=seen, notes=(*moving, *found.notes)).by_cause()
     return _weighed(_with_gravity(_remedied(found), log))
+
+
+def _with_clocks(found: TeamEstimate, apart: ClockErrors, log: TeamLog) -> TeamEstimate:
+    """Return the estimate with how late clocks were that were brought together before it."""
+    if not apart:
+        return found
+    found = clocked(found, apart.first(log))
+    others = (finding for finding in found.findings if finding.code != "clock-offset")
+    said = (*apart.findings(log), *late_clocks(found.clock_offsets_s, found.clock_offset_std_s), *others)
+    return replace(found, findings=tuple(sorted(said, key=lambda finding: finding.code != "robot-excluded")))
 
 
 def _remedied(found: TeamEstimate) -> TeamEstimate:

@@ -25,7 +25,8 @@ if TYPE_CHECKING:
 FOLLOWS_NOT = (
     "Gravity takes enough directions of the sensor for that, as the log was read, but the forces do not turn with it. "
     "Check form, order, unit and sense of the rotation, the frame and the mount of the wrench, stuck channels, and "
-    "whether the clocks are of one run; or a controller takes the weight away, or it is lost in noise."
+    "whether the clocks are of one run; or nothing is held, a controller takes the weight away, or "
+    "it is lost in noise."
 )
 # Findings after which motion or wrench are no body's.
 MISREAD = {"wrench-unexplained", "motion-mismatch", "weight-compensated"}

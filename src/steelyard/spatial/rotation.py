@@ -109,6 +109,13 @@ class Rotation:
         return cls.exp(about[..., 2, :]) @ cls.exp(about[..., 1, :]) @ cls.exp(about[..., 0, :])
 
     @classmethod
+    def from_zyz(cls, angles: ArrayLike) -> Rotation:
+        """Return R = Rz(a) Ry(b) Rz(c) from (..., 3) a, b, c [rad] (Doosan, Kawasaki)."""
+        about = check.vectors("zyz", angles)
+        z, y = np.eye(3)[2], np.eye(3)[1]
+        return cls.exp(about[..., :1] * z) @ cls.exp(about[..., 1:2] * y) @ cls.exp(about[..., 2:] * z)
+
+    @classmethod
     def exp(cls, vector: ArrayLike) -> Rotation:
         """Return rotations about `vector` (..., 3) by its length [rad].
 

@@ -14,6 +14,8 @@ from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 # A clock is called late from so much [s] and so many standard deviations.
 LATE_S, LATE_STD = 1e-3, 3.0
+# More than this is told in seconds.
+LONG_S = 10.0
 # A robot's poses are bad from so many times the noise of the middle one of the team.
 BAD = 20.0
 # A gain error is worth a word from this share.
@@ -103,7 +105,8 @@ def late_clocks(late: Mapping[str, float], std: Mapping[str, float]) -> Iterator
         doubt = std.get(name, 0.0)
         if abs(seconds) > max(LATE_S, LATE_STD * doubt):
             way = "late" if seconds > 0 else "early"
-            text = f"The stamps of '{name}' are {with_bar(1e3 * abs(seconds), 1e3 * doubt)} ms {way}"
+            unit, scale = ("s", 1.0) if abs(seconds) > LONG_S else ("ms", 1e3)
+            text = f"The stamps of '{name}' are {with_bar(scale * abs(seconds), scale * doubt)} {unit} {way}"
             yield Finding.of("clock-offset", f"{text} against the reference; they were put right.")
 
 

@@ -31,7 +31,7 @@ _TCP = "\n# the TCP that is set in the controller must be S"
 _BASE = "in the base's axes, as {} gives it"
 _HAND = "of {} in W; S must be there"
 
-_TURNS = "KUKA turns by A about z first, Doosan and Kawasaki about z, y, z, which needs matrices; S to W"
+_TURNS = "KUKA turns by A about z first; Doosan and Kawasaki about z, y, z: a, b, c in form zyz; S to W"
 
 # Quantity, names as they are simplified, the rest of its line, what its user must know. Franka's O_T_EE needs no line:
 # a 4 x 4 matrix shows itself how it is written.

@@ -191,7 +191,7 @@ def _rotation(entry: Entry) -> QuantitySpec:
     entry.require("form", f'form = "matrix"; one of {", ".join(FORMS)}')
     form = entry.choice("form", list(FORMS), "")
     if form not in ANGULAR and "unit" in entry:
-        raise entry.error(f'"unit" belongs to form = "rpy" and "rotation-vector"; a {form} has none.')
+        raise entry.error(f'"unit" belongs to form = "rpy", "rotation-vector" and "zyz"; a {form} has none.')
     unit = entry.choice("unit", list(ANGLE), "rad")
     return QuantitySpec("rotation", _columns(entry, FORMS[form]), unit, entry.where, form=form)
 
@@ -288,7 +288,7 @@ def _each_of_use(entry: Entry) -> None:
     if "form" in entry and "rotation" not in entry:
         raise entry.error('"form" belongs to "rotation", which is left out.')
     if "angle_unit" in entry and entry.values.get("form") not in ANGULAR:
-        raise entry.error('"angle_unit" belongs to a rotation of form = "rpy" or "rotation-vector".')
+        raise entry.error('"angle_unit" belongs to a rotation of form = "rpy", "rotation-vector" or "zyz".')
 
 
 def _fixed_rotation(entry: Entry) -> Rotation:

@@ -20,14 +20,18 @@ _POSE = {
     "geometry_msgs/msg/Pose": ("orientation", "position"),
 }
 _JOINTS = {"joint_position": '{ columns = ["position"], unit = "rad" }'}
+_FELT = {"specific_force": '{ columns = ["linear_acceleration"], unit = "m/s^2" }   # an accelerometer on the sensor'}
 _ROBOT = 'urdf        = "arm.urdf"   # put the file of your arm here\n'
 
 
 def bag_example(path: str, topics: Sequence[Topic], frames: Frames) -> str:
-    """Return a description of the bag `path`: its first wrench, and its first pose of the sensor, or its joints."""
+    """Return a description of the bag `path`: its first wrench, and its first pose of the sensor, or what stands in.
+
+    Joints do, and where there are none an accelerometer.
+    """
     wrench = first_wrench(topics) or Topic("/wrench", "geometry_msgs/msg/WrenchStamped", 0)
     posed = [t for t in topics if t.kind in _POSE and not t.name.endswith("/tf_static")]
-    joints = next((t for t in topics if t.kind == "sensor_msgs/msg/JointState"), None)
+    joints, imu = (next((t for t in topics if t.kind == f"sensor_msgs/msg/{k}"), None) for k in ("JointState", "Imu"))
     pose = next((t for kind in _POSE for t in posed if t.kind == kind), Topic("/tf", TRANSFORMS[0], 0))
     force, torque = _WRENCH[wrench.kind]
     turn, place = _POSE[pose.kind]
@@ -44,7 +48,7 @@ def bag_example(path: str, topics: Sequence[Topic], frames: Frames) -> str:
     }
     first = HEAD + _stream(path, wrench, felt) + "\n[[stream]]\n"
     if joints is None or posed:
-        return first + _stream(path, pose, seen)
+        return first + (_stream(path, imu, _FELT) if imu is not None and not posed else _stream(path, pose, seen))
     return first + _stream(path, joints, _JOINTS) + f"\n[robot]\n{_ROBOT}sensor_link = {toml_string(frames.sensor)}\n"
 
 

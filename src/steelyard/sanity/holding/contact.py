@@ -49,7 +49,8 @@ MUCH, MOVING = 0.4, 0.8
 STANDS_OUT = 15.0
 ALL_ELSE = (
     "Check what spoils a whole log first: time unit, clocks, axes and signs of the wrench, how the sensor is mounted, "
-    "a payload that the controller compensates. If all are right, keep hands and fixtures off the object."
+    "a payload that the controller compensates, a bias that drifts in a curve (warm the sensor up). If all are right, "
+    "keep hands and fixtures off the object."
 )
 TARED = "If the sensor was tared within the log, cut the log there and identify each piece with its own bias. Else:"
 

@@ -76,6 +76,8 @@ def _best(felt: Stream, posed: Stream, clock: Array, other: Array) -> tuple[floa
     """
     step = max(STEP_S, max(np.ptp(clock), np.ptp(other)) / _MOST_STEPS)
     force = _on_steps(clock, felt.channels["force"], step)
+    if felt.turn is not None:
+        force = felt.turn.apply(force)
     turned = np.swapaxes(_on_steps(other, posed.channels["rotation"], step), 1, 2)
     fewest = max(int(OVERLAP * min(len(force), len(turned))), int(SHORTEST_S / step))
     lags = range(fewest - len(turned), len(force) - fewest + 1)

@@ -1,6 +1,7 @@
 """Turning: a gyroscope's angular velocity beside that of the rotations, which shows in which axes and unit it is.
 
-Read otherwise it would give accelerations that no body felt.
+Read otherwise it would give accelerations that no body felt. Where there are no rotations, the accelerometer of its
+stream shows how gravity turns.
 """
 
 from __future__ import annotations
@@ -12,13 +13,17 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, percent
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.imu import first_mount
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, channel, resampled
+from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, channel, resampled, stream_of
 from steelyard.spatial import Rotation
 
 # As given more than the first share of the square of the angular velocity is unlike that of the rotations; as it was
 # meant less than the second. A delay of 0.1 s leaves less.
 UNLIKE, ALIKE = 0.25, 0.1
+# Beside an accelerometer: of the square of how gravity turns the gyroscope leaves less than this in the axes of the
+# accelerometer, and in S more by UNLIKE. Accelerations of the arm leave the same of both.
+FOLLOWED = 0.3
 _DEGREE = np.pi / 180
 _ABOUT = 0.2  # a gyroscope in another unit is that much off the rotations at most
 _RATE_HZ = 60.0
@@ -33,6 +38,8 @@ def examine_turning(recording: Recording) -> tuple[Recording, tuple[Finding, ...
     """
     given = next(channel(recording, "angular_velocity"), None)
     turned = next(channel(recording, "rotation"), None)
+    if given is not None and turned is None:
+        return _beside_accelerometer(recording, given[0])
     both = None if given is None or turned is None else _side_by_side(given[0], turned[0])
     if given is None or both is None:
         return recording, ()
@@ -81,18 +88,55 @@ def _axes(shown: Array, rotation: Array, omega: Array, frame: str) -> tuple[floa
 
 def _side_by_side(given: Stream, turned: Stream) -> tuple[Array, Array, Array] | None:
     """Return the angular velocity (N, 3) as given, rotations (N, 3, 3) and theirs in S (N, 3), on one even clock."""
-    if given.time is None or turned.time is None or min(len(given), len(turned)) < _FEWEST_ROWS:
+    both = _on_one_clock((given, "angular_velocity"), (turned, "rotation"))
+    if both is None:
         return None
-    clocks = [np.asarray(s.time) - (s.delay or 0.0) for s in (given, turned)]
+    shown, rotation = both
+    slow = lowpass(np.concatenate([shown, angular_velocity(rotation, _RATE_HZ)], 1), CUTOFF_HZ, _RATE_HZ, order=2)
+    return slow[:, :3], rotation, slow[:, 3:]
+
+
+def _on_one_clock(*channels: tuple[Stream, str]) -> list[Array] | None:
+    """Return channels (N, ..) of streams with clocks in the same even steps, None where there are few."""
+    if any(s.time is None or len(s) < _FEWEST_ROWS for s, _ in channels):
+        return None
+    clocks = [np.asarray(s.time) - (s.delay or 0.0) for s, _ in channels]
     start, end = max(float(t[0]) for t in clocks), min(float(t[-1]) for t in clocks)
     rows = int((end - start) * _RATE_HZ)
     if rows < _FEWEST_ROWS:
         return None
     grid: Array = np.asarray(start + (np.arange(rows) + 0.5) / _RATE_HZ, dtype=np.float64)
-    rotation = resampled(clocks[1], turned.channels["rotation"], grid)
-    shown = resampled(clocks[0], given.channels["angular_velocity"], grid)
-    slow = lowpass(np.concatenate([shown, angular_velocity(rotation, _RATE_HZ)], 1), CUTOFF_HZ, _RATE_HZ, order=2)
-    return slow[:, :3], rotation, slow[:, 3:]
+    return [resampled(t, s.channels[name], grid) for t, (s, name) in zip(clocks, channels, strict=True)]
+
+
+def _beside_accelerometer(recording: Recording, stream: Stream) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the angular velocity in S where it is in the axes of its stream's accelerometer.
+
+    One inertial unit has one set of axes, and its drivers write both in those: f' = -omega x f at rest, in them.
+    """
+    felt = stream_of(recording, "force")
+    if felt is None or "specific_force" not in stream.channels or "W" in (
+        stream.frames.get("angular_velocity"), felt.frames.get("force")
+    ):  # fmt: skip
+        return recording, ()
+    rows = _on_one_clock((stream, "angular_velocity"), (stream, "specific_force"), (felt, "force"))
+    if rows is None:
+        return recording, ()
+    force = recording.wrench_sign * (rows[2] if felt.turn is None else felt.turn.apply(rows[2]))
+    mount = first_mount(rows[1], None, force) if stream.turn is None else stream.turn
+    slow = lowpass(np.concatenate(rows[:2], 1), CUTOFF_HZ, _RATE_HZ, order=2)
+    shown, pull = slow[:, :3], slow[:, 3:]
+    change = np.gradient(pull, 1 / _RATE_HZ, axis=0)
+    left, given = (_share(change, np.cross(pull, omega)) for omega in (shown, mount.inverse().apply(shown)))
+    if left > FOLLOWED or given - left < UNLIKE:
+        return recording, ()
+    text = (
+        f"The gyroscope of '{stream.name}' is in the axes of its accelerometer, turned by "
+        f"{np.degrees(float(mount.angle())):.1f} degrees against S: so read, {percent(left)} of the square of how "
+        f"gravity turns is left instead of {percent(given)}. The answer assumes this."
+    )
+    remedy = "Turn the angular velocity into the axes of S beforehand, or record orientations."
+    return _read(recording, stream, 1.0, "S", mount), (Finding("imu-rotated", text, remedy),)
 
 
 def _share(shown: Array, meant: Array) -> float:

@@ -43,8 +43,8 @@ def _never_together(data: TwistScatter, reference: int, i: int, names: tuple[str
     for k in (i, reference):
         if not data.spoke[:, k].any():
             return (
-                f"'{names[k]}' gives no twists while others move: give its angular_velocity and linear_velocity, or, "
-                'if its base stands, its poses without base = "moving".'
+                f"'{names[k]}' gives no twists while others move: give its angular_velocity and linear_velocity (an "
+                'accelerometer tells none), or, if its base stands, its poses without base = "moving".'
             )
     return f"robots '{names[reference]}' and '{names[i]}' never measured twists at the same time; record them together."
 
