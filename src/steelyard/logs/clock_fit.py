@@ -15,9 +15,8 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array
 from steelyard.logs.delays import Question, features
-from steelyard.logs.kinematics import Delays
 from steelyard.logs.noise import FAR, block_sums, huber, robust_std
 
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
@@ -61,20 +60,11 @@ class ClockCourse(ABC):
 Clock = TypeVar("Clock", bound=ClockCourse)
 
 
-def rows_of(question: Question, rows: Integers) -> Question:
-    """Return the question with some of its rows."""
-    return replace(question, time=question.time[rows], felt=question.felt.rows(rows), _cache={})
-
-
 def seen(question: Question, clocks: Mapping[str, ClockCourse]) -> tuple[Array, Array]:
     """Return features (N, F) of the motion and the channels (N, C) of the wrench that measure, by these clocks."""
     late = {n: clock.at(question.time) for n, clock in clocks.items()}
-    delays: Delays = {**question.known, **late}
-    motion, force = question.kinematics.at(question.time, delays), None
-    if question.imu is not None:
-        force = question.imu.signal.at(question.time + delays.get(question.imu.name, 0.0))
-    alive = ~np.array(question.felt.dead)
-    return np.concatenate(features(motion, force), 1), question.felt.in_sensor(motion.rotation)[:, alive]
+    motion, wrench, force = question.seen_anew({**question.known, **late})
+    return np.concatenate(features(motion, force), 1), wrench[:, ~np.array(question.felt.dead)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -135,7 +125,7 @@ def by_leaving_out(question: Question, start: Mapping[str, Clock], found: Mappin
     """Return the standard deviation of each clock's `more` by leaving out each of some stretches (jackknife)."""
     stretch = np.arange(len(question.time)) * _STRETCHES // len(question.time)
     without = [np.flatnonzero(stretch != k).astype(np.int64) for k in range(_STRETCHES)]
-    told = [settled(rows_of(question, rows), start, found) for rows in without]
+    told = [settled(question.rows(rows), start, found) for rows in without]
     spread = np.sqrt(_STRETCHES - 1)
     return {n: float(spread * np.std([clocks[n].more for clocks in told])) for n in found}
 

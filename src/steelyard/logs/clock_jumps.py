@@ -23,7 +23,6 @@ from steelyard.logs.clock_fit import (
     ClockCourse,
     Linear,
     by_leaving_out,
-    rows_of,
     seen,
     settled,
     share_left,
@@ -64,7 +63,7 @@ def clock_jumps(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
 
     delays  [s] of every stream, as one delay for the whole log; the question says which were sought
     """
-    every = rows_of(question, picked(len(question.time), ROWS))
+    every = question.rows(picked(len(question.time), ROWS))
     start = {n: ClockJump(delays[n], 0.0, np.inf) for n in question.others}
     if not start or not _worth_a_search(every, start):
         return {}
@@ -132,7 +131,7 @@ def _searched(
     inner = np.flatnonzero((time > time[0] + far) & (time < time[-1] - far)).astype(np.int64)
     if len(inner) < 4 * _BINS:
         return None
-    few = rows_of(question, inner[picked(len(inner), _FEW_ROWS)])
+    few = question.rows(inner[picked(len(inner), _FEW_ROWS)])
     spread, steps = Linear.of(few, start).spread, round(far / _LAG_S)
     lags = _LAG_S * np.arange(-steps, steps + 1)
     edges = np.arange(_BINS) * len(few.time) // _BINS
@@ -234,7 +233,7 @@ def still_jumping(
     question: Question, delays: Mapping[str, float], placed: Iterable[Placed], wrench: str
 ) -> tuple[Placed, ...]:
     """Return what is left of jumps that were put right."""
-    every = rows_of(question, picked(len(question.time), ROWS))
+    every = question.rows(picked(len(question.time), ROWS))
     out = []
     for jump in placed:
         start = {n: ClockJump(delays[n], 0.0, jump.at) for n in question.others}

@@ -20,7 +20,6 @@ from steelyard.logs.clock_fit import (
     SURE,
     ClockCourse,
     by_leaving_out,
-    rows_of,
     settled,
     share_left,
 )
@@ -69,9 +68,9 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
     while half <= full:
         rows = np.flatnonzero(np.abs(time - middle) <= half * (1 + 1e-9)).astype(np.int64)
         if len(rows) >= _FEWEST:
-            found = settled(rows_of(question, rows[picked(len(rows), ROWS)]), start, found)
+            found = settled(question.rows(rows[picked(len(rows), ROWS)]), start, found)
         half *= 2
-    every = rows_of(question, picked(len(time), ROWS))
+    every = question.rows(picked(len(time), ROWS))
     if not share_left(every, start, found) < LEFT:
         return {}
     least = LEAST_S / full

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Imu, Mounting
-from steelyard.logs.kinematics import Kinematics, Motion
+from steelyard.logs.kinematics import Delays, Kinematics, Motion
 from steelyard.logs.runs import picked
 
 _SCANNED = 3000  # rows that are enough to tell a first delay
@@ -62,6 +62,10 @@ class Question:
         """The streams whose delay is sought, but for the wrench's own: their clocks may part from it."""
         return tuple(n for n in self.unknown if n != self.felt.stream)
 
+    def rows(self, chosen: Integers) -> Question:
+        """Return the question with some of its rows."""
+        return replace(self, time=self.time[chosen], felt=self.felt.rows(chosen), _cache={})
+
     def seen(self, delays: Mapping[str, float]) -> tuple[Motion, Array, Array | None]:
         """Return motion, wrench (N, 6) in S and raw specific force (N, 3) at the rows, for these delays.
 
@@ -71,12 +75,15 @@ class Question:
         if key not in self._cache:
             if len(self._cache) > 64:
                 self._cache.clear()
-            force = None
-            if self.imu is not None:
-                force = self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
-            motion = self.kinematics.at(self.time, delays)
-            self._cache[key] = (motion, self.felt.in_sensor(motion.rotation), force)
+            self._cache[key] = self.seen_anew(delays)
         return self._cache[key]
+
+    def seen_anew(self, delays: Delays) -> tuple[Motion, Array, Array | None]:
+        """Return what `seen` does, for delays that may be others in each row (N,)."""
+        motion, force = self.kinematics.at(self.time, delays), None
+        if self.imu is not None:
+            force = self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
+        return motion, self.felt.in_sensor(motion.rotation), force
 
 
 def scan(question: Question) -> dict[str, float]:
@@ -151,5 +158,4 @@ def free_residual(values: Array, features: list[Array]) -> Array:
 
 def _thinned(question: Question) -> Question:
     """Return the question with as many rows as a scan looks at, evenly taken."""
-    pick = picked(len(question.time), _SCANNED)
-    return replace(question, time=question.time[pick], felt=question.felt.rows(pick), _cache={})
+    return question.rows(picked(len(question.time), _SCANNED))
