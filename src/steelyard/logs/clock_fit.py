@@ -24,7 +24,7 @@ from steelyard.logs.noise import FAR, block_sums, huber, robust_std
 SURE, LEFT = 8.0, 0.95
 # A clock shows everywhere; errors that vary with the pose feign another one in each stretch. So it must stand out by so
 # many standard deviations of what leaving out each of some stretches does to it.
-HOLDS, _STRETCHES = 2.0, 8
+_HOLDS, _STRETCHES = 2.0, 8
 # Rows that are enough, and blocks of them whose scores tell standard deviations.
 ROWS, _BLOCKS = 3000, 20
 _STEPS = 4
@@ -121,13 +121,15 @@ def settled(question: Question, start: Mapping[str, Clock], found: Mapping[str, 
     return clocks
 
 
-def by_leaving_out(question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]) -> dict[str, float]:
-    """Return the standard deviation of each clock's `more` by leaving out each of some stretches (jackknife)."""
+def holding(
+    question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock], sure: Mapping[str, Clock]
+) -> dict[str, Clock]:
+    """Return those of the `sure` clocks whose `more` holds when each of some stretches is left out (jackknife)."""
     stretch = np.arange(len(question.time)) * _STRETCHES // len(question.time)
     without = [np.flatnonzero(stretch != k).astype(np.int64) for k in range(_STRETCHES)]
     told = [settled(question.rows(rows), start, found) for rows in without]
-    spread = np.sqrt(_STRETCHES - 1)
-    return {n: float(spread * np.std([clocks[n].more for clocks in told])) for n in found}
+    loose = {n: np.sqrt(_STRETCHES - 1) * float(np.std([clocks[n].more for clocks in told])) for n in sure}
+    return {n: clock for n, clock in sure.items() if abs(clock.more) > _HOLDS * loose[n]}
 
 
 def _step(

@@ -14,12 +14,11 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.clock_fit import (
-    HOLDS,
     LEFT,
     ROWS,
     SURE,
     ClockCourse,
-    by_leaving_out,
+    holding,
     settled,
     share_left,
 )
@@ -70,15 +69,14 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
         if len(rows) >= _FEWEST:
             found = settled(question.rows(rows[picked(len(rows), ROWS)]), start, found)
         half *= 2
-    every = question.rows(picked(len(time), ROWS))
+    every = question.thinned(ROWS)
     if not share_left(every, start, found) < LEFT:
         return {}
     least = LEAST_S / full
     sure = {n: f for n, f in found.items() if max(SURE * f.more_std, least) < abs(f.more) < LARGEST}
     if not sure:
         return {}
-    loose = by_leaving_out(every, start, found)
-    return {n: f for n, f in sure.items() if abs(f.more) > HOLDS * loose[n]}
+    return holding(every, start, found, sure)
 
 
 def put_right(recording: Recording, rates: Mapping[str, ClockRate]) -> Recording:

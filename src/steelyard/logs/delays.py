@@ -66,6 +66,10 @@ class Question:
         """Return the question with some of its rows."""
         return replace(self, time=self.time[chosen], felt=self.felt.rows(chosen), _cache={})
 
+    def thinned(self, most: int) -> Question:
+        """Return the question with at most so many of its rows, evenly taken."""
+        return self.rows(picked(len(self.time), most))
+
     def seen(self, delays: Mapping[str, float]) -> tuple[Motion, Array, Array | None]:
         """Return motion, wrench (N, 6) in S and raw specific force (N, 3) at the rows, for these delays.
 
@@ -93,7 +97,7 @@ def scan(question: Question) -> dict[str, float]:
     """
     delays = {**question.known, **dict.fromkeys(question.unknown, 0.0)}
     for name in sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name):
-        delays[name] = _best_lag(_thinned(question), delays, name, by_wrench=True)
+        delays[name] = _best_lag(question.thinned(_SCANNED), delays, name, by_wrench=True)
     return {n: delays[n] for n in question.unknown}
 
 
@@ -102,7 +106,7 @@ def scan_without_wrench(question: Question, delays: Mapping[str, float]) -> dict
     out = dict(delays)
     for name in question.unknown:
         if question.imu is not None and name != question.imu.name:
-            out[name] = _best_lag(_thinned(question), out, name, by_wrench=False)
+            out[name] = _best_lag(question.thinned(_SCANNED), out, name, by_wrench=False)
     return out
 
 
@@ -154,8 +158,3 @@ def free_residual(values: Array, features: list[Array]) -> Array:
     X = X / np.maximum(np.abs(X).max(0), 1e-12)
     normal = X.T @ X + 1e-9 * len(X) * np.eye(X.shape[1])
     return np.asarray(values - X @ np.linalg.solve(normal, X.T @ values))
-
-
-def _thinned(question: Question) -> Question:
-    """Return the question with as many rows as a scan looks at, evenly taken."""
-    return question.rows(picked(len(question.time), _SCANNED))
