@@ -248,6 +248,21 @@ def test_wrong_descriptions(files: Path, what: str) -> None:
     assert str(error.value).startswith(said)
 
 
+def test_all_mistakes_of_a_description_are_told_at_once(files: Path) -> None:
+    text = files.read_text().replace('name = "robot1"\n', 'name = "robot1"\nbase = "rolling"\nwrench = "up"\n')
+    first, rest = text.split('name = "robot2"')
+    rest = rest.replace('kind = "grasp"', 'kind = "grip"', 1).replace('kind = "motion"', 'kind = "moved"', 1)
+    files.write_text(f'{first}name = "robot2"{rest}')
+    with pytest.raises(BadInput) as error:
+        read_team(files)
+    assert [line.removeprefix("team.toml, ").split(".")[0] for line in str(error.value).splitlines()] == [
+        '[[robot]] 2 ("robot1"): unknown base "rolling"',
+        '[[robot]] 2 ("robot1"): unknown wrench "up"',
+        '[[robot]] 3 ("robot2"), recording 1: unknown kind "grip"',
+        '[[robot]] 3 ("robot2"), recording 6: unknown kind "moved"',
+    ]
+
+
 def rewritten(files: Path, name: str, change: Callable[[np.ndarray], np.ndarray]) -> None:
     """Write one table of the team anew, its joint angles changed."""
     table = files.with_suffix("") / name

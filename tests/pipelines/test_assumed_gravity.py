@@ -69,6 +69,14 @@ def test_what_is_read_without_gravity_is_written_without(tmp_path: Path) -> None
         write_recording(replace(stated(), gravity_std=0.1), tmp_path / "odd")
 
 
+@pytest.mark.parametrize("sign", [1, -1])
+def test_a_sign_that_nothing_says_is_not_written_as_said_unless_it_was_found(tmp_path: Path, sign: int) -> None:
+    path = write_recording(replace(stated(), wrench_sign=sign, sign_said=False), tmp_path / "unsaid")
+    assert ("wrench " in path.read_text()) == (sign < 0)
+    assert read_recording(path).wrench_sign == sign
+    assert "wrench " in write_recording(stated(), tmp_path / "said").read_text()
+
+
 def test_of_a_team_one_who_states_it_is_enough() -> None:
     turn = {"columns": ["qw", "qx", "qy", "qz"], "form": "quaternion-wxyz"}
     stream = {"path": "a.csv", "time": {"columns": ["t"]}, "rotation": turn}

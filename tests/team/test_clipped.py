@@ -13,7 +13,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, Presence, TeamNoise, TeamScene, case
-from steelyard.team.clipped import without_clipped
+from steelyard.team.lost_wrenches import without_clipped
 
 NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=0.5, torque_white_Nm=0.02)
 SCENE = TeamScene(

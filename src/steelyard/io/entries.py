@@ -6,6 +6,7 @@ import difflib
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -85,6 +86,13 @@ class Entry:
             raise self.error(f'"{key}" must be a section that starts with [{key}]; got {value!r}.')
         return Entry(value, f"{self.where}, [{key}]")
 
+    def sections(self, key: str, written: str, called: str) -> list[Entry]:
+        """Return the sections that start with `written`, none where `key` is left out; messages number them."""
+        value = self.values.get(key, [])
+        if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
+            raise self.error(f'"{key}" is written as sections that start with {written}.')
+        return [Entry(item, f"{self.where}, {called} {k}") for k, item in enumerate(value, 1)]
+
     def text(self, key: str) -> str | None:
         """Return a string, None where it is left out."""
         value = self.values.get(key)
@@ -142,6 +150,11 @@ class Entry:
         if not good:
             raise self.error(f'"{key}" must be a list of {wanted} finite numbers; got {value!r}.')
         return np.array(value, dtype=np.float64)
+
+
+def each(entries: Sequence[Entry], parse: Callable[[Entry], Any]) -> tuple[Any, ...]:
+    """Return every entry as it is parsed; raises one BadDescription with what is wrong in any."""
+    return tuple(gathered({entry.where: partial(parse, entry) for entry in entries}).values())
 
 
 def is_number(value: object) -> bool:

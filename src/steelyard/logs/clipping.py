@@ -9,6 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
+from steelyard.findings import Finding
 from steelyard.logs.recording import Stream
 
 # A channel is clipped when its extreme value comes up this often and at least five times as often as its neighbours.
@@ -40,6 +41,12 @@ def clipped_rows(column: Array, extreme: float, begins: Integers = ONE_PIECE) ->
     quantum = float(steps[steps > 0].min())
     # A coarse channel at rest creeps into its plateau by one quantum; a clipped one runs into its stop.
     return at if enters.any() and float(np.median(steps[enters])) > 3 * quantum else none
+
+
+def saturated(name: str, quantity: str, axis: int, extreme: float, rows: int, of: int, then: str) -> Finding:
+    """Return the finding of an axis of `name` that stops at its extreme value in `rows` of so many rows."""
+    what = f"{quantity.capitalize()} {'xyz'[axis]} of '{name}' stops at {extreme:.6g} in {rows} of {of} rows"
+    return Finding.of("channel-saturated", f"{what}; {then}.")
 
 
 def left_out(stream: Stream, rows: Mask) -> tuple[Stream, str]:

@@ -15,9 +15,8 @@ from typing import ClassVar, TypeVar
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array
 from steelyard.logs.delays import Question, features
-from steelyard.logs.kinematics import Delays
 from steelyard.logs.noise import FAR, block_sums, huber, robust_std
 
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
@@ -25,7 +24,7 @@ from steelyard.logs.noise import FAR, block_sums, huber, robust_std
 SURE, LEFT = 8.0, 0.95
 # A clock shows everywhere; errors that vary with the pose feign another one in each stretch. So it must stand out by so
 # many standard deviations of what leaving out each of some stretches does to it.
-HOLDS, _STRETCHES = 2.0, 8
+_HOLDS, _STRETCHES = 2.0, 8
 # Rows that are enough, and blocks of them whose scores tell standard deviations.
 ROWS, _BLOCKS = 3000, 20
 _STEPS = 4
@@ -61,20 +60,11 @@ class ClockCourse(ABC):
 Clock = TypeVar("Clock", bound=ClockCourse)
 
 
-def rows_of(question: Question, rows: Integers) -> Question:
-    """Return the question with some of its rows."""
-    return replace(question, time=question.time[rows], felt=question.felt.rows(rows), _cache={})
-
-
 def seen(question: Question, clocks: Mapping[str, ClockCourse]) -> tuple[Array, Array]:
     """Return features (N, F) of the motion and the channels (N, C) of the wrench that measure, by these clocks."""
     late = {n: clock.at(question.time) for n, clock in clocks.items()}
-    delays: Delays = {**question.known, **late}
-    motion, force = question.kinematics.at(question.time, delays), None
-    if question.imu is not None:
-        force = question.imu.signal.at(question.time + delays.get(question.imu.name, 0.0))
-    alive = ~np.array(question.felt.dead)
-    return np.concatenate(features(motion, force), 1), question.felt.in_sensor(motion.rotation)[:, alive]
+    motion, wrench, force = question.seen_anew({**question.known, **late})
+    return np.concatenate(features(motion, force), 1), wrench[:, ~np.array(question.felt.dead)]
 
 
 @dataclass(frozen=True, eq=False)
@@ -131,13 +121,15 @@ def settled(question: Question, start: Mapping[str, Clock], found: Mapping[str, 
     return clocks
 
 
-def by_leaving_out(question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock]) -> dict[str, float]:
-    """Return the standard deviation of each clock's `more` by leaving out each of some stretches (jackknife)."""
+def holding(
+    question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock], sure: Mapping[str, Clock]
+) -> dict[str, Clock]:
+    """Return those of the `sure` clocks whose `more` holds when each of some stretches is left out (jackknife)."""
     stretch = np.arange(len(question.time)) * _STRETCHES // len(question.time)
     without = [np.flatnonzero(stretch != k).astype(np.int64) for k in range(_STRETCHES)]
-    told = [settled(rows_of(question, rows), start, found) for rows in without]
-    spread = np.sqrt(_STRETCHES - 1)
-    return {n: float(spread * np.std([clocks[n].more for clocks in told])) for n in found}
+    told = [settled(question.rows(rows), start, found) for rows in without]
+    loose = {n: np.sqrt(_STRETCHES - 1) * float(np.std([clocks[n].more for clocks in told])) for n in sure}
+    return {n: clock for n, clock in sure.items() if abs(clock.more) > _HOLDS * loose[n]}
 
 
 def _step(

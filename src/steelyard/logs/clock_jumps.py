@@ -17,13 +17,11 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap, stamps_of
 from steelyard.logs.clock_fit import (
-    HOLDS,
     ROWS,
     SURE,
     ClockCourse,
     Linear,
-    by_leaving_out,
-    rows_of,
+    holding,
     seen,
     settled,
     share_left,
@@ -64,7 +62,7 @@ def clock_jumps(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
 
     delays  [s] of every stream, as one delay for the whole log; the question says which were sought
     """
-    every = rows_of(question, picked(len(question.time), ROWS))
+    every = question.thinned(ROWS)
     start = {n: ClockJump(delays[n], 0.0, np.inf) for n in question.others}
     if not start or not _worth_a_search(every, start):
         return {}
@@ -132,7 +130,7 @@ def _searched(
     inner = np.flatnonzero((time > time[0] + far) & (time < time[-1] - far)).astype(np.int64)
     if len(inner) < 4 * _BINS:
         return None
-    few = rows_of(question, inner[picked(len(inner), _FEW_ROWS)])
+    few = question.rows(inner[picked(len(inner), _FEW_ROWS)])
     spread, steps = Linear.of(few, start).spread, round(far / _LAG_S)
     lags = _LAG_S * np.arange(-steps, steps + 1)
     edges = np.arange(_BINS) * len(few.time) // _BINS
@@ -189,8 +187,7 @@ def _sure(question: Question, start: Mapping[str, ClockJump], found: Mapping[str
     growing = {n: ClockRate(f.late + f.more / 2, 1.5 * f.more / span, middle) for n, f in found.items()}
     if not share_left(question, settled(question, growing, growing), found) < 1 / BETTER:
         return {}
-    loose = by_leaving_out(question, found, found)
-    return {n: f for n, f in sure.items() if abs(f.more) > HOLDS * loose[n]}
+    return holding(question, found, found, sure)
 
 
 @dataclass(frozen=True)
@@ -234,7 +231,7 @@ def still_jumping(
     question: Question, delays: Mapping[str, float], placed: Iterable[Placed], wrench: str
 ) -> tuple[Placed, ...]:
     """Return what is left of jumps that were put right."""
-    every = rows_of(question, picked(len(question.time), ROWS))
+    every = question.thinned(ROWS)
     out = []
     for jump in placed:
         start = {n: ClockJump(delays[n], 0.0, jump.at) for n in question.others}

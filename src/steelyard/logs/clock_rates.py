@@ -14,13 +14,11 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.clock_fit import (
-    HOLDS,
     LEFT,
     ROWS,
     SURE,
     ClockCourse,
-    by_leaving_out,
-    rows_of,
+    holding,
     settled,
     share_left,
 )
@@ -69,17 +67,16 @@ def clock_rates(question: Question, delays: Mapping[str, float]) -> dict[str, Cl
     while half <= full:
         rows = np.flatnonzero(np.abs(time - middle) <= half * (1 + 1e-9)).astype(np.int64)
         if len(rows) >= _FEWEST:
-            found = settled(rows_of(question, rows[picked(len(rows), ROWS)]), start, found)
+            found = settled(question.rows(rows[picked(len(rows), ROWS)]), start, found)
         half *= 2
-    every = rows_of(question, picked(len(time), ROWS))
+    every = question.thinned(ROWS)
     if not share_left(every, start, found) < LEFT:
         return {}
     least = LEAST_S / full
     sure = {n: f for n, f in found.items() if max(SURE * f.more_std, least) < abs(f.more) < LARGEST}
     if not sure:
         return {}
-    loose = by_leaving_out(every, start, found)
-    return {n: f for n, f in sure.items() if abs(f.more) > HOLDS * loose[n]}
+    return holding(every, start, found, sure)
 
 
 def put_right(recording: Recording, rates: Mapping[str, ClockRate]) -> Recording:

@@ -13,10 +13,10 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Imu, Mounting
-from steelyard.logs.kinematics import Kinematics, Motion
+from steelyard.logs.kinematics import Delays, Kinematics, Motion
 from steelyard.logs.runs import picked
 
 _SCANNED = 3000  # rows that are enough to tell a first delay
@@ -62,6 +62,14 @@ class Question:
         """The streams whose delay is sought, but for the wrench's own: their clocks may part from it."""
         return tuple(n for n in self.unknown if n != self.felt.stream)
 
+    def rows(self, chosen: Integers) -> Question:
+        """Return the question with some of its rows."""
+        return replace(self, time=self.time[chosen], felt=self.felt.rows(chosen), _cache={})
+
+    def thinned(self, most: int) -> Question:
+        """Return the question with at most so many of its rows, evenly taken."""
+        return self.rows(picked(len(self.time), most))
+
     def seen(self, delays: Mapping[str, float]) -> tuple[Motion, Array, Array | None]:
         """Return motion, wrench (N, 6) in S and raw specific force (N, 3) at the rows, for these delays.
 
@@ -71,12 +79,15 @@ class Question:
         if key not in self._cache:
             if len(self._cache) > 64:
                 self._cache.clear()
-            force = None
-            if self.imu is not None:
-                force = self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
-            motion = self.kinematics.at(self.time, delays)
-            self._cache[key] = (motion, self.felt.in_sensor(motion.rotation), force)
+            self._cache[key] = self.seen_anew(delays)
         return self._cache[key]
+
+    def seen_anew(self, delays: Delays) -> tuple[Motion, Array, Array | None]:
+        """Return what `seen` does, for delays that may be others in each row (N,)."""
+        motion, force = self.kinematics.at(self.time, delays), None
+        if self.imu is not None:
+            force = self.imu.signal.at(self.time + delays.get(self.imu.name, 0.0))
+        return motion, self.felt.in_sensor(motion.rotation), force
 
 
 def scan(question: Question) -> dict[str, float]:
@@ -86,7 +97,7 @@ def scan(question: Question) -> dict[str, float]:
     """
     delays = {**question.known, **dict.fromkeys(question.unknown, 0.0)}
     for name in sorted(question.unknown, key=lambda n: question.imu is None or n != question.imu.name):
-        delays[name] = _best_lag(_thinned(question), delays, name, by_wrench=True)
+        delays[name] = _best_lag(question.thinned(_SCANNED), delays, name, by_wrench=True)
     return {n: delays[n] for n in question.unknown}
 
 
@@ -95,7 +106,7 @@ def scan_without_wrench(question: Question, delays: Mapping[str, float]) -> dict
     out = dict(delays)
     for name in question.unknown:
         if question.imu is not None and name != question.imu.name:
-            out[name] = _best_lag(_thinned(question), out, name, by_wrench=False)
+            out[name] = _best_lag(question.thinned(_SCANNED), out, name, by_wrench=False)
     return out
 
 
@@ -147,9 +158,3 @@ def free_residual(values: Array, features: list[Array]) -> Array:
     X = X / np.maximum(np.abs(X).max(0), 1e-12)
     normal = X.T @ X + 1e-9 * len(X) * np.eye(X.shape[1])
     return np.asarray(values - X @ np.linalg.solve(normal, X.T @ values))
-
-
-def _thinned(question: Question) -> Question:
-    """Return the question with as many rows as a scan looks at, evenly taken."""
-    pick = picked(len(question.time), _SCANNED)
-    return replace(question, time=question.time[pick], felt=question.felt.rows(pick), _cache={})

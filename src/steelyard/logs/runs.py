@@ -20,6 +20,11 @@ def lasting(mask: Mask, least: float) -> Mask:
     return out
 
 
+def around(steps: Mask) -> Mask:
+    """Return the rows (N,) before and after these steps (N - 1,) from one row to the next."""
+    return np.asarray(np.concatenate([[False], steps]) | np.concatenate([steps, [False]]))
+
+
 def distinct_rows(mask: Mask) -> tuple[Mask, Integers]:
     """Return the different rows (C, M) of a mask (N, M), in order, and which of them each row (N,) is."""
     changes = np.ones(len(mask), np.bool_)

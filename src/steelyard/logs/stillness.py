@@ -11,8 +11,8 @@ from steelyard.logs.runs import runs
 
 _SHORTEST_S = 0.25
 _BLOCKS, _SHORTEST_BLOCK_S = 12, 0.3
-_TURNING = 0.02  # [rad/s]
-_MOVING = 0.005  # [m/s]
+TURNING = 0.02  # [rad/s]
+MOVING = 0.005  # [m/s]
 _NOISES = 1.5  # times the white noise of a channel: its spread at rest, and a little
 
 
@@ -23,9 +23,9 @@ def still_rows(time: Array, omega: Array, velocity: Array | None, wrench: Array,
     that nobody measured shows in the wrench, whose local spread must be near its least. Where nobody measured the
     turning (`turning_known` false) a smooth motion may be the least there is: then the wrench must stay in its noise.
     """
-    quiet = np.linalg.norm(omega, axis=1) < _TURNING
+    quiet = np.linalg.norm(omega, axis=1) < TURNING
     if velocity is not None:
-        quiet &= np.linalg.norm(velocity, axis=1) < _MOVING
+        quiet &= np.linalg.norm(velocity, axis=1) < MOVING
     quiet &= steady(time, wrench[:, 3:])
     if not turning_known:
         quiet &= steady(time, wrench[:, 3:], limit=_NOISES * float(np.linalg.norm(noise_std(wrench[:, 3:]))))

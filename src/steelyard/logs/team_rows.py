@@ -79,7 +79,7 @@ def common_time(recording: TeamRecording, names: Sequence[str]) -> Array:
         steps = np.diff(first)
         if np.abs(steps - np.median(steps)).max() < _EVEN * np.median(steps):
             return first
-    begin, end = max(float(t.time[0]) for t in tracks), min(float(t.time[-1]) for t in tracks)
+    begin, end = recording.span
     rates = [1 / median_step(t.time) for t in tracks if len(t) > 1]
     if not rates or end <= begin:
         raise BadValue(f"'{recording.name}' needs at least two samples of every robot in the time that all cover.")

@@ -26,11 +26,11 @@ from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, examine_room_bias, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
 from steelyard.sanity.fitted.room_bias import SeenRoomBias
 from steelyard.sanity.fitted.sensor_matrix import turn_of
-from steelyard.sanity.fitted.two_masses import ELSEWHERE
 from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
 from steelyard.sanity.holding.small_slip import small_slip
@@ -205,7 +205,7 @@ def _room_bias(
     rows: FitRows, log: MotionLog, recording: Recording, before: tuple[Finding, ...], options: Options
 ) -> SeenRoomBias | None:
     """Return the bias that keeps its direction in the room in the rows that are kept, or in all of `log`; else None."""
-    if options.gravity != "given" or codes(before) & ELSEWHERE or any(f.left_in for f in before):
+    if options.gravity != "given" or stands_aside("room bias", before) or any(f.left_in for f in before):
         return None
     bias = Bias(options.bias, drift=options.drift)
     # Noise that aligning judged with the bias in is not kept.

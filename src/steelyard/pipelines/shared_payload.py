@@ -26,12 +26,11 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
 from steelyard.pipelines.telling import MISREAD
-from steelyard.team.clipped import without_clipped
 from steelyard.team.clocks.apart import together
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.frozen import without_frozen
 from steelyard.team.joint import JointTeam
+from steelyard.team.lost_wrenches import without_clipped, without_frozen
 from steelyard.team.misread.angle_units import require_one_angle_unit
 from steelyard.team.misread.length_units import require_one_length_unit
 from steelyard.team.misread.same_numbers import require_own_numbers, stuck_forces

@@ -11,7 +11,9 @@ from steelyard.spatial.vectors import (
     cross,
     cross_matrix,
     lever_acceleration,
+    lever_matrix,
     signed_axes,
+    signed_columns,
     unit_vectors,
 )
 
@@ -26,6 +28,8 @@ __all__ = [
     "cross",
     "cross_matrix",
     "lever_acceleration",
+    "lever_matrix",
     "signed_axes",
+    "signed_columns",
     "unit_vectors",
 ]

@@ -29,6 +29,12 @@ def lever_acceleration(omega: Array, alpha: Array, p: Array) -> Array:
     return np.asarray(cross(alpha, p) + cross(omega, cross(omega, p)))
 
 
+def lever_matrix(omega: Array, alpha: Array) -> Array:
+    """Return [alpha]x + [omega]x [omega]x (N, 3, 3): what turning adds to the acceleration of a point per metre."""
+    across = cross_matrix(omega)
+    return np.asarray(cross_matrix(alpha) + across @ across)
+
+
 def classical_acceleration(derivative: Array, twist: Array) -> Array:
     """Return that of the origin (..., 3) [m/s^2] from the component-wise derivative (..., 6) of a body twist (..., 6).
 
@@ -57,6 +63,12 @@ def signed_axes() -> Array:
     """Return every order and sign of three axes (48, 3, 3), first as they are: 24 rotations, 24 reflections."""
     orders, signs = permutations(range(3)), tuple(product((1.0, -1.0), repeat=3))
     return np.stack([np.eye(3)[list(order)] * np.array(sign) for order in orders for sign in signs])
+
+
+def signed_columns(axes: Array, letter: str = "") -> list[str]:
+    """Return which of three columns, with its sign, each row of `signed_axes` takes: "-y", or "-Fy" with a letter."""
+    largest = np.abs(axes).argmax(1)
+    return [f"{'-' if axes[i, k] < 0 else ''}{letter}{'xyz'[k]}" for i, k in enumerate(largest)]
 
 
 def axial_vector(matrix: Array) -> Array:

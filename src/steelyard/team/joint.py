@@ -27,7 +27,7 @@ from steelyard.team.level import Tilted
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.twists import require_twists_well_read
-from steelyard.team.motion_fit import F, MotionFit
+from steelyard.team.motion_fit import F, MotionFit, against
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import Yields, stiffened
@@ -109,7 +109,7 @@ class JointTeam:
         grasps, noise = standing.fit.team.grasps, standing.fit.noise
         spread = yields.widened(grasp_covariance(standing.fit), grasps, log.names.index(log.reference))
         spread = replace(spread, level=standing.level(log))
-        late = _against(standing.late, log.reference)
+        late = against(standing.late, log.reference)
         split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
         jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
         if jointed is not None:
@@ -194,11 +194,6 @@ def _doubtful(team: MotionFit, tilt: Tilted | None) -> bool:
     out in which one of them slipped or let go.
     """
     return team.rough or tilt is not None or any(one.code in CHANGES for one in team.findings)
-
-
-def _against(late: Mapping[str, float], reference: str) -> dict[str, float]:
-    """Return how late every clock is against the reference's."""
-    return {name: seconds - late[reference] for name, seconds in late.items()}
 
 
 def needs_twists(log: TeamLog) -> bool:

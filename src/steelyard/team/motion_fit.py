@@ -20,6 +20,16 @@ LEVEL = 0.02
 PUNCTUAL, DOUBTED, CLOCK_ROUNDS = 2e-4, 4.0, 10
 
 
+def later(late: Mapping[str, float], more: Array) -> dict[str, float]:
+    """Return how late clocks are [s], by robot, and more (N,) besides."""
+    return {name: seconds + float(step) for (name, seconds), step in zip(late.items(), more, strict=True)}
+
+
+def against(late: Mapping[str, float], reference: str) -> dict[str, float]:
+    """Return how late every clock is against the reference's."""
+    return {name: seconds - late[reference] for name, seconds in late.items()}
+
+
 @dataclass(frozen=True, eq=False)
 class MotionFit(ABC):
     """Recordings with their clocks right, the optimum, with its noise (N, 2), and how late each clock is [s].

@@ -17,6 +17,7 @@ from steelyard.evidence import Evidence
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import people_jacobian
+from steelyard.logs.stillness import MOVING, TURNING
 from steelyard.logs.team_conditioning import all_conditioned
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_rows import TeamRows
@@ -29,7 +30,6 @@ from steelyard.team.inertia_matrix import InertiaFit, Negative, inertia, made_po
 from steelyard.team.loop_closure import refine
 from steelyard.team.mass_and_com import MassAndCom, mass_and_com
 
-_STILL_RATE, _STILL_SPEED = 0.02, 0.005  # [rad/s, m/s] as for one arm: below them a row of a moving log is at rest
 FORMAL = (
     "standard deviations are formal, from white residuals of each step by itself: the paper gives none, and with "
     "correlated noise or force bias these are too small."
@@ -140,8 +140,8 @@ def _at_rest(rows: TeamRows, declared: bool) -> Mask:
     """Return rows (T,) at rest: all of a still recording; else those in which no robot that is seen moves."""
     if declared:
         return np.ones(len(rows.time), np.bool_)
-    quick = (np.linalg.norm(rows.twist[..., :3], axis=-1) > _STILL_RATE) | (
-        np.linalg.norm(rows.twist[..., 3:], axis=-1) > _STILL_SPEED
+    quick = (np.linalg.norm(rows.twist[..., :3], axis=-1) > TURNING) | (
+        np.linalg.norm(rows.twist[..., 3:], axis=-1) > MOVING
     )
     return np.asarray(~(quick & rows.has_twist).any(0) & rows.has_twist.any(0))
 

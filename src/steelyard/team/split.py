@@ -187,16 +187,8 @@ def rigidity_findings(split: Split | None, names: Sequence[str], unweighed: str 
         return []
     called = [" and ".join(f"'{names[i]}'" for i in group) for group in split.groups]
     if split.hinge is not None:
-        axis, point, swing = split.hinge
-        text = ", ".join(f"{a:.3f}" for a in axis), ", ".join(f"{1e3 * a:.0f}" for a in point)
-        return [
-            Finding.of(
-                "payload-jointed",
-                f"{called[0]} hold one body, {called[1]} another: between them is a hinge about ({text[0]}) "
-                f"through ({text[1]}) mm of grasp '{names[split.groups[1][0]]}', which swung by "
-                f"{np.rad2deg(swing):.0f} deg. {unweighed}",
-            )
-        ]
+        said = hinge_words(called, *split.hinge, names[split.groups[1][0]])
+        return [Finding.of("payload-jointed", f"{said} {unweighed}")]
     return [
         Finding.of(
             "payload-not-rigid",
@@ -204,3 +196,15 @@ def rigidity_findings(split: Split | None, names: Sequence[str], unweighed: str 
             "for the payload as if it were rigid.",
         )
     ]
+
+
+def hinge_words(holders: Sequence[str], axis: Array, point: Array, swing: float, grasp: str) -> str:
+    """Say who holds which body, and where the hinge between them is.
+
+    axis, point (3,) [m] in the `grasp` named     swing  by how much it turned [rad]
+    """
+    about, through = ", ".join(f"{a:.3f}" for a in axis), ", ".join(f"{1e3 * a:.0f}" for a in point)
+    return (
+        f"{holders[0]} hold one body, {holders[1]} another: between them is a hinge about ({about}) through "
+        f"({through}) mm of grasp '{grasp}', which swung by {np.rad2deg(swing):.0f} deg."
+    )

@@ -35,6 +35,13 @@ def twists_between(first: Pose, second: Pose) -> Array:
     return _twists(turn, first.rotation.matrix, second.position - first.position)
 
 
+def extent(path: Pose) -> Array:
+    """Return how far poses (T,) turn and lie from their middle (2,), rms along an axis [rad, m]."""
+    turns = turns_between(Rotation.nearest(path.rotation.matrix.mean(0)), path.rotation)
+    places = path.position - path.position.mean(0)
+    return np.sqrt([(turns**2).mean(), (places**2).mean()])
+
+
 def turning_speed(track: Track, time: Array, over_s: float) -> Array:
     """Return how fast (T,) [rad/s] a grasp turns from `time` (T,) to `over_s` later; NaN where it was not measured.
 

@@ -15,7 +15,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.assembled import assembled, team_size
 from steelyard.team.changes.odd_recording import without_odd
-from steelyard.team.changes.propped import is_propped, maybe_propped
+from steelyard.team.changes.propped import MISSING, maybe_propped
 from steelyard.team.changes.touched import Touched, together, without_touched
 from steelyard.team.clocks.errors import ClockErrors, Errors
 from steelyard.team.consistent import consistent
@@ -32,7 +32,7 @@ from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
-from steelyard.team.payload.model import Group, unit_bias, units_of_body
+from steelyard.team.payload.model import Group, unit_bias, units_of_body, weight
 from steelyard.team.payload.motion_noise import motion_noise
 from steelyard.team.payload.spectra import band_edges, gathered
 from steelyard.team.poses.covariance import Spread
@@ -182,7 +182,7 @@ def _unpropped(
     for one in asked:
         body = rows[one.number][0]
         missing = one.missing(body, fit.payload.parameters, fit.D)
-        if is_propped(missing, fit.payload.parameters):
+        if missing > MISSING * weight(fit.payload.parameters):
             out[one.number] = kept[one.number]
             found.append(one.finding(body, missing))
     return out, tuple(found)

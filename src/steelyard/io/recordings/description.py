@@ -4,14 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
-from steelyard.io.entries import Entry, gathered
+from steelyard.io.entries import Entry, each, gathered
 from steelyard.io.example import EXAMPLE
 from steelyard.io.object_pose import ObjectPose, parse_object_pose
 from steelyard.io.streams.entries import StreamSpec, parse_stream
@@ -88,7 +87,7 @@ def parse_description(values: Mapping[str, Any], name: str) -> Description:
             "tool": lambda: log.text("tool"),
             "noise": lambda: parse_noise(top.section("noise")),
             "placed": lambda: parse_object_pose(top.section("object")),
-            "streams": lambda: _streams(top),
+            "streams": lambda: each(top.sections("stream", "[[stream]]", "[[stream]]"), parse_stream),
             "arm": lambda: _arm(top) if "robot" in top else None,
         }
     )
@@ -155,11 +154,3 @@ def _require_arm_for_joints(streams: Sequence[StreamSpec], arm: ArmSpec | None) 
             )
         if twice := [name for other in streams for name in ("rotation", "position") if name in other.names]:
             raise BadDescription(f'{spec.where}: "joint_position" tells the {twice[0]}, too. Give one of them.')
-
-
-def _streams(top: Entry) -> tuple[StreamSpec, ...]:
-    value = top.values.get("stream", [])
-    if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
-        raise top.error("streams are written as sections that start with [[stream]].")
-    entries = [Entry(item, f"{top.where}, [[stream]] {i}") for i, item in enumerate(value, 1)]
-    return tuple(gathered({entry.where: partial(parse_stream, entry) for entry in entries}).values())

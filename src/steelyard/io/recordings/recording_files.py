@@ -10,7 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.example import columns_text
-from steelyard.io.recordings.description import NOISE, default_gravity
+from steelyard.io.recordings.description import NOISE, SIGNS, Description, default_gravity
 from steelyard.io.streams.entries import FRAMED
 from steelyard.io.tables.files import TEXT
 from steelyard.io.toml_string import toml_string
@@ -84,11 +84,17 @@ def _log(recording: Recording) -> str:
             "a description has no words for channels of the wrench that do not measure: "
             "write the recording as it was read, before its dead channels were found."
         )
-    sign = "on-object" if recording.wrench_sign > 0 else "on-sensor"
-    lines = ["[log]", *_gravity(recording), f'wrench  = "{sign}"']
+    lines = ["[log]", *_gravity(recording), *_sign(recording)]
     if recording.tool is not None:
         lines.append(f"tool    = {toml_string(str(Path(recording.tool).absolute()))}")
     return "\n".join(lines) + "\n"
+
+
+def _sign(recording: Recording) -> list[str]:
+    """Return the line of the wrench's sign, none where nothing said the one that a description without it has, too."""
+    if not recording.sign_said and recording.wrench_sign == Description.wrench_sign:
+        return []
+    return [f'wrench  = "{next(word for word, sign in SIGNS.items() if sign == recording.wrench_sign)}"']
 
 
 def _gravity(recording: Recording) -> list[str]:

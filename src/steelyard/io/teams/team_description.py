@@ -4,10 +4,11 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import partial
 from typing import Any, get_args
 
 from steelyard.check import Array
-from steelyard.io.entries import Entry
+from steelyard.io.entries import Entry, each, gathered
 from steelyard.io.recordings.description import (
     ARM,
     SIGNS,
@@ -76,34 +77,32 @@ class TeamDescription:
 
 
 def parse_team_description(values: Mapping[str, Any], name: str) -> TeamDescription:
-    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription."""
+    """Check the parsed TOML `values`; `name` stands in messages. Raises BadDescription with all that is wrong."""
     top = Entry(values, name)
     if "log" in top or "stream" in top:
         raise top.error("[log] and [[stream]] make this the log of one robot. Use it with: steelyard identify")
     top.only("team", "robot")
     team = top.section("team")
-    team.only("gravity", "reference", "wrench")
-    rows = _tables(top, "robot", "[[robot]]")
-    if not rows:
+    entries = top.sections("robot", "[[robot]]", "[[robot]]")
+    if not entries:
         raise top.error(f"no [[robot]] is given, so there is no team. A description begins like this:\n{EXAMPLE}")
-    robots = tuple(_robot(Entry(row, f"{name}, [[robot]] {k}"), team) for k, row in enumerate(rows, 1))
-    reference = team.text("reference")
-    measured = any(measures_gravity(own.streams) for robot in robots for own in robot.recordings)
-    told = measured or any(_states_gravity(place) for place in (team, *(Entry(row, name) for row in rows)))
-    return TeamDescription(
-        robots, robots[0].name if reference is None else reference, 0.0 if told else ASSUMED_GRAVITY_STD
+    shared = gathered(
+        {
+            "keys": lambda: team.only("gravity", "reference", "wrench"),
+            "reference": lambda: team.text("reference"),
+            "gravity": lambda: _gravity(team, default_gravity()),
+            "wrench": lambda: team.choice("wrench", list(SIGNS), "on-object"),
+        }
     )
+    robots = each(entries, partial(_robot, gravity=shared["gravity"], wrench=shared["wrench"]))
+    measured = any(measures_gravity(own.streams) for robot in robots for own in robot.recordings)
+    told = measured or any(_states_gravity(place) for place in (team, *entries))
+    reference = robots[0].name if shared["reference"] is None else shared["reference"]
+    return TeamDescription(robots, reference, 0.0 if told else ASSUMED_GRAVITY_STD)
 
 
-def _tables(entry: Entry, key: str, written: str) -> Sequence[Mapping[str, Any]]:
-    """Return an array of tables, empty where it is not there."""
-    value = entry.values.get(key, [])
-    if not isinstance(value, list) or not all(isinstance(item, Mapping) for item in value):
-        raise entry.error(f'"{key}" is written as sections that start with {written}.')
-    return value
-
-
-def _robot(entry: Entry, team: Entry) -> RobotSpec:
+def _robot(entry: Entry, gravity: Array | None, wrench: str) -> RobotSpec:
+    """Check one [[robot]]; `gravity` and `wrench` are what it has where it says nothing."""
     entry.require("name", 'name = "left"')
     name = str(entry.text("name"))
     entry = Entry(entry.values, f'{entry.where} ("{name}")')
@@ -112,24 +111,26 @@ def _robot(entry: Entry, team: Entry) -> RobotSpec:
     if omnid and "urdf" in entry:
         raise entry.error('"model" and "urdf" say the same. Give one of them.')
     arm = parse_arm(entry) if set(ARM) & set(entry.values) else None
-    base: Any = entry.choice("base", get_args(Base), "still")
-    sign = SIGNS[entry.choice("wrench", list(SIGNS), team.choice("wrench", list(SIGNS), "on-object"))]
-    rows = _tables(entry, "recording", "[[robot.recording]]")
-    if not rows:
+    entries = entry.sections("recording", "[[robot.recording]]", "recording")
+    if not entries:
         raise entry.error(f"no [[robot.recording]] is given. A robot looks like this:\n{EXAMPLE}")
     known = ("joint_position", "joint_torque") if omnid else ("joint_position",) if arm else ()
-    recordings = tuple(_recording(Entry(row, f"{entry.where}, recording {k}"), known) for k, row in enumerate(rows, 1))
-    return RobotSpec(name, _gravity(entry, team), base, sign, omnid, arm, recordings)
+    found = gathered(
+        {
+            "base": lambda: entry.choice("base", get_args(Base), "still"),
+            "sign": lambda: SIGNS[entry.choice("wrench", list(SIGNS), wrench)],
+            "gravity": lambda: _gravity(entry, gravity),
+            "recordings": lambda: each(entries, partial(_recording, known=known)),
+        }
+    )
+    return RobotSpec(name=name, omnid=omnid, arm=arm, wrench_sign=found.pop("sign"), **found)
 
 
-def _gravity(entry: Entry, team: Entry) -> Array | None:
-    """Return the robot's own gravity, else the team's, else the standard one of a level base."""
-    for place in (entry, team):
-        if _states_gravity(place):
-            return parse_gravity(place)
-        if "gravity" in place:
-            return None
-    return default_gravity()
+def _gravity(entry: Entry, otherwise: Array | None) -> Array | None:
+    """Return gravity as it is stated here, None where it is unknown."""
+    if _states_gravity(entry):
+        return parse_gravity(entry)
+    return None if "gravity" in entry else otherwise
 
 
 def _states_gravity(entry: Entry) -> bool:
@@ -142,17 +143,14 @@ def _recording(entry: Entry, known: Sequence[str]) -> RecordingSpec:
     entry.require("kind", f'kind = "motion"; one of {", ".join(KINDS)}')
     kind: Any = entry.choice("kind", KINDS, "")
     away = entry.flag("away")
-    rows = _tables(entry, "stream", "[[robot.recording.stream]]")
-    if away and rows:
+    entries = entry.sections("stream", "[[robot.recording.stream]]", "stream")
+    if away and entries:
         raise entry.error('"away" says that the robot holds nothing in this recording; leave out its streams.')
-    if not away and not rows:
+    if not away and not entries:
         raise entry.error(
             "no [[robot.recording.stream]] is given. Give one, or away = true where the robot holds nothing."
         )
-    streams = tuple(
-        parse_stream(Entry(row, f"{entry.where}, stream {k}"), robot=True, arm="joint_torque" not in known)
-        for k, row in enumerate(rows, 1)
-    )
+    streams = each(entries, partial(parse_stream, robot=True, arm="joint_torque" not in known))
     for stream in streams:
         _check(Entry({}, stream.where), stream, known)
     _refuse_twice(entry, streams)

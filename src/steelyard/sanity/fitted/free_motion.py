@@ -10,17 +10,16 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array, Integers
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import FEWEST_BLOCKS, Rows
 from steelyard.sanity.fitted.seen_motion import CALM, at_rest, noise_share
-from steelyard.sanity.fitted.two_masses import ELSEWHERE
 
 # It is said where accelerations explain so much of what is left, in stretches that were left out, and that is so much
 # of what accelerations make of the wrench. A real arm's vibration reached 0.15, sound made logs nothing.
 EXPLAINED, SHARE = 0.25, 0.1
 _FEWEST_ROWS = 100
-_TOLD = ELSEWHERE | {"sensor-turned", "gains-differ", "bias-drift"}
 _REMEDY = (
     "Check the stamps, filters and smoothing of poses and wrench. In a simulator that damps joints implicitly "
     "(MuJoCo), take the wrench of the acceleration that the step made."
@@ -30,7 +29,7 @@ _KINDS = {"torque": slice(0, 3), "force": slice(3, 6)}
 
 def examine_motion(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Return `motion-mismatch` where what a body leaves of force or torque follows the accelerations."""
-    if codes(known) & _TOLD or log.noise is None or log.dead.any() or noise_share(log) > CALM:
+    if stands_aside("motion", known) or log.noise is None or log.dead.any() or noise_share(log) > CALM:
         return ()
     followed = following(log)
     if not followed:

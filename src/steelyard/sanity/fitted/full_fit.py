@@ -109,9 +109,12 @@ class Rows:
         """Whether they are of stretches enough to tell a spread by leaving each out."""
         return int(self.block.max()) + 1 >= FEWEST_BLOCKS
 
+    def _with(self, extra: Array | None) -> Array:
+        return self.columns if extra is None else np.concatenate([self.columns, extra], 2)
+
     def solve(self, extra: Array | None = None, jackknife: bool = False) -> FullFit:
         """Return the solution with extra columns (N, 6, k)."""
-        X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
+        X = self._with(extra)
         both = np.concatenate([X, self.values[:, :, None]], 2) * np.sqrt(self.weights)[:, :, None]
         blocks = int(self.block.max()) + 1
         scatter = np.stack([_gram(both[self.block == b]) for b in range(blocks)]) if jackknife else _gram(both)[None]
@@ -129,7 +132,7 @@ class Rows:
 
         least  share of a combination's squares, its columns scaled alike, that the other columns must leave
         """
-        both = np.concatenate([self.columns, extra], 2) * np.sqrt(self.weights)[:, :, None]
+        both = self._with(extra) * np.sqrt(self.weights)[:, :, None]
         gram, size = _gram(both), self.columns.shape[2]
         scale = np.sqrt(np.maximum(np.diag(gram)[size:], _SMALLEST**2))
         across = gram[size:, :size]
@@ -142,8 +145,7 @@ class Rows:
 
         White noise hardly lasts that long. Rows of a table are taken one by one.
         """
-        X = self.columns if extra is None else np.concatenate([self.columns, extra], 2)
-        miss = (self.values - X @ fit.solution) * np.sqrt(self.weights)
+        miss = (self.values - self._with(extra) @ fit.solution) * np.sqrt(self.weights)
         if self.log.time is None:
             return float((miss**2).sum())
         at = np.unique(np.floor(self.log.time / _MEAN_S), return_inverse=True)[1]

@@ -11,17 +11,18 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
-from steelyard.sanity.fitted.two_masses import ELSEWHERE, two_masses
+from steelyard.sanity.fitted.two_masses import two_masses
 from steelyard.sanity.readings.levers import UNITS, compared
 from steelyard.sanity.readings.torques import opposed
-from steelyard.spatial import cross_matrix
+from steelyard.spatial import cross_matrix, lever_matrix
 
 # A point this far [m] from S is worth a word, if it is so many standard deviations from none, by leaving out stretches,
 # and leaves less of the squared residual. No tool's tip is farther than the last.
@@ -158,7 +159,9 @@ class Misplaced:
 
 def of_sensor(log: MotionLog, place: Array) -> MotionLog:
     """Return the log with accelerations of S, where they are of a point (3,) [m] in S."""
-    return replace(log, acceleration=log.acceleration - _lever(log) @ place)
+    return replace(
+        log, acceleration=log.acceleration - lever_matrix(log.angular_velocity, log.angular_acceleration) @ place
+    )
 
 
 def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
@@ -173,7 +176,7 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
         return None
     once = rows.solve()
     phi, place = once.phi, np.zeros(3)
-    lever = _lever(rows.log)
+    lever = lever_matrix(rows.log.angular_velocity, rows.log.angular_acceleration)
     axes, blind = _axes(lever)
     for _ in range(ROUNDS):
         # What a body misses in its wrench where the point at one metre along each axis is taken for S.
@@ -200,7 +203,7 @@ def examine_place(
 
     known  what was found before: where the motion or the wrench is no body's, no point is looked for
     """
-    if codes(known) & ELSEWHERE:
+    if stands_aside("place", known):
         return None, ()
     found = misplaced(log, drift)
     if found is None or not (found.seen or found.maybe):
@@ -214,12 +217,6 @@ def examine_place(
     ratio, std = found.larger
     # A point at the centre of mass itself has no ratio that tells.
     return None, (opposed(ratio, std) or compared(ratio, std)) if std < TOLD * abs(ratio) else ()
-
-
-def _lever(log: MotionLog) -> Array:
-    """Return what turning adds to the acceleration of a point per metre from S (N, 3, 3)."""
-    across = cross_matrix(log.angular_velocity)
-    return np.asarray(cross_matrix(log.angular_acceleration) + across @ across)
 
 
 def _axes(lever: Array) -> tuple[Array, Array | None]:

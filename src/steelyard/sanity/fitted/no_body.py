@@ -12,10 +12,11 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.errors import CannotAnswer
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import ROUNDED_GRAVITY
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.readings.levers import UNITS
 
 # Chi-square per degree of freedom above which no body explains a wrench, and what another unit must bring it down to:
@@ -30,8 +31,6 @@ MISFIT, NO_NOISE, ARM = 0.2, 5.0, 0.1
 _PARTS = {"force": (1.0, 0.1, "N", ""), "torque": (ARM, 0.01, "N m", f" at {ARM:g} m")}
 # No arm holds more [kg]; nothing is denser [kg/m^3] than osmium.
 HEAVIEST, DENSEST = 500.0, 22600.0
-ELSEWHERE = {"weight-compensated", "motion-mismatch", "base-tilted", "force-unit"}
-TOLD = {"wrench-unexplained", "noise-level-off", "sensor-turned", "gains-differ"}
 
 
 def examine_wrench_unit(
@@ -47,7 +46,7 @@ def examine_wrench_unit(
     before    findings of before the fit
     """
     chi2 = estimate.evidence.chi2_per_dof
-    if chi2 is None or chi2 <= UNEXPLAINED or codes((*before, *late)) & ELSEWHERE:
+    if chi2 is None or chi2 <= UNEXPLAINED or stands_aside("unit", (*before, *late)):
         return late
     larger = [(1 / u.ratio, u.words) for u in UNITS if 1 < 1 / u.ratio < LARGEST]
     explain = sorted((times, words) for times, words in larger if _left(identify, log, times) < SOUND)
@@ -70,19 +69,18 @@ def examine_body(
     gravity  its size [m/s^2]
     noise    of the torque from row to row [N m], zero where the log has no clock
     """
-    if codes(known) & (ELSEWHERE | TOLD):
+    if stands_aside("body", known):
         return ()
     chi2 = estimate.evidence.chi2_per_dof
     # Noise that nobody declared is told by the residuals, and chi-square then says nothing of those.
     if missed := _missed(estimate, "torque", gravity, noise):
         return missed
-    if chi2 is not None and chi2 > UNEXPLAINED:
-        text = (
-            f"{_much(chi2)}: one rigid body does not explain this wrench to its noise; the error bars hold only what "
-            "leaving parts of the log out shows."
-        )
-    else:
+    if chi2 is None or chi2 <= UNEXPLAINED:
         return ()
+    text = (
+        f"{_much(chi2)}: one rigid body does not explain this wrench to its noise; the error bars hold only what "
+        "leaving parts of the log out shows."
+    )
     return (Finding.of("wrench-unexplained", text),)
 
 

@@ -11,12 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.fitted.two_masses import ELSEWHERE
 
 # It is said beyond so many standard deviations, by leaving out stretches, and where it leaves so much less of what
 # lasts for a second: sound made logs keep 0.97, a real sensor's errors with the pose 0.62.
@@ -71,7 +71,7 @@ def allow_sag(log: MotionLog, estimate: Estimate, known: tuple[Finding, ...]) ->
 
     known  what was found before: where motion or wrench are no body's, a sag is not looked for
     """
-    if codes(known) & ELSEWHERE:
+    if stands_aside("sag", known):
         return estimate
     found = sag(log)
     if found is None or found.sure < SURE or found.slowly > SLOWLY:

@@ -18,6 +18,7 @@ from steelyard.identify.people import parameter_jacobian
 from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.mounts import mount_of, mount_remedy, vector
@@ -28,7 +29,6 @@ from steelyard.spatial import Rotation, cross_matrix
 # standard deviations from none and leave so much less of the squared residual.
 TURN, UNLIKE, SURE = np.radians(1.0), 0.015, 8.0
 TURN_LEFT, UNLIKE_LEFT = 0.95, 0.99
-ELSEWHERE = {"base-tilted", "weight-compensated", "wrench-unexplained"}
 # Turns and stretches that a body and a bias mimic but for this share of their squares are not told: noise of the
 # acceleration alone would decide them. A sweep of one joint keeps gravity within some 3 degrees of a plane of S.
 TOLD = 3e-3
@@ -161,7 +161,7 @@ def _looked_at(log: MotionLog, known: tuple[Finding, ...], drift: bool) -> Senso
 
     Where a large turn was told, it begins with the turn that the force shows at once.
     """
-    if codes(known) & ELSEWHERE:
+    if stands_aside("sensor", known):
         return None
     return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes(known) else None)
 

@@ -11,13 +11,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding
 from steelyard.logs.alignment_findings import planar_finding
 from steelyard.logs.log import MotionLog
+from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import Rows
 from steelyard.sanity.fitted.seen_motion import CALM, NOISE, at_rest, moves, noise_share
 from steelyard.sanity.fitted.slow_sensor import taken_away
-from steelyard.sanity.readings.both_masses import TAKEN_AWAY, clock_words
+from steelyard.sanity.readings.both_masses import clock_words, compensated
 from steelyard.spatial import cross_matrix
 
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this
@@ -33,7 +34,6 @@ BENDING = 0.005
 FARTHEST = 5.0
 # Below this share a controller has not only taken a weight away.
 TOO_MUCH = -0.7
-ELSEWHERE = {"weight-compensated", "motion-mismatch", "wrench-unexplained", "base-tilted", "force-unit"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +92,7 @@ def _weight(gravity: Array) -> Array:
 
 def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding, ...]:
     """Return `weight-compensated` or `motion-mismatch` where a log weighs another body than it accelerates."""
-    if codes(known) & ELSEWHERE:
+    if stands_aside("two masses", known):
         return ()
     found = two_masses(log)
     if found is None or found.left > LEFT or min(found.mass, found.weighed) <= TOO_MUCH * abs(found.mass):
@@ -105,8 +105,7 @@ def examine_masses(log: MotionLog, known: tuple[Finding, ...]) -> tuple[Finding,
     # About one axis a lever passes for a mass, and noise of either draws both.
     least = SHARE + NOISE * found.noise if planar_finding(log.gravity) else SCALED
     if _taken_away(found, least) and _taken_away(two_masses(log, bending=True), least):
-        other = clock_words(found.mass, found.weighed)
-        return (Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else "")),)
+        return (compensated(both, clock_words(found.mass, found.weighed)),)
     if -short > max(SURE * spread, (SHARE + NOISE * found.noise) * abs(found.weighed)):
         other = clock_words(found.mass, found.weighed)
         text = f"{both}the load was not accelerated as the poses say.{f' {other}.' if other else ''}"

@@ -51,6 +51,11 @@ def clock_words(moved: float, weighed: float) -> str:
     return f"A clock that runs {rate} times too {clock}, or positions {about(ratio)} times too {size}, do so"
 
 
+def compensated(both: str, other: str) -> Finding:
+    """Return `weight-compensated` of what is said of both masses, and of another cause that may be."""
+    return Finding.of("weight-compensated", both + TAKEN_AWAY + (f" {other}, too." if other else ""))
+
+
 def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) -> tuple[Finding, ...]:
     """Return `weight-compensated` or `motion-mismatch` where force shows another mass by acceleration than by weight.
 
@@ -77,5 +82,4 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     if not sure or abs(moved) > HEAVIEST or left > EXPLAINED or weighed < -TOO_MUCH * abs(moved):
         return ()
     other = clock_words(abs(moved), weighed) if weighed > SURE * spread[1] and left < CLOSELY else ""
-    message = both + TAKEN_AWAY + (f" {other}, too." if other else "")
-    return (Finding.of("weight-compensated", message),)
+    return (compensated(both, other),)

@@ -15,11 +15,12 @@ import numpy as np
 from steelyard.check import Array, Integers, Mask
 from steelyard.inertia import forms
 from steelyard.logs.conditioning import lowpass
+from steelyard.logs.felt import Felt
 from steelyard.logs.holes import holes, unknown_motion
 from steelyard.logs.imu import first_mount
 from steelyard.logs.outliers import bursts, inside, merged
 from steelyard.logs.recording import Recording, Stream
-from steelyard.spatial import cross_matrix
+from steelyard.spatial import cross_matrix, lever_matrix
 
 CUTOFF_HZ = 3.0
 _RATE_HZ = 60.0
@@ -137,7 +138,7 @@ def _turning(rotation: Array, rate: float) -> tuple[Array, Array]:
     omega = angular_velocity(rotation, rate)
     alpha = np.gradient(omega, 1 / rate, axis=0)
     across = cross_matrix(omega)
-    lever = cross_matrix(alpha) + across @ across
+    lever = lever_matrix(omega, alpha)
     entries = forms.inertia_matrix(np.eye(10)[4:])
     spin = np.einsum("kij,nj->nik", entries, alpha) + across @ np.einsum("kij,nj->nik", entries, omega)
     return lever, spin
@@ -201,21 +202,9 @@ def _area_at(time: Array, values: Array, area: Array, at: Array) -> Array:
     return np.asarray(area[left] + h * values[left] + 0.5 * h**2 * slope)
 
 
-def _wrench(recording: Recording, stream: Stream) -> tuple[Array, frozenset[str]]:
-    """Return [tau, f] (N, 6) on-object in the stream's axes turned into S, and which of them are in W axes."""
-    world = frozenset(part for part in _PARTS if stream.frames.get(part, "S") == "W")
-    torque, force = (
-        v if part in world or stream.turn is None else stream.turn.apply(v)
-        for part, v in ((part, stream.channels[part]) for part in _PARTS)
-    )
-    if stream.arm is not None and not world:
-        torque = torque + np.cross(stream.arm, force)
-    return recording.wrench_sign * np.concatenate([torque, force], 1), world
-
-
 def _of_table(recording: Recording, stream: Stream) -> Glance | None:
-    wrench, world = _wrench(recording, stream)
-    rows = len(wrench)
+    felt = Felt.of(stream, recording.wrench_sign)
+    wrench, rows = felt.values, len(stream)
     if any(len(s) != rows for s in recording.streams) or rows < 3:
         return None
     rotation = next((v for _, _, v in channel(recording, "rotation")), None)
@@ -223,7 +212,7 @@ def _of_table(recording: Recording, stream: Stream) -> Glance | None:
     if rotation is None and pull is None:
         return None
     place = next((v for _, _, v in channel(recording, "position")), None)
-    return Glance(wrench, rotation, pull, None, np.arange(rows), None, world, mirrored, position=place)
+    return Glance(wrench, rotation, pull, None, np.arange(rows), None, felt.world, mirrored, position=place)
 
 
 def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array | None, Array | None]:
@@ -261,9 +250,9 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
     def on_grid(s: Stream, values: Array) -> Array:
         return resampled(_stamps(s), values, grid)
 
-    raw, world = _wrench(recording, stream)
+    raw = Felt.of(stream, recording.wrench_sign)
     calm = ~inside(_stamps(stream), _knocks(stream))
-    wrench = np.where(recording.dead, 0.0, resampled(_stamps(stream)[calm], raw[calm], grid))
+    wrench = np.where(recording.dead, 0.0, resampled(_stamps(stream)[calm], raw.values[calm], grid))
     seen = replace(recording, streams=tuple(used))
     rotation = next((on_grid(s, v) for s, _, v in channel(seen, "rotation")), None)
     pull, mirrored = (None, None) if rotation is not None else _pulls(seen, on_grid, wrench)
@@ -278,7 +267,7 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
         felt = next((on_grid(s, v) for s, _, v in channel(seen, "specific_force")), None)
     place = next((on_grid(s, v) for s, _, v in channel(seen, "position")), None)
     return Glance(
-        wrench, rotation, pull, acceleration, block if whole else block[kept], rate, world, mirrored, felt,
+        wrench, rotation, pull, acceleration, block if whole else block[kept], rate, raw.world, mirrored, felt,
         recording.dead, place, None if whole else kept,
     )  # fmt: skip
 

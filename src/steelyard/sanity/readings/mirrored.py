@@ -10,7 +10,7 @@ from steelyard.check import Array
 from steelyard.sanity.readings.glance import Glance
 from steelyard.sanity.readings.static_fit import beside, solve
 from steelyard.sanity.readings.tilt import force_and_weight
-from steelyard.spatial import signed_axes
+from steelyard.spatial import signed_axes, signed_columns
 
 
 @dataclass(frozen=True, eq=False)
@@ -43,8 +43,6 @@ def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
 
 def in_words(X: Array, letter: str) -> str:
     """Say what columns must be read as whose numbers are X (3, 3) times those meant: "Fx = -Fy, Fy = .."."""
-    said = []
-    for row, name in zip(X.T, "xyz", strict=True):  # meant_k = sum_i X_ik read_i
-        k = int(np.argmax(np.abs(row)))
-        said.append(f"{letter}{name} = {'-' if row[k] < 0 else ''}{letter}{'xyz'[k]}")
-    return ", ".join(said)
+    # meant_k = sum_i X_ik read_i
+    pairs = zip("xyz", signed_columns(X.T, letter), strict=True)
+    return ", ".join(f"{letter}{name} = {read}" for name, read in pairs)

@@ -6,7 +6,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_shares, with_neighbours
+from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_shares, saturated, with_neighbours
 from steelyard.logs.recording import Recording, Stream
 
 # Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
@@ -28,15 +28,7 @@ def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
                     found.append((quantity, axis, float(extreme), int(rows.sum())))
                     clipped |= rows
     rest, then = left_out(stream, with_neighbours(clipped))
-    return rest, tuple(_saturated(stream, *each, then) for each in found)
-
-
-def _saturated(stream: Stream, quantity: str, axis: int, extreme: float, rows: int, then: str) -> Finding:
-    return Finding.of(
-        "channel-saturated",
-        f"{quantity.capitalize()} {'xyz'[axis]} of '{stream.name}' stops at {extreme:.6g} in {rows} of "
-        f"{len(stream)} rows; {then}.",
-    )
+    return rest, tuple(saturated(stream.name, *each, len(stream), then) for each in found)
 
 
 def clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
@@ -52,7 +44,8 @@ def clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
                 if len(values) > 4 and counts[end] >= 3 and counts[1:-1].max() == 1:
                     at = column == values[end]
                     if not _same_pull(stream, at, gravity):
-                        out.append(_saturated(stream, quantity, axis, values[end], int(at.sum()), "check them"))
+                        extreme, rows = values[end], int(at.sum())
+                        out.append(saturated(stream.name, quantity, axis, extreme, rows, len(stream), "check them"))
     return out
 
 

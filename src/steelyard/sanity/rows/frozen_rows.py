@@ -9,7 +9,7 @@ from steelyard.findings import Finding
 from steelyard.logs.clipping import NOISE_SHARE, left_out, noise_shares
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.repeated_rows import NOISY, columns_of
-from steelyard.logs.runs import lasting, runs
+from steelyard.logs.runs import around, lasting, runs
 from steelyard.spatial import cross_matrix
 
 # A channel is frozen when it holds still for this long although it never else does.
@@ -94,7 +94,7 @@ def _frozen_rows(column: Array, time: Array) -> Mask:
     blocks = max(len(elsewhere) // FROZEN_ROWS, 1)
     if len(elsewhere) < FROZEN_ROWS or max(b.mean() for b in np.array_split(elsewhere, blocks)) > 0.5:
         return np.zeros(len(column), bool)
-    return np.asarray(np.concatenate([[False], long]) | np.concatenate([long, [False]]))
+    return around(long)
 
 
 def _rows_needed(time: Array) -> float:

@@ -11,12 +11,12 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.log import Mask
 from steelyard.logs.runs import lasting, runs
+from steelyard.team.payload.body_rows import averaged
 from steelyard.team.stacked import Stretch
 
 # A push below this share of the robot's usual one is idle where it stays so for IDLE_S [s]; forces are averaged over
@@ -49,8 +49,7 @@ def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
 
 def _smoothed(part: Stretch) -> Array:
     """Return the size (T, N) [N] of the force averaged over MEAN_S."""
-    width = max(1, round(MEAN_S * part.rate))
-    mean = uniform_filter1d(part.wrench[..., 3:], width, axis=0, mode="nearest")
+    mean = averaged(part.wrench[..., 3:], MEAN_S, part.rate)
     return np.asarray(np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2))
 
 

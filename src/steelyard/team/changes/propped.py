@@ -11,7 +11,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.findings import Finding
@@ -19,8 +18,7 @@ from steelyard.inertia.regressor import motion_map
 from steelyard.logs.log import Mask
 from steelyard.spatial import unit_vectors
 from steelyard.team.changes.touched import MEAN_S, around
-from steelyard.team.payload.body_rows import BodyRows, Run
-from steelyard.team.payload.model import weight
+from steelyard.team.payload.body_rows import BodyRows, Run, averaged
 
 # What robots bear is averaged over MEAN_S. It is little below this share of what they bear in a tenth of the rows, and
 # the payload is propped where so much of its weight is missing.
@@ -36,7 +34,8 @@ class Propped:
 
     def missing(self, body: BodyRows, phi: Array, D: Array) -> float:
         """Return how much less [N] robots bear in these rows than in the others, beside what a payload phi needs."""
-        less = np.concatenate([_borne(run, D) - _needed(run, phi) for run in body.runs])
+        needed = motion_map(phi)[3:].T
+        less = np.concatenate([_borne(run, D) - _along_weight(run.motion @ needed, run) for run in body.runs])
         rows = np.concatenate(self.rows)
         return float(np.median(less[~rows]) - np.median(less[rows]))
 
@@ -58,7 +57,7 @@ def maybe_propped(rows: Sequence[BodyRows], D: Array) -> list[Propped]:
     for number, body in enumerate(rows):
         if body.still or not body.runs:
             continue
-        borne = [_averaged(_borne(run, D), run.rate) for run in body.runs]
+        borne = [averaged(_borne(run, D), MEAN_S, run.rate) for run in body.runs]
         least = LITTLE * float(np.quantile(np.concatenate(borne), USUAL))
         little = tuple(around(each < least, run.rate) for each, run in zip(borne, body.runs, strict=True))
         if least > 0 and any(each.any() for each in little) and not all(each.all() for each in little):
@@ -66,24 +65,10 @@ def maybe_propped(rows: Sequence[BodyRows], D: Array) -> list[Propped]:
     return out
 
 
-def is_propped(missing: float, phi: Array) -> bool:
-    """Return whether so much [N] of the weight of a payload phi (10,) is missing that something else bears it."""
-    return missing > MISSING * weight(phi)
-
-
 def _borne(run: Run, D: Array) -> Array:
     """Return the force (T,) [N] with which robots push against gravity, and what accelerates the payload along it."""
     return _along_weight(run.pushed @ D[3:].T, run)
 
 
-def _needed(run: Run, phi: Array) -> Array:
-    """Return what a payload phi (10,) needs along it (T,) [N]."""
-    return _along_weight(run.motion @ motion_map(phi)[3:].T, run)
-
-
 def _along_weight(force: Array, run: Run) -> Array:
     return np.asarray(np.einsum("ti,ti->t", force, unit_vectors(run.motion[:, 3:6])))
-
-
-def _averaged(values: Array, rate: float) -> Array:
-    return np.asarray(uniform_filter1d(values, max(1, round(MEAN_S * rate)), mode="nearest"))

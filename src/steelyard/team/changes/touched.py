@@ -10,13 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.ndimage import binary_dilation, uniform_filter1d
+from scipy.ndimage import binary_dilation
 
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import motion_map
 from steelyard.logs.log import Mask
-from steelyard.team.payload.body_rows import BodyRows, Run
+from steelyard.team.payload.body_rows import BodyRows, Run, averaged
 from steelyard.team.payload.model import weight
 
 # What is left is averaged over MEAN_S. It counts where it is so many times the usual (median) and this share of the
@@ -89,7 +89,7 @@ def together(touched: Sequence[Touched]) -> tuple[Touched, ...]:
 def _unneeded(run: Run, phi: Array, D: Array, size: float) -> Array:
     """Return what is pushed (T, 6) and not needed, averaged over MEAN_S and less a constant [N, moments over size]."""
     left = (run.pushed @ D.T - run.motion @ motion_map(phi).T) / np.repeat([size, 1.0], 3)
-    smooth = uniform_filter1d(left, max(1, round(MEAN_S * run.rate)), axis=0, mode="nearest")
+    smooth = averaged(left, MEAN_S, run.rate)
     return np.asarray(smooth - np.median(smooth, axis=0))
 
 

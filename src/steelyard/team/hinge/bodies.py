@@ -14,6 +14,7 @@ from steelyard.team.adjoint import exp
 from steelyard.team.estimate import BodyEstimate, TeamEstimate
 from steelyard.team.hinge.rows import COUNT, EXCHANGED, SECOND, SEVEN, WHOLE
 from steelyard.team.payload.shown import SHOWN
+from steelyard.team.split import hinge_words
 
 # Seven parameters of the whole in its ten: first moments across the hinge, second moments of mass, products.
 FROM_TEN = np.zeros((SECOND, WHOLE))
@@ -116,13 +117,9 @@ def hinge_findings(team: TeamEstimate) -> list[Finding]:
     if team.hinge is None:
         return []
     hinge = team.hinge
-    one, two = (" and ".join(f"'{name}'" for name in body.robots) for body in hinge.bodies)
-    axis, point = ", ".join(f"{a:.3f}" for a in hinge.axis), ", ".join(f"{1e3 * a:.0f}" for a in hinge.point)
-    said = (
-        f"{one} hold one body, {two} another: between them is a hinge about ({axis}) through ({point}) mm of grasp "
-        f"'{team.reference}', which swung by {np.rad2deg(hinge.swing):.0f} deg. What is given is for both together "
-        "with the hinge at the mean of its angles. "
-    )
+    holders = [" and ".join(f"'{name}'" for name in body.robots) for body in hinge.bodies]
+    said = hinge_words(holders, hinge.axis, hinge.point, hinge.swing, team.reference)
+    said += " What is given is for both together with the hinge at the mean of its angles. "
     if np.isnan([body.mass_range[0] for body in hinge.bodies]).any():
         said += "Too little is shown of each body: open and close the hinge faster while tilting the payload."
     else:

@@ -47,17 +47,15 @@ def _scatter(team: Hinged, one: BodyRows, two: BodyRows, sums: Sums, highest_hz:
     """Return the scatter of motion and forces of one recording, as far as frequencies are used."""
     count = len(team.second)
     out = np.zeros((INNER + 3 * count, INNER + 3 * count))
+    # (N, 3, 6): the force that each robot's push adds, with the hinge at zero.
+    forces = np.split((sums.first + sums.second)[3:], count, axis=1)
     for run, other in zip(one.runs, two.runs, strict=True):
         turn = about_z(team.angle[run.rows])[:, 3:, 3:]
-        force = np.stack([run.pushed.reshape(-1, count, 6)[:, i] @ _force(sums, i).T for i in range(count)], axis=2)
+        pushed = np.split(run.pushed, count, axis=1)
+        force = np.stack([own @ F.T for own, F in zip(pushed, forces, strict=True)], axis=2)
         force[..., team.second] = turn @ force[..., team.second]
         cos, sin = turn[:, :1, 0], turn[:, 1:2, 0]
         seen = [run.motion, other.motion, cos * other.motion, sin * other.motion, np.ones_like(cos), cos, sin]
         z = as_frequencies([*seen, force.reshape(len(force), -1)], run, highest_hz, not one.still)
         out += z.T @ z
     return out
-
-
-def _force(sums: Sums, robot: int) -> Array:
-    """Return (3, 6): the force that a robot's push adds, with the hinge at zero."""
-    return (sums.first + sums.second)[3:, 6 * robot : 6 * robot + 6]

@@ -28,7 +28,7 @@ from steelyard.team.hinge.rows import COUNT, WHOLE, Bands, Sums, bodies_of, gath
 from steelyard.team.hinge.signs import robot_of_other_sign
 from steelyard.team.hinge.start import first_hinged
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
-from steelyard.team.motion_fit import CLOCK_ROUNDS, PUNCTUAL
+from steelyard.team.motion_fit import CLOCK_ROUNDS, PUNCTUAL, against, later
 from steelyard.team.payload.body_rows import BodyRows, reach, require_runs
 from steelyard.team.payload.doubt import turned_by_step
 from steelyard.team.payload.gain_sight import of_force
@@ -65,7 +65,7 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
         speed = _speeds(parts, team)[some] if clocks else None
         fit = fit_hinged(data.rows(some), team.rows(some), reference, fit.noise, speed)
         step = fit.team.delays
-        late = {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
+        late = later(late, step)
         if not clocks or np.abs(step).max() < PUNCTUAL:
             break
         before, parts = parts, stretches(log, late)
@@ -75,8 +75,7 @@ def fit_two_bodies(log: TeamLog, split: Split, clocks: bool) -> tuple[tuple[Stre
         raise CannotAnswer("the motion does not show where the hinge is and where the robots hold.")
     team = followed(data, replace(fit.team, motion=team.motion, angle=team.angle), fit.noise, FOLLOWED)
     last = finished(data, replace(fit, team=team), reference, _speeds(parts, team) if clocks else None)
-    step = last.team.delays - fit.team.delays
-    return parts, last, {name: late[name] + float(d) for name, d in zip(log.names, step, strict=True)}
+    return parts, last, later(late, last.team.delays - fit.team.delays)
 
 
 def _speeds(parts: tuple[Stretch, ...], team: Hinged) -> Array:
@@ -118,7 +117,7 @@ def identify_two_bodies(
     grasps = {name: GraspEstimate(team.grasps[i], _grasp_covariance(fit, i)) for i, name in enumerate(log.names)}
     moment, push = payload.residual
     rows, still = (sum(p.samples for k in kinds for p in k.parts if p.still or every) for every in (True, False))
-    late = {name: seconds - late[log.reference] for name, seconds in late.items()}
+    late = against(late, log.reference)
     held = tuple(tuple(log.names[i] for i in np.flatnonzero(who)) for who in (~team.second, team.second))
     hinge = _hinge(
         fit, both_bodies(seventeen, _spreads(payload, doubt, frame), float(outer[0, 0]), payload.scale, frame, held)

@@ -24,7 +24,7 @@ from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
 from steelyard.team.poses.measured import TeamMotion, in_words
 from steelyard.team.poses.start import first_team
 from steelyard.team.stacked import Stretch, stretches
-from steelyard.team.turns import turns_between
+from steelyard.team.turns import extent
 
 # Rows of a recording that are enough to tell; readings that are fitted at most.
 ROWS, MOST = 50, 4
@@ -259,11 +259,7 @@ def _size(data: TeamMotion) -> Array:
     out = np.empty((data.count, 2))
     for i in range(data.count):
         path = data.poses[data.valid[:, i], i]
-        turns = turns_between(Rotation.nearest(path.rotation.matrix.mean(0)), path.rotation)
-        if not len(path.position):
-            out[i] = 0.0
-            continue
-        out[i] = np.sqrt((turns**2).mean()), np.sqrt(((path.position - path.position.mean(0)) ** 2).mean())
+        out[i] = extent(path) if len(path.position) else 0.0
     return np.maximum(out, [STILL, 1e-12])
 
 

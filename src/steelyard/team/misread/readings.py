@@ -8,7 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.recording import INCH, POUND_FORCE, STANDARD_GRAVITY
-from steelyard.spatial import signed_axes
+from steelyard.spatial import signed_axes, signed_columns
 
 # Units taken for newtons: force, and the torque that goes with it, in SI.
 _UNITS = {"kgf": (STANDARD_GRAVITY, STANDARD_GRAVITY), "lbf": (POUND_FORCE, POUND_FORCE * INCH), "kN": (1e3, 1e3)}
@@ -54,7 +54,7 @@ class Reading:
             also = " (or mN as N)" if unit == "kN" else ""
             said.append(f"{unit} read as N" if size > 1 else f"N read as {unit}{also}")
         if self.number % len(AXES):
-            axes = zip(("Fx", "Fy", "Fz"), _columns(self.axes), strict=True)
+            axes = zip(("Fx", "Fy", "Fz"), signed_columns(self.axes, "F"), strict=True)
             said.append(", ".join(f"{is_} = {given}" for is_, given in axes if is_ != given))
         return " and ".join(said)
 
@@ -74,7 +74,7 @@ class Reading:
             out.append(f"Give the wrench stream of '{name}' mount = {{ rotation = [{numbers}], form = \"matrix\" }}.")
         elif mixed:
             what = "force and torque" if turned else "force"
-            order = ", ".join(c.replace("F", "") for c in _columns(self.axes))
+            order = ", ".join(signed_columns(self.axes))
             out.append(f"Give the columns of {what} of '{name}' in the order and with the signs {order}.")
         return " ".join(out)
 
@@ -85,9 +85,3 @@ def torques_beside(number: int) -> tuple[Reading, ...]:
     turned = [np.eye(3), axes, *([-axes] if np.linalg.det(axes) < 0 else [])]
     sizes = dict.fromkeys((1.0, float(_SIZES[number // len(AXES), 1])))
     return tuple(Reading(number, size * X) for size in sizes for X in turned[: 1 if number % len(AXES) == 0 else None])
-
-
-def _columns(axes: Array) -> list[str]:
-    """Return the given column that each axis is, with its sign."""
-    largest = np.abs(axes).argmax(1)
-    return [f"{'-' if axes[i, k] < 0 else ''}F{'xyz'[k]}" for i, k in enumerate(largest)]

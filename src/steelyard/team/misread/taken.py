@@ -14,6 +14,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
+from steelyard.spatial import signed_columns
 
 
 def maps_of(names: Sequence[str], D: Array, taken: Array, reading: tuple[int, Array] | None) -> dict[str, Array]:
@@ -58,7 +59,5 @@ def _words(X: Array) -> str:
     if np.allclose(axes, -np.eye(3)):
         said.append("with its sign turned")
     elif not np.allclose(axes, np.eye(3)):
-        column = np.abs(axes).argmax(1)
-        order = ", ".join(f"{'-' if axes[i, k] < 0 else ''}{'xyz'[k]}" for i, k in enumerate(column))
-        said.append(f"with axes ({order})")
+        said.append(f"with axes ({', '.join(signed_columns(axes))})")
     return " ".join(said)

@@ -13,6 +13,7 @@ from itertools import pairwise
 
 import numpy as np
 from scipy.fft import prev_fast_len
+from scipy.ndimage import uniform_filter1d
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
@@ -207,6 +208,11 @@ def features(omega: Array, alpha: Array, supported: Array) -> Array:
     """Return (T, 12) of angular velocity, its derivative and acceleration less gravity (T, 3) each."""
     x, y, z = omega.T
     return np.concatenate([alpha, supported, np.stack([x * x, x * y, x * z, y * y, y * z, z * z], 1)], axis=1)
+
+
+def averaged(values: Array, seconds: float, rate: float) -> Array:
+    """Return values (T, ...) averaged over so long about each row; rate in Hz."""
+    return np.asarray(uniform_filter1d(values, max(1, round(seconds * rate)), axis=0, mode="nearest"))
 
 
 def require_runs(kinds: Sequence[object]) -> None:

@@ -12,6 +12,7 @@ from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.gain_sight import gain_columns
+from steelyard.team.payload.leftover import scatter
 from steelyard.team.payload.model import Group
 from steelyard.team.payload.spectra import Spectra
 
@@ -42,7 +43,7 @@ def lost_turns(fit: PayloadFit, X_BG: Pose, lost: Array) -> Array:
     """
     bends = _bends(X_BG, lost)
     out = _squares(_moved(fit, bends[:, None]))
-    S = sum(part.scatter.sum(0) for group in fit.groups for part in group.parts)
+    S = scatter(fit.groups)
     up, pushed = S[-1, 3:6] / S[-1, -1], S[-1, 12:-1].reshape(-1, 6, 1) / S[-1, -1]
     lift = up / (up @ up)
     slope = (turned_by_step(X_BG) @ pushed[:, None])[..., 3:, 0] @ lift

@@ -104,13 +104,12 @@ def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with
     # in the noise already.
     last = groups[-1]
     unsure = 1 + 2 * len(last.wrench_noise) / max(sum(float(p.rows.sum()) for p in last.parts), 1.0)
-    rows = sum(float(part.rows.sum()) for group in groups for part in group.parts)
     shown = models.shown(scale)
     return PayloadFit(
         phi, models.covariance_about(phi) * unsure, shown.lost, scale, models.information[models.best],
         shown.condition, models.gain, models.gain_squares, models.gainless, groups,
         models.recordings(models.best).biases, found.normals, found.weights, found.blind, _residual(groups),
-        float(models.chi2[models.best]) / max(6 * rows - 10, 1.0), unsure,
+        float(models.chi2[models.best]) / max(6 * _rows(groups) - 10, 1.0), unsure,
     )  # fmt: skip
 
 
@@ -176,7 +175,11 @@ def _start(groups: tuple[Group, ...], D: Array, size: float) -> tuple[Array, tup
 
 def _residual(groups: tuple[Group, ...]) -> Array:
     """Return the rms (6,) of what is left of the summed moment and force, per row."""
-    rows = sum(float(p.rows.sum()) for g in groups for p in g.parts)
     each = [np.einsum("ki,k->i", g.wrench_noise, p.rows) for g in groups for p in g.parts]
     total = np.sum(each, axis=0)
-    return np.asarray(np.sqrt(total / max(rows, 1.0)))
+    return np.asarray(np.sqrt(total / max(_rows(groups), 1.0)))
+
+
+def _rows(groups: tuple[Group, ...]) -> float:
+    """Return how many rows there are in all bands."""
+    return sum(float(part.rows.sum()) for group in groups for part in group.parts)

@@ -9,8 +9,7 @@ Source: AX = XB as in hand-eye calibration; the paper's eq. 3-8 are the same wit
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from functools import cached_property
+from typing import NamedTuple
 
 import numpy as np
 
@@ -70,21 +69,16 @@ def _rows_in_common(data: TeamMotion, reference: int) -> list[tuple[Integers, li
     return list(groups.values())
 
 
-@dataclass(frozen=True, eq=False)
-class _Level:
+class _Level(NamedTuple):
     """Direction of gravity in the grasps of r (M, 3) and of others (M, K, 3), zero where the base does not tell it."""
 
     own: Array
     others: Array
 
-    @cached_property
-    def pairs(self) -> Array:
-        """What Wahba's problem asks of them (K, 3, 3)."""
-        return np.asarray(np.einsum("ma,mkb->kab", self.own, self.others))
 
-    def left(self, R: Rotation) -> Array:
-        """Return the squares (K,) that grasps turned by R (K,) leave of them."""
-        return np.asarray(((self.own[:, None] - R.apply(self.others)) ** 2).sum((0, 2)))
+def _unlike(own: Array, others: Array, R: Rotation) -> Array:
+    """Return the squares (K,) by which vectors (M, K, 3), turned by R (K,), are unlike those of r (M, 3)."""
+    return np.asarray(((own[:, None] - R.apply(others)) ** 2).sum((0, 2)))
 
 
 def _level(T_r: Pose, T: Pose, own: Array, others: Array) -> _Level | None:
@@ -103,16 +97,17 @@ def _grasps(T_r: Pose, T: Pose, level: _Level | None) -> Pose:
     turning, moving = (x.T @ y.swapaxes(0, 1) for x, y in ((alpha, beta), (a, b)))
     first = Rotation.aligning(turning)
     seen, axes = np.linalg.eigh(alpha.T @ alpha)
-    unlike = ((alpha[:, None] - first.apply(beta)) ** 2).sum((0, 2))
+    unlike = _unlike(alpha, beta, first)
     two = seen[1] > ONE_AXIS**2 * seen[2] and seen[1] > rows * (10 * ROTATION_NOISE) ** 2
     if two and (level is None or seen[1] > NOISE_SHARE * unlike.max() / 3):
         return Pose(first, _positions(A, B, first)[0])
     candidates, about = [first, Rotation.aligning(moving)], [axes[:, 2]]
     if level is not None:
         # Directions and turns err alike; places are brought to the size of turns.
-        upright = Rotation.aligning(turning + level.pairs)
+        leveling = turning + np.einsum("ma,mkb->kab", *level)
+        upright = Rotation.aligning(leveling)
         scale = seen.sum() / max(float((a**2).sum()), 1e-300)
-        candidates += [upright, Rotation.aligning(turning + level.pairs + scale * moving)]
+        candidates += [upright, Rotation.aligning(leveling + scale * moving)]
         about.append(level.own.mean(0))
     else:
         upright = first
@@ -122,16 +117,12 @@ def _grasps(T_r: Pose, T: Pose, level: _Level | None) -> Pose:
     spread = float(np.linalg.norm(alpha, axis=1).mean()) + 1e-12
     size = float(np.linalg.norm(a, axis=1).mean()) + 1e-12
     cost = [
-        left / size**2 + (((alpha[:, None] - R.apply(beta)) ** 2).sum((0, 2)) + _tilted(level, R)) / spread**2
+        left / size**2 + (_unlike(alpha, beta, R) + (0.0 if level is None else _unlike(*level, R))) / spread**2
         for R, (_, left) in zip(candidates, found, strict=True)
     ]
     best, each = np.argmin(cost, axis=0), np.arange(len(first.matrix))
     turns = np.stack([R.matrix for R in candidates])[best, each]
     return Pose(Rotation(turns), np.stack([place for place, _ in found])[best, each])
-
-
-def _tilted(level: _Level | None, R: Rotation) -> Array:
-    return np.zeros(len(R.matrix)) if level is None else level.left(R)
 
 
 def _positions(A: Pose, B: Pose, R: Rotation) -> tuple[Array, Array]:

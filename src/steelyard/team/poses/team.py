@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -11,7 +11,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.changes.found import Edit, without_changes
 from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
@@ -19,7 +19,7 @@ from steelyard.team.changes.slips_between import slip_between, step_between
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
 from steelyard.team.level import Tilted, tilted
-from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, later
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_poses
 from steelyard.team.poses import rows as pose_rows
 from steelyard.team.poses.covariance import Spread
@@ -28,7 +28,7 @@ from steelyard.team.poses.measured import Team, TeamMotion
 from steelyard.team.poses.rest import shares_at_rest
 from steelyard.team.poses.start import ENOUGH, first_team
 from steelyard.team.stacked import Stretch, row_slices, stretches
-from steelyard.team.turns import turns_between, twists_between
+from steelyard.team.turns import extent, twists_between
 
 # Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
 # is the reference, and by where noisy rows are then read the answer does in its sixth digit.
@@ -86,7 +86,7 @@ class PoseTeam(MotionFit):
             if not left or (step < near).all():
                 break
             known, close = fit.known if step.max() < UNCHANGED else None, NEARLY
-            late = _later(late, fit)
+            late = later(late, fit.team.delays)
             parts = edit(stretches(log, late))
             data = TeamMotion.of(parts)
         share = shares_at_rest(parts, fit)
@@ -94,7 +94,7 @@ class PoseTeam(MotionFit):
             fit = fit_poses(replace(timed, share=share), fit.team, reference, fit.noise)
         elif clocks:
             fit = fit_poses(timed, fit.team, reference, fit.noise, known=fit.known)
-        return cls(parts, fit, _later(late, fit))
+        return cls(parts, fit, later(late, fit.team.delays))
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
@@ -134,10 +134,7 @@ class PoseTeam(MotionFit):
     @cached_property
     def _moved(self) -> Array:
         """How far the payload turned and moved (2,), rms [rad, m]."""
-        path = self.fit.team.motion
-        middle = Rotation.nearest(path.rotation.matrix.mean(0))
-        turned = float(np.sqrt((turns_between(middle, path.rotation) ** 2).mean()))
-        return np.array([turned, float(np.sqrt(((path.position - path.position.mean(0)) ** 2).mean()))])
+        return extent(self.fit.team.motion)
 
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""
@@ -193,11 +190,6 @@ class PoseTeam(MotionFit):
             body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
             out.append((body, fit.rows.residual[rows]))
         return out, noise
-
-
-def _later(late: Mapping[str, float], fit: PoseFit) -> dict[str, float]:
-    """Return how late each clock is [s] with what a fit found."""
-    return {name: before + float(more) for (name, before), more in zip(late.items(), fit.team.delays, strict=True)}
 
 
 def _followed(data: TeamMotion, fit: PoseFit) -> Team:

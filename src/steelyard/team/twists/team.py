@@ -19,7 +19,7 @@ from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, s
 from steelyard.team.clocks.errors import ClockErrors
 from steelyard.team.clocks.unsteady import Left, clock_errors
 from steelyard.team.level import Tilted, tilted
-from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, later
 from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
 from steelyard.team.split import Split, smoothed, split_of
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
@@ -61,7 +61,7 @@ class TwistTeam(MotionFit):
             # What is told of clocks is what the rows and the fit were made with.
             if not (clocks and left) or fit.punctual(share * PUNCTUAL, share * DOUBTED):
                 break
-            late = {name: late[name] + float(d) for name, d in zip(log.names, fit.delays, strict=True)}
+            late = later(late, fit.delays)
         return cls(parts, fit, late, reference=log.names.index(log.reference))
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
