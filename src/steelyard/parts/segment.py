@@ -32,7 +32,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
-from steelyard.spatial import cross
+from steelyard.spatial import area_vectors, summed
 
 PER_PART = 0.08  # worth of a part: a hollow of a twelfth of the volume at a full seam, or 0.8 % of the surface
 
@@ -189,8 +189,7 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
         colours = colour_modes(_vertex_colours(cloud, mesh), skin, *told)
         colour = without_prints(without_fades(colours, skin), skin)
     pairs, corners = mesh.dual, mesh.inner_faces
-    a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
-    areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
+    areas = np.linalg.norm(area_vectors(mesh.vertices[corners]), axis=1)
     piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)
     nearest = _cell_of_its_colour(cloud, mesh, nearest, colour, of_piece[piece])
     piece, of_piece = with_points(mesh, piece, of_piece, pairs, areas, nearest)
@@ -294,8 +293,7 @@ def _vertex_colours(cloud: Cloud, mesh: TetMesh) -> Colours:
         return np.asarray(rgb)
     owner = cKDTree(mesh.vertices).query(cloud.xyz)[1]
     count = np.bincount(owner, minlength=len(mesh.vertices))
-    total = np.stack([np.bincount(owner, rgb[:, k], len(mesh.vertices)) for k in range(3)], axis=1)
-    colours = total / np.maximum(count, 1)[:, None]
+    colours = summed(owner, rgb, len(mesh.vertices)) / np.maximum(count, 1)[:, None]
     empty = count == 0
     colours[empty] = rgb[cKDTree(cloud.xyz).query(mesh.vertices[empty])[1]]
     return np.asarray(colours)
@@ -306,5 +304,4 @@ def _mean_colours(rgb: Colours | None, part: Integers, count: int) -> Array | No
     if rgb is None:
         return None
     points = np.bincount(part, minlength=count)
-    total = np.stack([np.bincount(part, rgb[:, k], count) for k in range(3)], axis=1)
-    return np.where(points[:, None] > 0, total / np.maximum(points, 1)[:, None], 128.0)
+    return np.where(points[:, None] > 0, summed(part, rgb, count) / np.maximum(points, 1)[:, None], 128.0)

@@ -18,6 +18,7 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
+from steelyard.spatial import area_vectors
 
 # Places in a cell that are asked: its centroid, and halfway from there to each corner.
 _PLACES = np.array([[0.25] * 4, *(0.15 + 0.4 * np.eye(4))])
@@ -70,8 +71,7 @@ class SeenSpace:
         if self.guess is None:
             return 0.0
         corners = solid.vertices[solid.surface]
-        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-        return self.guess(corners.mean(1), areas)
+        return self.guess(corners.mean(1), area_vectors(corners))
 
     def kept(self, cells: TetMesh) -> KeptSpace:
         """Return what is to be kept of it with the cloud whose complex has these cells."""

@@ -6,12 +6,14 @@ from steelyard.spatial.vectors import (
     Acceleration,
     Twist,
     Wrench,
+    area_vectors,
     axial_vector,
     classical_acceleration,
     cross,
     cross_matrix,
     lever_acceleration,
     signed_axes,
+    summed,
     unit_vectors,
 )
 
@@ -21,11 +23,13 @@ __all__ = [
     "Rotation",
     "Twist",
     "Wrench",
+    "area_vectors",
     "axial_vector",
     "classical_acceleration",
     "cross",
     "cross_matrix",
     "lever_acceleration",
     "signed_axes",
+    "summed",
     "unit_vectors",
 ]

@@ -16,7 +16,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding, percent
 from steelyard.shape.scans.grid import Cells
 from steelyard.shape.scans.scene import Scene
-from steelyard.shape.scans.underside import Underside, median_along
+from steelyard.shape.scans.underside import Underside, median_along, rim_of
 
 # What a rod hangs below where it was last seen, of its rise above that: (1 - sin e) / (1 + sin e) for sight lines at
 # the elevation e, 0.4 at 25 degrees, 0.6 at 15.
@@ -54,7 +54,7 @@ def _free_to(bottom: Underside, xyz: Array, normal: Array, off_table: float) -> 
     """
     under = np.isfinite(bottom.height)
     cells, _ = bottom.grid.cells_under(xyz)
-    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    rim = rim_of(under)
     side = normal[:, 2] < _SIDE
     known = rim | (under & _beside(bottom, (cells[0][side], cells[1][side]), xyz[side, 2]))
     if not known.any():

@@ -92,7 +92,7 @@ def closed_below(scene: Scene, xyz: Array, normal: Array, pitch: float) -> Under
 def _raise_to_feet(scene: Scene, xyz: Array, normal: Array, grid: Grid, empty_to: Array, top: Array) -> None:
     """Raise the empty height of the outermost columns under the object to where the walls over them end."""
     under = np.isfinite(empty_to) & (empty_to < top)
-    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    rim = rim_of(under)
     wall = np.abs(normal[:, 2]) < _WALL
     i, j = np.nonzero(rim)
     if not len(i) or not wall.any():
@@ -144,12 +144,17 @@ def _underside(xyz: Array, normal: Array, grid: Grid, empty_to: Array, top: Arra
     height = np.where(under, empty_to, 0.0)
     smooth = _smooth(ndimage.median_filter(height, 3), under)
     steep = under & (_steepness(smooth, under) / grid.pitch > _STEEPER * sight)
-    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    rim = rim_of(under)
     bare = rim & ~steep
     height = np.where(bare, median_along(height, rim), height)
     span = _spanned(height, rim, steep, under)
     closed = np.where(under, np.clip(span, 0.0, np.where(under, top, 0.0)), np.inf)
     return Underside(grid, closed, seen & under, top, np.where(under, empty_to, 0.0))
+
+
+def rim_of(under: Any) -> Any:
+    """Return the outermost of cells (I, J)."""
+    return under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
 
 
 def median_along(height: Array, rim: Any) -> Array:
