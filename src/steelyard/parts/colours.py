@@ -43,7 +43,7 @@ class ColourModes:
     plain: Array
 
 
-def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: Any = None) -> ColourModes:
+def colour_modes(rgb: Colours | Array, skin: Skin, normals: Array | None = None, seen: Any = None) -> ColourModes:
     """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255.
 
     normals  (V, 3) outward at the vertices, where they are known better than the triangles tell
