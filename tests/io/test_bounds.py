@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 import pytest
 
+from steelyard.datasets.track import MOTION
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io import bounds
 from steelyard.io.cloud_files import read_cloud
@@ -22,7 +23,6 @@ from steelyard.io.ply_files import read_mesh
 from steelyard.io.shapes.parts_files import read_parts
 from steelyard.io.shapes.pcd_files import read_pcd
 from steelyard.io.tables.files import open_table
-from steelyard.parts.known import MOTION
 
 TOO_MUCH = "F: holds 3 MiB, more than the 1 MiB that are read. Give fewer rows, points or views at once."
 

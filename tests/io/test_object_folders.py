@@ -16,13 +16,14 @@ import numpy as np
 import pytest
 
 from steelyard.api import identify
+from steelyard.datasets.known_object import KnownObject
+from steelyard.datasets.track import Track
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.object_folders import object_folders, read_object, read_track
 from steelyard.io.ply_files import read_mesh, write_mesh
 from steelyard.io.shapes.object_writing import write_object
 from steelyard.logs.log import MotionLog
-from steelyard.parts.known import KnownObject, Track
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.simulate.workshop import known_object
 from steelyard.workshop.catalogue import build

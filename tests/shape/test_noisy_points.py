@@ -5,7 +5,8 @@ import pytest
 
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.points.noisy_points import settled
-from steelyard.shape.volume import Solid, enclose
+from steelyard.shape.solid import Solid
+from steelyard.shape.volume import enclose
 from steelyard.workshop.sampling import spread_evenly
 from steelyard.workshop.sheets import sheets
 

@@ -16,8 +16,9 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.nesting import winding_number
 from steelyard.shape.sides.sheets import sheet_planes, torn
 from steelyard.shape.sides.tree import Tree
+from steelyard.shape.solid import Solid
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.volume import Solid, enclose
+from steelyard.shape.volume import enclose
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.locking import channel as folded
 from steelyard.workshop.sampling import spread_evenly

@@ -13,12 +13,12 @@ from scipy.spatial import cKDTree
 
 from steelyard.bench.asked import Progress
 from steelyard.check import Array
+from steelyard.datasets.known_object import KnownObject
 from steelyard.errors import BadValue
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.evaluate.solids import score, true_solid, winding_of
 from steelyard.io.object_folders import object_folders, read_object
 from steelyard.parts.clustering import cluster
-from steelyard.parts.known import KnownObject
 from steelyard.parts.segment import Segmentation, coloured_pieces, nearest_cell, parts_of_pieces
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.shape.cloud import Cloud
@@ -26,7 +26,7 @@ from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import oriented
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import enclose
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, area_vectors
 
 REPEATS = 3
 DEPTH = 2  # of the tree: where the paper cuts it, four parts
@@ -248,7 +248,7 @@ def _spread(corners: Array, count: int) -> tuple[Array, Array]:
     """Return points (M, 3) spread evenly over triangles (F, 3, 3), and the normals (M, 3) there."""
     rng = np.random.default_rng(0)
     a, b, c = np.moveaxis(corners, 1, 0)
-    normal = np.cross(b - a, c - a)
+    normal = area_vectors(corners)
     area = np.linalg.norm(normal, axis=1)
     chosen = rng.choice(len(corners), count, p=area / area.sum())
     u, v = rng.uniform(size=(2, count, 1))

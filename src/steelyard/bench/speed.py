@@ -9,8 +9,6 @@ from typing import Any
 
 import numba
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, Delaunay, cKDTree
 
 from steelyard.bench.shapes import hull_sets
@@ -25,6 +23,7 @@ from steelyard.shape.hull import TOLERANCE, HullWork, hull_volume, hull_work, qh
 from steelyard.shape.inside import inside
 from steelyard.shape.mesh import Integers, TriangleMesh
 from steelyard.shape.nesting import body_of
+from steelyard.shape.pairs import joined
 from steelyard.shape.tets import TetMesh
 from steelyard.workshop.catalogue import build
 from steelyard.workshop.sampling import spread_evenly, surface_cloud
@@ -107,9 +106,7 @@ def _filled(skin: TriangleMesh, count: int, rng: np.random.Generator) -> TetMesh
 
 
 def _largest_body(mesh: TetMesh) -> TetMesh:
-    one, other = mesh.dual.T
-    graph = coo_array((np.ones(len(one)), (one, other)), (len(mesh), len(mesh)))
-    body = connected_components(graph, directed=False)[1]
+    body = joined(mesh.dual, len(mesh))
     return mesh.chosen(body == np.bincount(body).argmax())
 
 

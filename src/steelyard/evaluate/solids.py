@@ -8,7 +8,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.parts.known import KnownObject
+from steelyard.datasets.known_object import KnownObject
 from steelyard.shape.mesh import Integers, TriangleMesh, part_moments
 from steelyard.shape.tets import TetMesh
 

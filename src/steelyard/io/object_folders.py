@@ -8,6 +8,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.datasets.known_object import KnownObject, unseen_finding
+from steelyard.datasets.track import MOTION, Track
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
@@ -18,7 +20,6 @@ from steelyard.io.json_arrays import Shape, array_of
 from steelyard.io.ply_files import read_mesh
 from steelyard.io.tables.array_table import ArrayTable, read_numbers
 from steelyard.parts.from_mesh import parts_of_mesh
-from steelyard.parts.known import MOTION, KnownObject, Track, unseen_finding
 from steelyard.parts.parts import Parts
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh

@@ -12,7 +12,7 @@ from steelyard.parts.light import Light, light_on
 from steelyard.parts.skin import OPPOSITE, Skin
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import Integers
-from steelyard.spatial import unit_vectors
+from steelyard.spatial import summed, unit_vectors
 
 NEIGHBOURS = 8
 # Distances between colours 0..1 (black to white is 1.7). Steps of eight bits and of a compressed texture are below the
@@ -43,7 +43,7 @@ class ColourModes:
     plain: Array
 
 
-def colour_modes(rgb: Colours, skin: Skin, normals: Array | None = None, seen: Any = None) -> ColourModes:
+def colour_modes(rgb: Colours | Array, skin: Skin, normals: Array | None = None, seen: Any = None) -> ColourModes:
     """Return the colours of the surface whose vertices have `rgb` (V, 3), 0..255.
 
     normals  (V, 3) outward at the vertices, where they are known better than the triangles tell
@@ -131,7 +131,7 @@ def _modes(colour: Array, near: Integers, sure: Any, reach: float) -> Array:
     grid -= grid.min(0)
     key = np.ravel_multi_index(tuple(grid.T), tuple(grid.max(0) + 1))
     cell, member, count = np.unique(key, return_inverse=True, return_counts=True)
-    centre = np.stack([np.bincount(member, colour[sure][:, k], len(cell)) for k in range(3)], axis=1) / count[:, None]
+    centre = summed(member, colour[sure], len(cell)) / count[:, None]
     company = np.bincount(member, alike[sure], len(cell))
     close = np.linalg.norm(centre[:, None] - centre, axis=2) < reach
     left = np.ones(len(cell), dtype=bool)

@@ -83,7 +83,7 @@ class Hierarchy:
 
     def leaves(self, node: int) -> Integers:
         """Return the numbers (k,) of the pieces inside a node, rising."""
-        return np.flatnonzero(self._owner([self._node(node)]) >= 0)
+        return np.flatnonzero(self._above([self._node(node)])[: len(self)] >= 0)
 
     def nodes(self, count: int) -> list[int]:
         """Return the `count` nodes, rising, that are left when the last count - 1 merges are undone."""
@@ -113,8 +113,9 @@ class Hierarchy:
         Parts are numbered by falling volume (equal or unknown volumes: by first appearance among the tets).
         """
         chosen = np.array(sorted(self._node(n) for n in nodes), dtype=np.int64)
-        owner = self._owner(chosen)
-        inner = np.isin(_ancestors(self.parent, chosen), chosen).any()
+        above = self._above(chosen)
+        owner, over = above[: len(self)], self.parent[chosen]
+        inner = (above[over[over >= 0]] >= 0).any()
         if inner or (owner < 0).any() or len(np.unique(chosen)) != len(chosen):
             raise BadValue(
                 "nodes to cut at must hold every piece exactly once; "
@@ -133,22 +134,11 @@ class Hierarchy:
             raise BadValue(f"nodes of this tree are 0..{self.root}; got {node}.")
         return int(node)
 
-    def _owner(self, chosen: Sequence[int] | Integers) -> Integers:
-        """Return which of the nodes `chosen` each piece (N,) lies in, -1 for none, the innermost of two."""
+    def _above(self, chosen: Sequence[int] | Integers) -> Integers:
+        """Return which of the nodes `chosen` each node (2N-1,) is or lies in, -1 for none, the innermost of two."""
         place = np.full(self.root + 1, -1)
         place[chosen] = np.arange(len(chosen))
         up = np.where((place >= 0) | (self.parent < 0), np.arange(self.root + 1), self.parent)
         while not np.array_equal(up, higher := up[up]):
             up = higher
-        return np.asarray(place[up[: len(self)]])
-
-
-def _ancestors(parent: Integers, nodes: Integers) -> Integers:
-    """Return every node strictly above any of `nodes`."""
-    above = np.zeros(len(parent), dtype=bool)
-    level = parent[nodes]
-    while len(level := np.unique(level[level >= 0])):
-        level = level[~above[level]]
-        above[level] = True
-        level = parent[level]
-    return np.flatnonzero(above)
+        return np.asarray(place[up])

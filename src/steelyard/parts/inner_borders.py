@@ -18,6 +18,7 @@ from steelyard.check import Array
 from steelyard.parts.skin import Skin
 from steelyard.shape.cells.cut_cells import crossing_edges, cut_cells
 from steelyard.shape.mesh import Integers
+from steelyard.shape.pairs import distinct_pairs, joined
 from steelyard.shape.tets import TetMesh
 
 _LONG = 3.0  # median edges of the surface: cells with shorter ones draw the border themselves
@@ -101,19 +102,14 @@ def _patches(skin: Skin, part: Integers) -> Integers:
 
     One that noise put inside is joined to the nearest of its part.
     """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
     outer = np.zeros(len(part), np.bool_)
     outer[skin.triangles] = True
     inside = np.flatnonzero(~outer)
     alike = part[skin.near[inside]] == part[inside][:, None]
     nearest = np.take_along_axis(skin.near[inside], alike.argmax(1)[:, None], 1)
     links = np.concatenate([skin.edges, np.column_stack([inside, nearest])])
-    one, two = links[part[links[:, 0]] == part[links[:, 1]]].T
-    joined = coo_array((np.ones(len(one), np.int8), (one, two)), shape=(len(part), len(part)))
-    patch: Integers = connected_components(joined, directed=False)[1].astype(np.int64)
-    return patch
+    one, two = part[links].T
+    return joined(links[one == two], len(part))
 
 
 def _borders(skin: Skin, patch: Integers) -> Iterator[tuple[int, int, Any]]:
@@ -125,8 +121,7 @@ def _borders(skin: Skin, patch: Integers) -> Iterator[tuple[int, int, Any]]:
     one, two = patch[skin.edges].T
     count = int(patch.max()) + 1
     beside: dict[int, set[int]] = {}
-    for key in np.unique((one * count + two)[one != two]).tolist():
-        a, b = divmod(key, count)
+    for a, b in distinct_pairs(one[one != two], two[one != two], count).tolist():
         beside.setdefault(a, set()).add(b)
         beside.setdefault(b, set()).add(a)
     beyond = {k: [k] for k in beside}

@@ -16,7 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
-from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place
+from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place, six_volumes
 from steelyard.parts.reach import MOST, Room, reach, room
 from steelyard.shape.hull import HullWork, hull_work
 from steelyard.shape.hulls.borrowed import borrowed, integer
@@ -85,13 +85,9 @@ def _five_points(xyz: Array, rows: Any) -> float:
     negative, half the sum of all.
     """
     total, last = 0.0, 0.0
-    ax, ay, az = xyz[rows[4], 0], xyz[rows[4], 1], xyz[rows[4], 2]
     for k in range(4):
         i, j, h = rows[0 if k != 0 else 3], rows[1 if k != 1 else 3], rows[2 if k != 2 else 3]
-        ux, uy, uz = xyz[i, 0] - ax, xyz[i, 1] - ay, xyz[i, 2] - az
-        vx, vy, vz = xyz[j, 0] - ax, xyz[j, 1] - ay, xyz[j, 2] - az
-        wx, wy, wz = xyz[h, 0] - ax, xyz[h, 1] - ay, xyz[h, 2] - az
-        d = ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx)
+        d = six_volumes(xyz, rows[4], j, h, i)
         total += abs(d)
         last += d if k == 3 else -d
     return (total + abs(last)) / 12

@@ -71,10 +71,14 @@ def pieces_of(
     # A sliver that hangs free is skin all over, and was foil for that.
     touching = np.isin(piece, piece[pairs][piece[pairs[:, 0]] != piece[pairs[:, 1]]])
     piece = _specks_to_nearest(mesh, piece, np.where(touching, size, mesh.volumes / mesh.volume / TINY))
-    # A piece has the colour of most of its volume.
+    return piece, _main_colours(piece, colour, mesh.volumes)
+
+
+def _main_colours(piece: Integers, colour: Integers, volumes: Array) -> Integers:
+    """Return the colour (N,) of most of the volume of every piece, by the piece and colour (T,) of tets."""
     count, colours = int(piece.max()) + 1, int(colour.max()) + 1
-    volume = np.bincount(piece * colours + colour, mesh.volumes, count * colours).reshape(count, colours)
-    return piece, volume.argmax(1)
+    volume = np.bincount(piece * colours + colour, volumes, count * colours).reshape(count, colours)
+    return np.asarray(volume.argmax(1))
 
 
 def with_points(
@@ -94,10 +98,8 @@ def with_points(
     alike = colour[piece[pairs[:, 0]]] == colour[piece[pairs[:, 1]]]
     whole = _absorbed(piece, points, pairs, np.where(alike, 1, _OTHER_COLOUR) * areas, 1.0)
     whole = _specks_to_nearest(mesh, whole, points)
-    count, colours, known = int(whole.max()) + 1, int(colour.max()) + 1, seen[piece]
-    key = whole[known] * colours + colour[piece[known]]
-    volume = np.bincount(key, mesh.volumes[known], count * colours).reshape(count, colours)
-    return whole, volume.argmax(1)
+    known = seen[piece]
+    return whole, _main_colours(whole[known], colour[piece[known]], mesh.volumes[known])
 
 
 def _absorbed(piece: Integers, size: Array, pairs: Integers, pull: Array, least: float) -> Integers:

@@ -10,6 +10,8 @@ import numpy as np
 
 from steelyard.parts.skin import Skin
 from steelyard.shape.mesh import Integers
+from steelyard.shape.pairs import joined
+from steelyard.spatial import summed
 
 FLUSH = 0.75  # vector area over area; plates, whose rims count, are flush as well
 SMALL = 0.05  # of the boundary's area: a larger patch is rather a plate, and a part more does less harm than one less
@@ -26,8 +28,7 @@ def without_prints(label: Integers, skin: Skin) -> Integers:
         corners = patch[skin.triangles]
         owner = np.where(corners[:, 1] == corners[:, 2], corners[:, 1], corners[:, 0])
         area = np.bincount(owner, skin.areas, count)
-        vector = np.stack([np.bincount(owner, skin.area_vectors[:, k], count) for k in range(3)], axis=1)
-        flush = np.linalg.norm(vector, axis=1) > FLUSH * area
+        flush = np.linalg.norm(summed(owner, skin.area_vectors, count), axis=1) > FLUSH * area
         colour = np.zeros(count, dtype=np.int64)
         colour[patch] = label
         speck, print_ = area < SPECK * total, flush & (area < SMALL * total)
@@ -49,12 +50,5 @@ def without_prints(label: Integers, skin: Skin) -> Integers:
 
 def patches(label: Integers, skin: Skin) -> Integers:
     """Return the number (V,) of the connected patch of one colour that each vertex lies in."""
-    from scipy.sparse import coo_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    count = len(label)
-    i, j = skin.links.T
-    one = label[i] == label[j]
-    i, j = i[one], j[one]
-    graph = coo_matrix((np.ones(len(i), np.int8), (i, j)), shape=(count, count))
-    return np.asarray(connected_components(graph, directed=False)[1], dtype=np.int64)
+    one, two = label[skin.links].T
+    return joined(skin.links[one == two], len(label))

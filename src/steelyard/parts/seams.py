@@ -24,8 +24,10 @@ from steelyard.parts.seam_merges import Clusters, merge
 from steelyard.parts.skin import Skin
 from steelyard.shape.hull import hull_work
 from steelyard.shape.mesh import Integers
+from steelyard.shape.pairs import joined
 from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
+from steelyard.spatial import area_vectors, summed
 
 # Hulls need not be exact: points nearer to them than this, over the cube root of the volume, are on them.
 _BLUNT = 0.005
@@ -60,8 +62,7 @@ def seam_tree(
     share = np.bincount(piece[skin.cell], skin.areas, count) / max(float(skin.areas.sum()), 1e-300)
     volume = np.bincount(piece, mesh.volumes, count) / mesh.volume
     weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
-    moment = np.stack([np.bincount(piece, weighted[:, k], count) for k in range(3)], axis=1)
-    centre = moment / np.maximum(volume * mesh.volume, 1e-300)[:, None]
+    centre = summed(piece, weighted, count) / np.maximum(volume * mesh.volume, 1e-300)[:, None]
     given = volume, share, colour, centre, contact, touch
     work = hull_work(len(xyz))
     merges, cost, seam, node_volume, hull = with_stand_ins(
@@ -86,8 +87,7 @@ def _contacts(
     table = np.zeros((count, count, WIDTH))
     ends = piece[pairs]
     apart = ends[:, 0] != ends[:, 1]
-    a, b, c = (xyz[corners[apart, k]] for k in range(3))
-    vector = np.cross(b - a, c - a) / 2
+    vector = area_vectors(xyz[corners[apart]])
     area = np.linalg.norm(vector, axis=1)
     i, j = ends[apart].T
     np.add.at(table, (i, j, AREA), area)
@@ -110,10 +110,8 @@ def _contacts(
 
 def _join_by_corners(corner: Any, touch: Any) -> None:
     """Mark pieces of bodies without a common face as touching where they share one of the corners (N, V)."""
-    from scipy.sparse.csgraph import connected_components
-
-    bodies, body = connected_components(touch, directed=False)
-    if bodies == 1:
+    body = joined(np.argwhere(touch), len(touch))
+    if not body.any():
         return
     meeting = corner[:, corner.sum(0) > 1].astype(np.float32)
     shared = meeting @ meeting.T > 0

@@ -32,7 +32,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
-from steelyard.spatial import cross
+from steelyard.spatial import area_vectors, summed
 
 PER_PART = 0.08  # worth of a part: a hollow of a twelfth of the volume at a full seam, or 0.8 % of the surface
 
@@ -180,19 +180,22 @@ def segment(cloud: Cloud, solid: Any, *, parts: int | None = None) -> Segmentati
 def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     """Return the small pieces that parts are put together from: the first half of `segment`."""
     mesh: TetMesh = solid if isinstance(solid, TetMesh) else solid.mesh
+    from scipy.spatial import cKDTree
+
     nearest = nearest_cell(cloud.xyz, mesh.centroids)
     same = _same(cloud, mesh)
+    owner = np.arange(len(cloud)) if same else cKDTree(mesh.vertices).query(cloud.xyz)[1]
     skin = skin_of(mesh, cloud.near if same else None)
     colour = np.zeros(len(mesh.vertices), dtype=np.int64)
     if cloud.rgb is not None:
         told = (cloud.normals, cloud.seen) if same else (None, None)  # what is known of points is known of vertices
-        colours = colour_modes(_vertex_colours(cloud, mesh), skin, *told)
+        rgb = cloud.rgb if same else _vertex_colours(cloud.rgb, cloud.xyz, mesh.vertices, owner)
+        colours = colour_modes(rgb, skin, *told)
         colour = without_prints(without_fades(colours, skin), skin)
     pairs, corners = mesh.dual, mesh.inner_faces
-    a, b, c = (mesh.vertices[corners[:, k]] for k in range(3))
-    areas = np.linalg.norm(cross(b - a, c - a), axis=1) / 2
+    areas = np.linalg.norm(area_vectors(mesh.vertices[corners]), axis=1)
     piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)
-    nearest = _cell_of_its_colour(cloud, mesh, nearest, colour, of_piece[piece])
+    nearest = _cell_of_its_colour(cloud.xyz, mesh.centroids, nearest, colour[owner], of_piece[piece])
     piece, of_piece = with_points(mesh, piece, of_piece, pairs, areas, nearest)
     return Pieces(cloud, mesh, skin, piece, of_piece, pairs, corners, nearest)
 
@@ -252,20 +255,20 @@ def nearest_cell(points: Array, centroids: Array) -> Integers:
 
 
 def _cell_of_its_colour(
-    cloud: Cloud, mesh: TetMesh, nearest: Integers, of_vertex: Integers, of_cell: Integers
+    points: Array, centroids: Array, nearest: Integers, colour: Integers, of_cell: Integers
 ) -> Integers:
     """Return the cell (N,) of every point: of the nearest few the first of its colour, the nearest where none is.
+
+    colour  (N,) of the points, of_cell (T,) of the cells
 
     Cells reach through thin walls and layers to what is behind; the nearest is often of another colour than the point.
     """
     from scipy.spatial import cKDTree
 
-    owner = np.arange(len(cloud)) if _same(cloud, mesh) else cKDTree(mesh.vertices).query(cloud.xyz)[1]
-    colour = of_vertex[owner]
     torn = np.flatnonzero(of_cell[nearest] != colour)
     if not len(torn):
         return nearest
-    near = cKDTree(mesh.centroids).query(cloud.xyz[torn], min(AROUND, len(mesh)))[1].reshape(len(torn), -1)
+    near = cKDTree(centroids).query(points[torn], min(AROUND, len(centroids)))[1].reshape(len(torn), -1)
     alike = of_cell[near] == colour[torn, None]
     found = nearest.copy()
     found[torn] = np.where(alike.any(1), near[np.arange(len(torn)), alike.argmax(1)], nearest[torn])
@@ -285,19 +288,17 @@ def _same(cloud: Cloud, mesh: TetMesh) -> bool:
     return cloud.xyz.shape == mesh.vertices.shape and np.array_equal(cloud.xyz, mesh.vertices)
 
 
-def _vertex_colours(cloud: Cloud, mesh: TetMesh) -> Colours:
-    """Return the colour (V, 3) of every vertex: the mean of the points it is nearest to, else the nearest point's."""
+def _vertex_colours(rgb: Colours, points: Array, vertices: Array, owner: Integers) -> Array:
+    """Return the colour (V, 3) of every vertex: the mean of the points it is nearest to, else the nearest point's.
+
+    owner  (N,) the vertex nearest to each point
+    """
     from scipy.spatial import cKDTree
 
-    rgb: Any = cloud.rgb
-    if _same(cloud, mesh):
-        return np.asarray(rgb)
-    owner = cKDTree(mesh.vertices).query(cloud.xyz)[1]
-    count = np.bincount(owner, minlength=len(mesh.vertices))
-    total = np.stack([np.bincount(owner, rgb[:, k], len(mesh.vertices)) for k in range(3)], axis=1)
-    colours = total / np.maximum(count, 1)[:, None]
+    count = np.bincount(owner, minlength=len(vertices))
+    colours = summed(owner, rgb, len(vertices)) / np.maximum(count, 1)[:, None]
     empty = count == 0
-    colours[empty] = rgb[cKDTree(cloud.xyz).query(mesh.vertices[empty])[1]]
+    colours[empty] = rgb[cKDTree(points).query(vertices[empty])[1]]
     return np.asarray(colours)
 
 
@@ -306,5 +307,4 @@ def _mean_colours(rgb: Colours | None, part: Integers, count: int) -> Array | No
     if rgb is None:
         return None
     points = np.bincount(part, minlength=count)
-    total = np.stack([np.bincount(part, rgb[:, k], count) for k in range(3)], axis=1)
-    return np.where(points[:, None] > 0, total / np.maximum(points, 1)[:, None], 128.0)
+    return np.where(points[:, None] > 0, summed(part, rgb, count) / np.maximum(points, 1)[:, None], 128.0)

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.tets import FACES, TetMesh
-from steelyard.spatial import cross, unit_vectors
+from steelyard.spatial import area_vectors, summed, unit_vectors
 
 NEAR = 16
 LINKED, APART = 6, -0.3  # neighbours linked to a vertex; cosine of normals that look out of opposite sides
@@ -43,8 +43,7 @@ class Skin:
     @cached_property
     def area_vectors(self) -> Array:
         """Outward normal of each triangle times its area (F, 3) [m^2]."""
-        a, b, c = (self.vertices[self.triangles[:, k]] for k in range(3))
-        return np.asarray(cross(b - a, c - a) / 2)
+        return area_vectors(self.vertices[self.triangles])
 
     @cached_property
     def areas(self) -> Array:
@@ -77,23 +76,20 @@ class Skin:
     def _vertex_sums(self) -> tuple[Array, Array]:
         corner, count = self.triangles.ravel(), len(self.vertices)
         area = np.bincount(corner, np.repeat(self.areas, 3), count)
-        total = [np.bincount(corner, np.repeat(self.area_vectors[:, k], 3), count) for k in range(3)]
-        return np.stack(total, axis=1), np.asarray(area, dtype=np.float64)
+        return summed(corner, np.repeat(self.area_vectors, 3, axis=0), count), np.asarray(area, dtype=np.float64)
 
     @cached_property
     def normals(self) -> Array:
         """Mean outward normal (V, 3) at each vertex, weighted by area; 0 inside."""
-        total = self._vertex_sums[0]
-        return unit_vectors(total)
+        return unit_vectors(self._vertex_sums[0])
 
     @cached_property
     def smooth_normals(self) -> Array:
         """Normals (V, 3) averaged over each vertex and its neighbours on the boundary."""
         total = self._vertex_sums[0]
         i, j = self.edges.T
-        around = [np.bincount(i, total[j, k], len(total)) + np.bincount(j, total[i, k], len(total)) for k in range(3)]
-        total = total + SMOOTH * np.stack(around, axis=1)
-        return unit_vectors(total)
+        around = summed(i, total[j], len(total)) + summed(j, total[i], len(total))
+        return unit_vectors(total + SMOOTH * around)
 
     @cached_property
     def flatness(self) -> Array:
@@ -104,8 +100,7 @@ class Skin:
     @cached_property
     def across(self) -> Array:
         """Unit vectors (E, 3) across each edge, from the apex of the first triangle to that of the second."""
-        step = self.vertices[self.apex[:, 1]] - self.vertices[self.apex[:, 0]]
-        return unit_vectors(step)
+        return unit_vectors(self.vertices[self.apex[:, 1]] - self.vertices[self.apex[:, 0]])
 
     @cached_property
     def turning(self) -> Array:
@@ -145,8 +140,7 @@ def skin_of(mesh: TetMesh, known: Neighbours | None = None) -> Skin:
     ends = triangles[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
     low, high = ends.min(1), ends.max(1)
     key = low * len(mesh.vertices) + high
-    a, b, c = (mesh.vertices[triangles[:, k]] for k in range(3))
-    area = np.linalg.norm(cross(b - a, c - a), axis=1)
+    area = np.linalg.norm(area_vectors(mesh.vertices[triangles]), axis=1)
     order = np.lexsort((np.repeat(area, 3), key))
     key = key[order]
     place = np.arange(len(key)) - np.searchsorted(key, key)

@@ -20,9 +20,10 @@ from steelyard.shape import carving
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import Kept, KeptSpace
 from steelyard.shape.scan import Scan, fuse
+from steelyard.shape.solid import Solid
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.views import Views
-from steelyard.shape.volume import Solid, enclose
+from steelyard.shape.volume import enclose
 
 # A finer cut than this is not offered to a log: ten numbers cannot tell so many masses.
 MOST_PARTS = 16

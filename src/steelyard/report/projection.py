@@ -10,7 +10,7 @@ from steelyard.report.markup import Html, joined, tag
 from steelyard.report.palette import hexadecimal
 from steelyard.report.scene import Scene
 from steelyard.report.surfaces import thinned
-from steelyard.spatial import unit_vectors
+from steelyard.spatial import area_vectors, unit_vectors
 
 MOST_TRIANGLES = 1600
 _WIDTH, _HEIGHT, _MARGIN = 960.0, 540.0, 40.0
@@ -63,8 +63,7 @@ def _lit(scene: Scene, colours: dict[int, tuple[int, int, int]], view: Array) ->
         most = max(int(MOST_TRIANGLES * len(body.triangles) / max(total, 1)), 12)
         v, t = thinned(body.vertices, body.triangles, most)
         corners = v[t] @ view.T
-        across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-        unit = unit_vectors(across)
+        unit = unit_vectors(area_vectors(corners))
         near = unit[:, 2] > 0
         light = 0.42 + 0.62 * np.maximum(unit @ _LIGHT, 0)
         faces.append(corners[near])

@@ -6,8 +6,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
+from steelyard.shape.points.thinning import cubes
 from steelyard.shape.tets import FACES, TetMesh
-from steelyard.spatial import unit_vectors
+from steelyard.spatial import area_vectors, summed, unit_vectors
 
 CREASE = np.cos(np.deg2rad(42.0))  # faces that turn by more than this keep their edge
 _ROUNDS = 3  # of evening
@@ -39,7 +40,7 @@ def evened(vertices: Array, triangles: Integers) -> Array:
     even = vertices.copy()
     for _ in range(_ROUNDS):
         for share in (_IN, _OUT):
-            total = np.stack([np.bincount(ends, even[others, k], len(vertices)) for k in range(3)], axis=1)
+            total = summed(ends, even[others], len(vertices))
             even[fine] += share * (total[fine] / count[fine, None] - even[fine])
     return even
 
@@ -56,14 +57,13 @@ def thinned(vertices: Array, triangles: Integers, most: int) -> tuple[Array, Int
     The grid is as fine as it can be to a fifth; a surface that is small enough is returned as it is.
     """
     vertices, triangles = compact(vertices, triangles)
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
+    area = np.linalg.norm(area_vectors(vertices[triangles]), axis=1).sum()
     # A sheet of cells has about two triangles per cell.
-    cell = 0.5 * float(np.sqrt(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum() / max(most, 1)))
+    cell = 0.5 * float(np.sqrt(2 * area / max(most, 1)))
     while len(triangles) > most and cell > 0:
-        place = np.floor((vertices - vertices.min(0)) / cell).astype(np.int64)
-        group = np.unique(place, axis=0, return_inverse=True)[1].ravel()
+        group = np.unique(cubes(vertices, cell), axis=0, return_inverse=True)[1].ravel()
         count = np.bincount(group)
-        means = np.stack([np.bincount(group, vertices[:, k]) / count for k in range(3)], axis=1)
+        means = summed(group, vertices) / count[:, None]
         merged = group[triangles]
         whole = (merged != np.roll(merged, 1, axis=1)).all(1)
         first = np.unique(np.sort(merged[whole], axis=1), axis=0, return_index=True)[1]
@@ -75,9 +75,8 @@ def thinned(vertices: Array, triangles: Integers, most: int) -> tuple[Array, Int
 
 def corner_normals(vertices: Array, triangles: Integers) -> Array:
     """Return a unit normal (F, 3, 3) at every corner: the mean, by area, of the faces there that turn little."""
-    a, b, c = np.moveaxis(vertices[triangles], 1, 0)
-    across = np.cross(b - a, c - a)
-    unit = unit_vectors(across)
+    areas = area_vectors(vertices[triangles])
+    unit = unit_vectors(areas)
     corner = triangles.ravel()
     order = np.argsort(corner, kind="stable")
     count = np.bincount(corner, minlength=len(vertices))
@@ -88,9 +87,7 @@ def corner_normals(vertices: Array, triangles: Integers) -> Array:
     step = np.arange(len(mine)) - np.repeat(np.cumsum(many) - many, many)
     theirs = order[start[corner[mine]] + step]
     alike = (unit[mine // 3] * unit[theirs // 3]).sum(1) > CREASE
-    total = np.zeros((len(corner), 3))
-    for k in range(3):
-        total[:, k] = np.bincount(mine[alike], across[theirs[alike] // 3, k], len(corner))
+    total = summed(mine[alike], areas[theirs[alike] // 3], len(corner))
     length = np.linalg.norm(total, axis=1, keepdims=True)
     flat = np.repeat(unit, 3, axis=0)
     return np.asarray(np.where(length > 0, total / np.maximum(length, 1e-300), flat).reshape(-1, 3, 3))

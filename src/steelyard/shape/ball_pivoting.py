@@ -19,6 +19,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES
+from steelyard.spatial import area_vectors, unit_vectors
 
 _TOUCHES = 1e-6  # of the radius: the three corners themselves lie on the ball
 
@@ -66,9 +67,7 @@ def _faces(xyz: Array, normals: Array) -> tuple[Integers, Array, Array]:
 def _rests(xyz: Array, corners: Integers, centre: Array, radius: Array, ball: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:  # fmt: skip  # noqa: E501
     """Return whether a ball of this radius rests on each face, on its front side, with no point inside."""
     rests = radius < ball
-    a, b, c = np.moveaxis(xyz[corners[rests]], 1, 0)
-    front = np.cross(b - a, c - a)
-    front /= np.linalg.norm(front, axis=1, keepdims=True)
+    front = unit_vectors(area_vectors(xyz[corners[rests]]))
     middle = centre[rests] + np.sqrt(ball**2 - radius[rests] ** 2)[:, None] * front
     rests[rests] = cKDTree(xyz).query(middle)[0] > (1 - _TOUCHES) * ball
     return rests

@@ -11,8 +11,8 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding, percent
 from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.known_space import KeptSpace, SeenSpace, Space
+from steelyard.shape.solid import Solid
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.volume import Solid
 
 _EMPTY, _FULL = 0.5, 0.1  # share of the places seen empty, above which a cell is outside, below which it is inside
 # Cells that cloud and views judge differently count half. Volumes of scans are no better than this share even where

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
-from typing import Any, Protocol
+from typing import Any
 
 import numpy as np
 
@@ -18,31 +18,10 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
+from steelyard.spatial import area_vectors
 
 # Places in a cell that are asked: its centroid, and halfway from there to each corner.
 _PLACES = np.array([[0.25] * 4, *(0.15 + 0.4 * np.eye(4))])
-
-
-class Space(Protocol):
-    """What is known of the space around an object."""
-
-    @property
-    def unseen(self) -> float:
-        """Share of the object's surface that nobody saw."""
-        ...
-
-    @property
-    def unsure_m3(self) -> float:
-        """Standard deviation of the object's volume that the table leaves open [m^3]."""
-        ...
-
-    def emptied(self, cells: TetMesh) -> Array:
-        """Return the share (T,) of each cell that is known to be outside."""
-        ...
-
-    def guessed(self, solid: TetMesh) -> float:
-        """Return the share of the skin of a solid that is a guess."""
-        ...
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +31,8 @@ class SeenSpace:
     empty      whether points (N, 3) are known to be outside the object
     guess      share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles, on which no view measured a
                surface; of what stands clear of the table and does not face it. None: not asked
-    unseen, unsure_m3  as in `Space`
+    unseen     share of the object's surface that nobody saw
+    unsure_m3  standard deviation of the object's volume that the table leaves open [m^3]
     """
 
     empty: Callable[[Array], Any]
@@ -70,8 +50,7 @@ class SeenSpace:
         if self.guess is None:
             return 0.0
         corners = solid.vertices[solid.surface]
-        areas = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]) / 2
-        return self.guess(corners.mean(1), areas)
+        return self.guess(corners.mean(1), area_vectors(corners))
 
     def kept(self, cells: TetMesh) -> KeptSpace:
         """Return what is to be kept of it with the cloud whose complex has these cells."""
@@ -83,7 +62,7 @@ class SeenSpace:
 class KeptSpace:
     """The space around an object as a written cloud keeps it.
 
-    unseen, unsure_m3  as in `Space`
+    unseen, unsure_m3  as in `SeenSpace`
     fifths     (T,) of each cell of the complex of its points that are known to be outside, 0 to 5; cells in the order
                of the numbers of their corners. (0,) where none are known
     skin       share of the skin of the solid on which no view measured a surface
@@ -117,6 +96,9 @@ class KeptSpace:
     def guessed(self, solid: TetMesh) -> float:
         """Return the share of the skin that was a guess when the cloud was written."""
         return self.skin
+
+
+Space = SeenSpace | KeptSpace
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from steelyard.check import Integers as Integers
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.shape.eight_bits import Colours, eight_bits
-from steelyard.spatial import Pose, Rotation, cross
+from steelyard.spatial import Pose, Rotation, area_vectors, cross, summed
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,8 +74,7 @@ class TriangleMesh:
 
     def areas(self) -> Array:
         """Return the area (F,) of every triangle [m^2]."""
-        a, b, c = np.moveaxis(self.corners, 1, 0)
-        return np.asarray(0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1))
+        return np.asarray(np.linalg.norm(area_vectors(self.corners), axis=1))
 
     def of_part(self, *labels: int) -> TriangleMesh:
         """Return the triangles of one part, or of some, with only the vertices they use."""
@@ -94,29 +93,39 @@ def part_moments(mesh: TriangleMesh) -> Array:
 
     The surface integral of each closed part, as signed tetrahedra over the mean of its corners: exact for flat
     triangles, negative for a surface turned inside out (a void). Nothing is checked; see `require_closed`.
-    Source: divergence theorem; a tetrahedron's second moment is V/20 (sum v v^T + s s^T), s the sum of its corners.
+    Source: divergence theorem.
     """
     labels, row = np.unique(mesh.part, return_inverse=True)
-    count = len(labels)
-    middle = _middles(mesh, row, count)
-    a, b, c = np.moveaxis(mesh.corners - middle[row][:, None], 1, 0)
-    volume = (a * cross(b, c)).sum(1) / 6
-    total = a + b + c
+    middle = _middles(mesh, row, len(labels))
+    corners = np.moveaxis(mesh.corners - middle[row][:, None], 1, 0)
+    volume = (corners[0] * cross(corners[1], corners[2])).sum(1) / 6
+    return tetrahedra_moments(corners, volume, row, middle)
+
+
+def tetrahedra_moments(corners: Array, volume: Array, group: Integers, middle: Array) -> Array:
+    """Return the ten parameters (G, 10) of groups of tetrahedra at 1 kg/m^3.
+
+    corners  (4, T, 3) about the middle of their group; (3, T, 3) where the fourth corner of each is that middle
+    volume   (T,) may be negative      group (T,) of each, 0..G-1      middle (G, 3)
+
+    Source: a tetrahedron's second moment about a point is V/20 (sum v v^T + s s^T), s the sum of its corners v.
+    """
+    count, total = len(middle), corners.sum(0)
     pseudo = np.empty((count, 4, 4))
     for i in range(3):
-        pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(row, volume / 4 * total[:, i], count)
+        pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(group, volume / 4 * total[:, i], count)
         for j in range(i, 3):
-            second = sum(v[:, i] * v[:, j] for v in (a, b, c, total))
-            pseudo[:, i, j] = pseudo[:, j, i] = np.bincount(row, volume / 20 * second, count)
-    pseudo[:, 3, 3] = np.bincount(row, volume, count)
+            second = (corners[..., i] * corners[..., j]).sum(0) + total[:, i] * total[:, j]
+            pseudo[:, i, j] = pseudo[:, j, i] = np.bincount(group, volume / 20 * second, count)
+    pseudo[:, 3, 3] = np.bincount(group, volume, count)
     about_middle = InertialParameters.from_pseudo_inertia(pseudo)
-    return about_middle.in_frame(Pose(Rotation.identity(len(labels)), middle)).vector
+    return about_middle.in_frame(Pose(Rotation.identity(count), middle)).vector
 
 
 def _middles(mesh: TriangleMesh, row: Integers, count: int) -> Array:
     """Return the mean corner (P, 3) of each part: a point near it, so that no digits are lost far from the origin."""
-    sums = [np.bincount(np.repeat(row, 3), mesh.corners[..., k].ravel(), count) for k in range(3)]
-    return np.asarray(np.stack(sums, axis=1) / (3 * np.bincount(row, minlength=count))[:, None])
+    sums = summed(np.repeat(row, 3), mesh.corners.reshape(-1, 3), count)
+    return np.asarray(sums / (3 * np.bincount(row, minlength=count))[:, None])
 
 
 def open_edges(mesh: TriangleMesh) -> Integers:

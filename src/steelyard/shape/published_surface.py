@@ -12,8 +12,6 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 from scipy.ndimage import binary_dilation, label, map_coordinates
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import Delaunay
 
 from steelyard.check import Array
@@ -21,6 +19,7 @@ from steelyard.errors import BadValue
 from steelyard.shape.ball_pivoting import ball_pivoting
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
+from steelyard.shape.pairs import joined
 from steelyard.shape.sides.tangent_planes import tangent_normals
 from steelyard.shape.tets import TetMesh
 
@@ -129,9 +128,7 @@ def _tetrahedra(field: _Field, diagonal: float) -> TetMesh:
 
 def _crumbs(solid: TetMesh) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
     """Return which cells belong to pieces so small that they are chips of the surface."""
-    first, second = solid.dual.T
-    links = coo_array((np.ones(len(first)), (first, second)), shape=(len(solid), len(solid)))
-    piece = connected_components(links, directed=False)[1]
+    piece = joined(solid.dual, len(solid))
     volume = np.bincount(piece, solid.volumes)
     return np.asarray((volume < CRUMB * solid.volume)[piece])
 

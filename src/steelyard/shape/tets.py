@@ -12,9 +12,8 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
-from steelyard.inertia import InertialParameters
-from steelyard.shape.mesh import Integers
-from steelyard.spatial import Pose, Rotation
+from steelyard.shape.mesh import Integers, tetrahedra_moments
+from steelyard.spatial import Pose
 
 # The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
@@ -107,23 +106,11 @@ class TetMesh:
         return self.tets[:, FACES].reshape(-1, 3)[self.neighbours.ravel() < 0]
 
     def moments(self, group: Any, count: int) -> Array:
-        """Return the ten parameters (count, 10) of groups of cells at 1 kg/m^3; `group` (T,) numbers each cell's.
-
-        Source: a tetrahedron's second moment about a point is V/20 (sum v v^T + s s^T), s the sum of its corners.
-        """
-        group = np.asarray(group, np.int64)
+        """Return the ten parameters (count, 10) of groups of cells at 1 kg/m^3; `group` (T,) numbers each cell's."""
         middle = self.vertices[self.tets.ravel()].mean(0)
         corners = np.moveaxis(self.vertices[self.tets] - middle, 1, 0)
-        total = corners.sum(0)
-        pseudo = np.empty((count, 4, 4))
-        for i in range(3):
-            pseudo[:, i, 3] = pseudo[:, 3, i] = np.bincount(group, self.volumes / 4 * total[:, i], count)
-            for j in range(i, 3):
-                second = (corners[..., i] * corners[..., j]).sum(0) + total[:, i] * total[:, j]
-                pseudo[:, i, j] = pseudo[:, j, i] = np.bincount(group, self.volumes / 20 * second, count)
-        pseudo[:, 3, 3] = np.bincount(group, self.volumes, count)
-        about_middle = InertialParameters.from_pseudo_inertia(pseudo)
-        return about_middle.in_frame(Pose(Rotation.identity(count), np.tile(middle, (count, 1)))).vector
+        group = np.asarray(group, np.int64)
+        return tetrahedra_moments(corners, self.volumes, group, np.tile(middle, (count, 1)))
 
     def chosen(self, cells: Any) -> TetMesh:
         """Return some of the cells over the same vertices, numbers or a mask."""

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
-from typing import TYPE_CHECKING
+from dataclasses import replace
 
 import numpy as np
 
@@ -11,32 +10,20 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.canonical import canonical
-from steelyard.shape.chords import lacking
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.filling import CLEAR, Filled, by_walls, clearer_alone, filled, outward
-from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import Oriented, oriented
 from steelyard.shape.sides.sheets import torn
 from steelyard.shape.sites import Sites
+from steelyard.shape.solid import BLURRED, Solid, judged
 from steelyard.shape.tets import TetMesh
-from steelyard.shape.thin_walls import blurred_walls, share_within_noise, thinner_than_seen, within_noise
-
-if TYPE_CHECKING:
-    from steelyard.shape.working_cloud import WorkingCloud
+from steelyard.shape.working_cloud import WorkingCloud, working_cloud
+from steelyard.spatial import area_vectors, summed
 
 POINTS = 4000
-# Doubt (see `filling`) above which walls could not be told from gaps. Found on made sheets: nearly
-# all whose volume comes out wrong lie above it, and few of the others.
-_BLURRED = 0.41
 _UNCLEAR = 0.38  # doubt above which one thickness of the walls is looked for
 _FEWER, _LEAST_OF_FEWER = (2, 4), 1000  # one point in so many is tried where noise leaves doubt; not fewer points
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
-# Length of the sum of all areas as vectors, over the sum of their sizes: 0 for a closed surface. Above this a side is
-# missing (0.12 and more without an underside). Patterns of points that are unlike on two sides leave up to 0.10, or
-# 0.135 where one is five times as dense.
-_OPEN = 0.11
-_LOST = 0.4  # of the spacing: thinner walls, told by their layers, lose 8 to 45 % of their own volume
-_NOISY = 0.3  # of the points: so many that are nearer to the other side make the solid doubtful
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
 # Doubt above which normals that come with a cloud may be wrong: thin walls reach 0.44, a tenth of them turned 0.67.
 _BY_CHANCE = 0.6
@@ -46,34 +33,6 @@ _CLEARER = 0.5  # of that doubt: no more is left without such normals
 # that is left where points alone tell better.
 _TORN, _MENDED = 0.004, 0.8
 _PATCHES = 0.05  # of the points: fewer that change sides are walls and gaps too narrow for neighbours, no patches
-# Standard deviation of the volume: of any solid; per share between points of round surfaces and their chords; per share
-# of cells unsure; per share that a skin as thick as the noise has; where walls blur, else per share in thin ones;
-# per share left open.
-_STD, _CHORDS, _UNSURE, _SKIN, _THIN, _HOLE = 0.025, 0.7, 0.1, 0.1, 0.5, 1.0
-
-
-@dataclass(frozen=True, eq=False)
-class Solid:
-    """A closed volume made of tetrahedra over the points of a cloud.
-
-    mesh        the cells inside; its vertices are the points of `cloud`, row by row
-    cloud       the points used [m]: the given ones without repeats and thinned, with their outward normals
-    sure        (T,) how sure each cell is to lie inside, 0 (could be either) to 1
-    volume_std  standard deviation of the volume, as a share of it
-    surface_m   standard deviation of where the surface lies, all of it moved alike [m]
-    findings    what one must know about it
-    around      all cells of the complex that `mesh` was chosen from; None where the cells are no longer of one
-    inside      (T,) which of those the cells of `mesh` are
-    """
-
-    mesh: TetMesh
-    cloud: Cloud
-    sure: Array
-    volume_std: float
-    surface_m: float
-    findings: tuple[Finding, ...]
-    around: TetMesh | None = None
-    inside: Integers | None = None
 
 
 def enclose(cloud: Cloud, points: int = POINTS) -> Solid:
@@ -94,8 +53,6 @@ def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
     Noise as large as the spacing makes an orientation collapse. Fewer points lie farther apart, and each is the mean of
     more; walls that are too thin are then so all the more.
     """
-    from steelyard.shape.working_cloud import working_cloud
-
     if not _has(made, "thin-thickened"):
         return made
     for most in (points // share for share in _FEWER if points >= share * _LEAST_OF_FEWER):
@@ -111,11 +68,9 @@ def _of_fewer(cloud: Cloud, points: int, made: Solid) -> Solid:
 
 def _enclosed_by(cloud: Cloud, points: int) -> Solid:
     """Return the closed volume behind a cloud, of at most about so many points."""
-    from steelyard.shape.working_cloud import working_cloud
-
     used = working_cloud(cloud, points)
     made, doubt = _made(used)
-    if used.along or (doubt < (CLEAR if used.noise else _BLURRED) and not (used.noise and _has(made, "surface-open"))):
+    if used.along or (doubt < (CLEAR if used.noise else BLURRED) and not (used.noise and _has(made, "surface-open"))):
         return made
     # Averaging clears a noisy cloud, but makes one sheet of two where noise is as large as the wall between is thin.
     other = working_cloud(cloud, points, settle=not used.noise)
@@ -145,21 +100,18 @@ def _made(used: WorkingCloud) -> tuple[Solid, float]:
     xyz = used.cloud.xyz
     X_CB, order = canonical(xyz)
     cloud = used.cloud.reordered(order).in_frame(X_CB)
-    made, around, doubt = _enclosed(used._replace(cloud=cloud), Sites.of(cloud))
+    made, doubt = _enclosed(used._replace(cloud=cloud), Sites.of(cloud))
     normals = np.empty_like(xyz)
     normals[order] = X_CB.inverse().rotation.apply(np.asarray(made.cloud.normals))
-    mesh, around = (
-        TetMesh.known(xyz, order[cells.tets], cells.volumes, cells.neighbours) for cells in (made.mesh, around)
-    )
-    return replace(made, mesh=mesh, around=around, cloud=used.cloud.with_normals(normals)), doubt
+    return made.over(used.cloud.with_normals(normals), order), doubt
 
 
 def _has(made: Solid, *codes: str) -> bool:
     return any(finding.code in codes for finding in made.findings)
 
 
-def _enclosed(used: WorkingCloud, sites: Sites) -> tuple[Solid, TetMesh, float]:
-    """Return the closed volume of points in their canonical frame and order, all cells, and the doubt about it.
+def _enclosed(used: WorkingCloud, sites: Sites) -> tuple[Solid, float]:
+    """Return the closed volume of points in their canonical frame and order, and the doubt about it.
 
     No doubt is left that averaging could take where one thickness of all walls was found.
     """
@@ -175,11 +127,10 @@ def _enclosed(used: WorkingCloud, sites: Sites) -> tuple[Solid, TetMesh, float]:
         as_found = surface
         surface, found = by_walls(surface, found)
         doubt = doubt if surface is as_found else 0.0
-    made = _solid(used, surface, found, turned)
-    return replace(made, inside=np.flatnonzero(found.inside)), found.mesh, doubt
+    return judged(used, surface, found, turned), doubt
 
 
-def _anew(used: WorkingCloud, surface: Oriented, found: Filled) -> tuple[Solid, TetMesh, float] | None:
+def _anew(used: WorkingCloud, surface: Oriented, found: Filled) -> tuple[Solid, float] | None:
     """Return the closed volume of points whose normals are not to be trusted, found without them; None where they are.
 
     Most that turn normals outward turn whole patches inward here and there: neighbours on one sheet then face
@@ -197,12 +148,12 @@ def _anew(used: WorkingCloud, surface: Oriented, found: Filled) -> tuple[Solid, 
         anew = _without_normals(used, sites, why)
     except BadValue:  # the points alone enclose nothing
         return None
-    if found.doubt > _BY_CHANCE and anew[2] < _CLEARER * found.doubt:
+    if found.doubt > _BY_CHANCE and anew[1] < _CLEARER * found.doubt:
         return anew
     normals = np.asarray(anew[0].cloud.normals)
     left, share = _torn(sites, normals), _apart(normals, surface.normals)
-    patches = share > _PATCHES or found.doubt > _BLURRED
-    return anew if split > _TORN and left < _MENDED * split and patches and anew[2] <= found.doubt else None
+    patches = share > _PATCHES or found.doubt > BLURRED
+    return anew if split > _TORN and left < _MENDED * split and patches and anew[1] <= found.doubt else None
 
 
 def _torn(sites: Sites, normals: Array) -> float:
@@ -215,7 +166,7 @@ def _apart(some: Array, others: Array) -> float:
     return min(turned, 1 - turned)
 
 
-def _without_normals(used: WorkingCloud, sites: Sites, why: str) -> tuple[Solid, TetMesh, float]:
+def _without_normals(used: WorkingCloud, sites: Sites, why: str) -> tuple[Solid, float]:
     """Return the closed volume of points without their normals, with what says so."""
     findings = (*used.findings, Finding.of("normals-flipped", f"{why}; they were found anew."))
     return _enclosed(used._replace(cloud=used.cloud.with_normals(None), findings=findings), sites)
@@ -234,43 +185,6 @@ def _oriented(cloud: Cloud, sites: Sites) -> tuple[Oriented, tuple[Finding, ...]
 def _against(surface: Oriented, solid: TetMesh) -> float:
     """Return the share of the points whose normals disagree with the surface of the cells inside."""
     skin = solid.surface
-    corners = surface.sites.xyz[skin]
-    across = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    out = np.stack([np.bincount(skin.ravel(), np.repeat(across[:, k], 3), len(surface.normals)) for k in range(3)], 1)
+    areas = area_vectors(surface.sites.xyz[skin])
+    out = summed(skin.ravel(), np.repeat(areas, 3, axis=0), len(surface.normals))
     return float(((out * surface.normals).sum(1) < _AGAINST * np.linalg.norm(out, axis=1)).mean())
-
-
-def _solid(used: WorkingCloud, surface: Oriented, found: Filled, turned: tuple[Finding, ...]) -> Solid:
-    solid, diagonal, doubt = found.solid, used.cloud.diagonal, found.doubt
-    sure = np.minimum(2 * found.score[found.inside], 1.0)
-    total = float(surface.area.sum())
-    gap = float(np.linalg.norm((surface.area[:, None] * surface.normals).sum(0))) / total
-    noisy = share_within_noise(surface, used.noise / diagonal)
-    hole = gap > _OPEN
-    findings = used.findings + turned
-    thin = _thin_walls(used, surface, doubt, noisy)
-    wrong = 0.0 if thin is None else 1.0
-    if thin is None and surface.layers is not None and surface.layers.thickness < _LOST * surface.sites.spacing:
-        thin = thinner_than_seen(surface.layers.thickness * diagonal * 1e3, surface.sites.spacing * diagonal * 1e3)
-        wrong = min(surface.layers.volume(surface.area) * diagonal**3 / solid.volume, 1.0)
-    if thin is not None:
-        findings += (thin,)
-    if hole:
-        text = (
-            f"The surface does not close: what faces one way misses {100 * gap:.0f} % of the whole on the other side."
-        )
-        findings += (Finding.of("surface-open", text),)
-    unsure = float((solid.volumes * (1 - sure)).sum() / solid.volume)
-    wrong = 1.0 if any(finding.code == "table-in-cloud" for finding in findings) else wrong
-    few = _CHORDS * lacking(surface, solid.volume / diagonal**3)
-    skin = used.noise * total * diagonal**2 / solid.volume
-    std = float(np.linalg.norm([max(_STD, few), _UNSURE * unsure, _SKIN * skin, _THIN * wrong, _HOLE * gap * hole]))
-    kept = used.cloud.with_normals(surface.normals)
-    return Solid(solid, kept, sure, std, std * solid.volume / (total * diagonal**2), findings)
-
-
-def _thin_walls(used: WorkingCloud, surface: Oriented, doubt: float, noisy: float) -> Finding | None:
-    """Return what is said of walls that are no walls for the points, or for a share `noisy` of them in their noise."""
-    if doubt > _BLURRED:
-        return blurred_walls(used.cloud, surface.sites.spacing * used.cloud.diagonal * 1e3, doubt)
-    return within_noise(noisy, used.noise) if noisy > _NOISY else None

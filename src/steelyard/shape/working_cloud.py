@@ -12,6 +12,7 @@ from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
+from steelyard.shape.pairs import joined
 from steelyard.shape.points.known_sides import settled_along
 from steelyard.shape.points.left_table import left_table
 from steelyard.shape.points.noisy_points import settled
@@ -184,13 +185,8 @@ def in_small_pieces(near: Neighbours) -> Mask:
 
 def _pieces(near: Neighbours) -> Integers:
     """Return the piece (N,) of each point, joined where nearest neighbours are not far apart."""
-    from scipy.sparse import csr_matrix
-    from scipy.sparse.csgraph import connected_components
-
-    index, close = near.index[:, :_LINKS], near.distance[:, :_LINKS] < _APART * near.spacing
-    start = np.concatenate([[0], np.cumsum(close.sum(1))])
-    graph = csr_matrix((np.ones(start[-1]), index[close], start), (len(index), len(index)))
-    return np.asarray(connected_components(graph, directed=False)[1], np.int64)
+    close = near.distance[:, :_LINKS] < _APART * near.spacing
+    return joined(np.column_stack([np.nonzero(close)[0], near.index[:, :_LINKS][close]]), len(near.index))
 
 
 def _gap(a: Array, b: Array) -> float:

@@ -15,7 +15,7 @@ from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import TriangleMesh, part_moments
 from steelyard.shape.views import Depths, Intrinsics, Views
 from steelyard.simulate.camera import D435, VIEWS, DepthNoise, disturbed, wrist_arc
-from steelyard.spatial import Pose, Rotation, unit_vectors
+from steelyard.spatial import Pose, Rotation, area_vectors, unit_vectors
 
 _TABLE = (171, 152, 124)
 _TABLE_REACH = 0.6  # half the edge of the square table [m]
@@ -144,9 +144,7 @@ def _stands_inside(point: Array, foot: Array) -> bool:
 
 def _shaded(mesh: TriangleMesh) -> Colours:
     """Return the colours (F, 3) of triangles under one lamp and much ambient light."""
-    a, b, c = np.moveaxis(mesh.corners, 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal = unit_vectors(normal)
+    normal = unit_vectors(area_vectors(mesh.corners))
     light = _AMBIENT + (1 - _AMBIENT) * np.maximum(normal @ _LAMP, 0)
     rgb = mesh.rgb if mesh.rgb is not None else np.full((len(mesh), 3), 128, np.uint8)
     return np.asarray(np.clip(rgb * light[:, None], 0, 255), np.uint8)

@@ -7,7 +7,8 @@ from collections.abc import Mapping
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.parts.known import KnownObject, Track, box_in_sensor, unseen_finding
+from steelyard.datasets.known_object import KnownObject, box_in_sensor, unseen_finding
+from steelyard.datasets.track import Track
 from steelyard.shape.views import Views
 from steelyard.simulate.handling import motion_arrays, noise_std
 from steelyard.simulate.scanning import scan_mesh

@@ -6,6 +6,7 @@ from steelyard.spatial.vectors import (
     Acceleration,
     Twist,
     Wrench,
+    area_vectors,
     axial_vector,
     classical_acceleration,
     cross,
@@ -14,6 +15,7 @@ from steelyard.spatial.vectors import (
     lever_matrix,
     signed_axes,
     signed_columns,
+    summed,
     unit_vectors,
 )
 
@@ -23,6 +25,7 @@ __all__ = [
     "Rotation",
     "Twist",
     "Wrench",
+    "area_vectors",
     "axial_vector",
     "classical_acceleration",
     "cross",
@@ -31,5 +34,6 @@ __all__ = [
     "lever_matrix",
     "signed_axes",
     "signed_columns",
+    "summed",
     "unit_vectors",
 ]

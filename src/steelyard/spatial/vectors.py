@@ -1,4 +1,4 @@
-"""Twist, Acceleration and Wrench: six-vectors with the angular part first, batch-first."""
+"""Vectors, batch-first: products, areas and sums of them; Twist, Acceleration and Wrench, the angular part first."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 
 
@@ -48,6 +48,17 @@ def classical_acceleration(derivative: Array, twist: Array) -> Array:
 def unit_vectors(vectors: Array) -> Array:
     """Return vectors (..., n) made one long; zero stays zero."""
     return np.asarray(vectors / np.maximum(np.linalg.norm(vectors, axis=-1, keepdims=True), 1e-300))
+
+
+def area_vectors(corners: Array) -> Array:
+    """Return normals (..., 3) of triangles (..., 3, 3) as long as their area; from there they are counter-clockwise."""
+    a = corners[..., 0, :]
+    return cross(corners[..., 1, :] - a, corners[..., 2, :] - a) / 2
+
+
+def summed(group: Integers, vectors: Array | np.ndarray[Any, np.dtype[np.uint8]], count: int = 0) -> Array:
+    """Return the sums (G, n) of vectors (N, n) over the groups 0..G-1 of `group` (N,); at least `count` groups."""
+    return np.stack([np.bincount(group, vectors[:, k], count) for k in range(vectors.shape[1])], axis=1)
 
 
 def cross_matrix(vector: ArrayLike) -> Array:

@@ -36,9 +36,7 @@ def electronic_caliper(draw: Draw) -> Tool:
     )
     channel = block((-99, 999), (-8, 8), (0, 3.3))
     moving = jaws(reach, 21, 3.3).mirror([1, 0, 0])
-    slider = (
-        union([block((0, 60), (-11.5, 11.5), (-1.5, 4.7)), moving.translate([0, 0, 0])]) - channel
-    ).translate([at, 0, 0])  # fmt: skip
+    slider = (union([block((0, 60), (-11.5, 11.5), (-1.5, 4.7)), moving]) - channel).translate([at, 0, 0])
     low, high = at + 2, at + 74
     inner = rounded((low + 2.0, high - 2.0), (-14, 14), (6.2, 11.6), 2)
     housing = union([rounded((low, high), (-16, 16), (4.7, 13.4), 4), block((at + 60, high - 1), (-13, 13), (3.3, 5))])

@@ -41,7 +41,7 @@ def c_clamp(draw: Draw) -> Tool:
     path = [(4, low - 8), (-0.7 * throat, low - 7), (-throat - 5, low + 14), (-throat - 5, top - 12),
             (-0.7 * throat, top + 8), (4, top + 9)]  # fmt: skip
     rib, flange = frame(path, 15, 8.5), frame([(x - 4.5 * (x < -20), y + np.sign(y) * 4) for x, y in path], 5.5, 21)
-    boss = upright(union([rod(11.5, -9, 9)])).translate([0, top + 9, 0])
+    boss = upright(rod(11.5, -9, 9)).translate([0, top + 9, 0])
     anvil = upright(rod(10, -3, 4)).translate([0, low - 1.2, 0])
     foot_y = low + open_
     screw = union([
@@ -73,9 +73,7 @@ def clamp(draw: Draw) -> Tool:
     top = length - 2
     fixed = limb([(0, top - 6, 8.5, -4.6, 4.6), (-0.5 * reach, top - 2, 5.4, -4, 4), (-reach, top - 6, 6.5, -5.4, 5.4)])
     at = top - gap - 24
-    sliding = union([
-        limb([(0, at, 12, -5.2, 5.2), (-0.5 * reach, at, 6.5, -4.2, 4.2), (-reach, at, 7.5, -6, 6)]),
-    ])  # fmt: skip
+    sliding = limb([(0, at, 12, -5.2, 5.2), (-0.5 * reach, at, 6.5, -4.2, 4.2), (-reach, at, 7.5, -6, 6)])
     screw = upright(threaded(4.1, at - 62, at + 18, 2.0, 0.6)).translate([-reach, 0, 0])
     foot = upright(lathe([(6, at + 14), (8.5, at + 19), (8.5, at + 21.5)], 28)).translate([-reach, 0, 0])
     pads = [

@@ -9,7 +9,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.mesh import TriangleMesh
-from steelyard.spatial import unit_vectors
+from steelyard.spatial import area_vectors, unit_vectors
 from steelyard.workshop.tools import Finish, Tool
 
 _SCUFF = np.array([150.0, 148.0, 144.0])
@@ -19,11 +19,9 @@ _WAVES, _FINEST = 12, 0.012  # waves of the scuff pattern, and the shortest of t
 
 def painted(tool: Tool) -> TriangleMesh:
     """Return the tool's mesh with its finish on every triangle."""
-    a, b, c = np.moveaxis(tool.mesh.corners, 1, 0)
-    normal = np.cross(b - a, c - a)
-    normal = unit_vectors(normal)
-    flat = tool.mesh.rgb if tool.mesh.rgb is not None else np.full(a.shape, 128, np.uint8)
-    return replace(tool.mesh, rgb=finished(tool.finish, (a + b + c) / 3, normal, flat))
+    corners = tool.mesh.corners
+    flat = tool.mesh.rgb if tool.mesh.rgb is not None else np.full((len(corners), 3), 128, np.uint8)
+    return replace(tool.mesh, rgb=finished(tool.finish, corners.mean(1), unit_vectors(area_vectors(corners)), flat))
 
 
 def finished(finish: Finish, xyz: Array, normal: Array, rgb: Colours) -> Colours:

@@ -2,11 +2,9 @@
 
 from __future__ import annotations
 
-import numpy as np
-
 from steelyard.workshop.draw import Draw
 from steelyard.workshop.materials import ALLOY_STEEL, ALUMINIUM, BLACK_OXIDE_STEEL, CARBON_STEEL, STAINLESS_STEEL, ZINC
-from steelyard.workshop.solids import Solid, block, elbow, hexagon, limb, prism, ring, rod, rounded, union
+from steelyard.workshop.solids import block, elbow, hexagon, limb, prism, ring, rod, rounded, star, union
 from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
 
 
@@ -32,18 +30,12 @@ def box_wrench(draw: Draw) -> Tool:
         rod(small, -thick / 2, thick / 2 - 1).translate([length, 0, 1.5]),
     ]
     openings = [
-        _twelve_points(0.6 * large),
-        _twelve_points(0.6 * small).translate([length, 0, 0]),
+        star(0.6 * large, 0.9 * (0.6 * large), 12, -20, 20),
+        star(0.6 * small, 0.9 * (0.6 * small), 12, -20, 20).translate([length, 0, 0]),
     ]
     solid = union([shank, *heads]) - union(openings)
     piece = Piece("wrench", solid, draw.pick(ALLOY_STEEL, CARBON_STEEL))
     return make_tool("box-wrench", [piece], Grasp((0.4 * length, 0, 0), "x", "z"), draw, finish="shaded")
-
-
-def _twelve_points(radius: float) -> Solid:
-    angles = np.pi / 12 * np.arange(24)
-    radii = np.where(np.arange(24) % 2, 0.9 * radius, radius)
-    return prism([(r * np.cos(a), r * np.sin(a)) for r, a in zip(radii, angles, strict=True)], -20, 20)
 
 
 def measuring_tape(draw: Draw) -> Tool:

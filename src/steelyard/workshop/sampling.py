@@ -9,6 +9,7 @@ from steelyard.errors import BadValue
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers, TriangleMesh
 from steelyard.shape.nesting import body_of
+from steelyard.spatial import area_vectors
 from steelyard.workshop.finish import finished
 from steelyard.workshop.solids import Solid, union
 from steelyard.workshop.tools import Tool
@@ -46,14 +47,14 @@ def surface_cloud(tool: Tool, seed: int = 0, points: int = POINTS) -> Cloud:
 def spread_evenly(mesh: TriangleMesh, rng: np.random.Generator, points: int) -> tuple[Array, Array, Integers]:
     """Return points (N, 3), unit normals (N, 3) and triangles (N,) drawn evenly over all area."""
     a, b, c = np.moveaxis(mesh.corners, 1, 0)
-    across = np.cross(b - a, c - a)
-    twice = np.linalg.norm(across, axis=1)
-    face = rng.choice(len(mesh), points, p=twice / twice.sum())
+    vectors = area_vectors(mesh.corners)
+    area = np.linalg.norm(vectors, axis=1)
+    face = rng.choice(len(mesh), points, p=area / area.sum())
     u, v = rng.random((2, points, 1))
     outside = u + v > 1
     u, v = np.where(outside, 1 - u, u), np.where(outside, 1 - v, v)
     xyz = a[face] + u * (b - a)[face] + v * (c - a)[face]
-    return xyz, across[face] / twice[face, None], face.astype(np.int64)
+    return xyz, vectors[face] / area[face, None], face.astype(np.int64)
 
 
 def _visible(body: Solid, xyz: Array, normal: Array, reach: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:

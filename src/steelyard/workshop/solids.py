@@ -111,8 +111,13 @@ def threaded(radius: float, low: float, high: float, pitch: float, depth: float)
 
 def knurled(radius: float, low: float, high: float, teeth: int, depth: float) -> Solid:
     """Return a rod along z with flutes along it."""
-    angles = np.pi / teeth * np.arange(2 * teeth)
-    radii = np.where(np.arange(2 * teeth) % 2, radius - depth, radius)
+    return star(radius, radius - depth, teeth, low, high)
+
+
+def star(outer: float, inner: float, points: int, low: float, high: float) -> Solid:
+    """Return a rod along z whose outline goes out and in between two radii, to so many points."""
+    angles = np.pi / points * np.arange(2 * points)
+    radii = np.where(np.arange(2 * points) % 2, inner, outer)
     return prism([(r * np.cos(a), r * np.sin(a)) for r, a in zip(radii, angles, strict=True)], low, high)
 
 

@@ -39,13 +39,12 @@ def adjustable_wrench(draw: Draw) -> Tool:
     sleeve = limb([(-0.42 * reach, -9, 13.2, -8, 8), (-0.75 * reach, -9, 14.2, -8, 8), (11 - reach, -9, 14.4, -8, 8)])
     grip = sleeve - limb([(-0.3 * reach, -9, 6.5, -20, 20), (30 - reach, -9, 7.5, -20, 20)])
     steel = draw.pick(ALLOY_STEEL, CARBON_STEEL)
-    scale = [k, k, k]
-    pieces = [
-        Piece("worm", worm.scale(scale), steel, (120, 122, 128)),
-        Piece("jaw", jaw.scale(scale), steel),
-        Piece("body", body.scale(scale), steel),
-        Piece("grip", grip.scale(scale), draw.pick(PVC, FOAM_RUBBER)),
-    ]
+    pieces = scaled(k, [
+        Piece("worm", worm, steel, (120, 122, 128)),
+        Piece("jaw", jaw, steel),
+        Piece("body", body, steel),
+        Piece("grip", grip, draw.pick(PVC, FOAM_RUBBER)),
+    ])  # fmt: skip
     return make_tool("adjustable-wrench", pieces, Grasp((-0.6 * reach * k, -9 * k, 0), "x", "z"), draw)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 
 from steelyard.bench.objects.cuts import interior_points, slabs
 from steelyard.check import Array
+from steelyard.datasets.known_object import KnownObject
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.geodesic_shape import ShapeGeodesic, published_prior
@@ -23,7 +24,6 @@ from steelyard.identify.point_masses import PointMasses
 from steelyard.io.object_folders import read_object
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments
-from steelyard.parts.known import KnownObject
 from steelyard.parts.parts import Parts
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import solids_of

@@ -11,11 +11,11 @@ import numpy as np
 
 from steelyard.bench.objects.cases import exact_rows, load_case, noisy_rows
 from steelyard.bench.timing import thread_ms
+from steelyard.datasets.known_object import KnownObject
 from steelyard.errors import BadValue
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.part_masses import PartMasses
 from steelyard.io.object_folders import read_object, read_track
-from steelyard.parts.known import KnownObject
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import with_noise
 

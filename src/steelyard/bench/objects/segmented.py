@@ -8,10 +8,10 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.datasets.known_object import KnownObject
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.parts.clustering import cluster
-from steelyard.parts.known import KnownObject
 from steelyard.parts.parts import Parts
 from steelyard.parts.segment import nearest_cell
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.datasets.known_object import KnownObject
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.io.ply_files import write_mesh
@@ -17,7 +18,6 @@ from steelyard.io.recordings.recording_files import object_table
 from steelyard.io.tables.array_table import npz
 from steelyard.io.view_folders import write_views
 from steelyard.logs.recording import KNOWN_PLACE
-from steelyard.parts.known import KnownObject
 from steelyard.shape.views import Views
 from steelyard.spatial import Pose
 from steelyard.whole_files import whole_folder, write_bytes, write_text

@@ -10,6 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.cells.delaunay import tetrahedra, thinly
 from steelyard.shape.mesh import Integers
+from steelyard.spatial import area_vectors
 
 _NUDGE = 1e-7  # of the diagonal
 _SIDES = 100  # facets of the hull that are asked which way is out
@@ -42,9 +43,8 @@ class Complex:
         simplices, beside = tetrahedra(moved, thinly(order)) or _by_qhull(moved)
         start, other = _edges(simplices, len(xyz))
         hull = _hull(simplices, beside)
-        a, b, c = xyz[hull].transpose(1, 0, 2)
-        across = np.cross(b - a, c - a)
-        outward = ((a - xyz[np.unique(hull)].mean(0)) * across).sum(1) >= 0
+        across = 2 * area_vectors(xyz[hull])
+        outward = ((xyz[hull[:, 0]] - xyz[np.unique(hull)].mean(0)) * across).sum(1) >= 0
         across = np.where(outward[:, None], across, -across)
         return cls(simplices, beside, start, other, hull, across)
 

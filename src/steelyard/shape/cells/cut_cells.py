@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
+from steelyard.shape.pairs import distinct_pairs
 from steelyard.shape.tets import TetMesh
 
 _EDGES = ((0, 1), (0, 2), (0, 3), (1, 2), (1, 3), (2, 3))
@@ -34,9 +35,7 @@ def crossing_edges(mesh: TetMesh, label: Integers) -> Integers:
     ends = mixed[:, _EDGES].reshape(-1, 2)
     one, two = label[ends].T
     ends = np.where((one < two)[:, None], ends, ends[:, ::-1])[one != two]
-    key = np.sort(ends[:, 0] * len(mesh.vertices) + ends[:, 1])
-    key = key[np.diff(key, prepend=-1) > 0]
-    return np.stack(np.divmod(key, len(mesh.vertices)), axis=1)
+    return distinct_pairs(ends[:, 0], ends[:, 1], len(mesh.vertices))
 
 
 def cut_cells(mesh: TetMesh, edges: Integers, share: Array) -> CutCells:

@@ -6,6 +6,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.spatial import area_vectors, unit_vectors
 
 _DRAWS, _VOTERS = 200, 500  # planes through three points that are tried, and points that vote
 _THICK = 0.75  # spacings from the plane to either side that still are the table
@@ -73,8 +74,7 @@ def _largest_plane(xyz: Array, spacing: float) -> Mask:
     """Return which points lie on the plane that holds the most of them, of those through three points drawn."""
     rng = np.random.default_rng(0)
     corners = xyz[rng.integers(len(xyz), size=(_DRAWS, 3))]
-    normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-300)
+    normals = unit_vectors(area_vectors(corners))
     offset = np.einsum("di,di->d", normals, corners[:, 0])
     voters = xyz[rng.permutation(len(xyz))[:_VOTERS]]
     votes = (np.abs(voters @ normals.T - offset) < _THICK * spacing).sum(0)

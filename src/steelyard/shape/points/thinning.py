@@ -19,9 +19,12 @@ def spread(xyz: Array, normal: Array, order: Integers, radius: float) -> Integer
 
     Points whose normals (N, 3) are more than a right angle apart do not hinder each other.
     """
-    low = xyz.min(0)
-    key = np.floor((xyz - low) / radius).astype(np.int64)
-    return np.asarray(_taken(xyz, normal, order, radius, key))
+    return np.asarray(_taken(xyz, normal, order, radius, cubes(xyz, radius)))
+
+
+def cubes(xyz: Array, edge: float) -> Integers:
+    """Return the cube (N, 3) that each point (N, 3) lies in, counted along the axes from the lowest on."""
+    return np.asarray(np.floor((xyz - xyz.min(0)) / edge).astype(np.int64))
 
 
 def spread_to(xyz: Array, normal: Array, order: Integers, count: int, least: float) -> tuple[Integers, float]:
@@ -44,7 +47,7 @@ def in_cubes(xyz: Array, edge: float) -> Integers:
     Passes over images read the same pixels for points that lie close: many images together are far larger than the
     processor's cache.
     """
-    cell = np.floor((xyz - xyz.min(0)) / edge).astype(np.int64)
+    cell = cubes(xyz, edge)
     size = cell.max(0) + 1
     return np.argsort((cell[:, 0] * size[1] + cell[:, 1]) * size[2] + cell[:, 2], kind="stable")
 

@@ -14,8 +14,9 @@ from scipy import ndimage
 
 from steelyard.check import Array
 from steelyard.findings import Finding, percent
+from steelyard.shape.scans.grid import Cells
 from steelyard.shape.scans.scene import Scene
-from steelyard.shape.scans.underside import Underside, median_along
+from steelyard.shape.scans.underside import Underside, median_along, rim_of
 
 # What a rod hangs below where it was last seen, of its rise above that: (1 - sin e) / (1 + sin e) for sight lines at
 # the elevation e, 0.4 at 25 degrees, 0.6 at 15.
@@ -34,16 +35,15 @@ def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple
 
     xyz, normal  (N, 3) the seen surface, in the table's frame
     """
-    i, j = np.nonzero(np.isfinite(bottom.height))
-    height, free = bottom.height[i, j], _free_to(bottom, xyz, normal, _OFF_TABLE * scene.sigma)[i, j]
-    tall = np.maximum(bottom.top[i, j] - height, 0)
+    under, grid = np.isfinite(bottom.height), bottom.grid
+    height, free = bottom.height[under], _free_to(bottom, xyz, normal, _OFF_TABLE * scene.sigma)[under]
+    tall = np.maximum(bottom.top[under] - height, 0)
     level = height[:, None] + tall[:, None] * (np.arange(_LEVELS) + 0.5) / _LEVELS
     column, k = np.nonzero(level < free[:, None])
-    spot = bottom.low + bottom.pitch * (np.stack([i[column], j[column]], axis=1) + 0.5)
-    points = np.column_stack([spot, level[column, k]])
-    empty = scene.seen_empty(points)
-    size = tall[column] * bottom.pitch**2 / _LEVELS
-    closed, left = float(size[~empty].sum()), float(tall.sum() * bottom.pitch**2 - size[empty].sum())
+    spots = grid.middles(np.argwhere(under)[column])
+    empty = scene.seen_empty(np.column_stack([spots, level[column, k]]))
+    size = tall[column] * grid.pitch**2 / _LEVELS
+    closed, left = float(size[~empty].sum()), float(tall.sum() * grid.pitch**2 - size[empty].sum())
     return ((_open(closed / left),) if closed > _MUCH * left else ()), closed
 
 
@@ -53,10 +53,10 @@ def _free_to(bottom: Underside, xyz: Array, normal: Array, off_table: float) -> 
     off_table  height over the table from which on something does not stand on it, for all that depth tells [m]
     """
     under = np.isfinite(bottom.height)
-    cell = np.floor((xyz[:, :2] - bottom.low) / bottom.pitch).astype(int)
-    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    cells, _ = bottom.grid.cells_under(xyz)
+    rim = rim_of(under)
     side = normal[:, 2] < _SIDE
-    known = rim | (under & _beside(bottom, cell[side], xyz[side, 2]))
+    known = rim | (under & _beside(bottom, (cells[0][side], cells[1][side]), xyz[side, 2]))
     if not known.any():
         return np.zeros(under.shape)
     nearest = tuple(ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True))
@@ -64,27 +64,28 @@ def _free_to(bottom: Underside, xyz: Array, normal: Array, off_table: float) -> 
     usual = np.where(rim, median_along(bottom.empty, rim), np.inf)
     last = np.minimum(bottom.empty, usual)[nearest]
     rise = np.where(under, bottom.top, 0.0) - last
-    rod = np.where(_sheer(cell, normal[:, 2], under.shape)[nearest], 0.0, _ROD)
+    rod = np.where(_sheer(cells, normal[:, 2], under.shape)[nearest], 0.0, _ROD)
     # What dips below where its side was last seen, as the floor of a bowl does, does not go on flat from there.
     doubtful = ~known & (rise > 0) & (last > off_table)
     return np.where(doubtful, last - rod * rise, 0.0)
 
 
-def _beside(bottom: Underside, cell: Any, z: Array) -> Any:
-    """Return which cells (I, J) were seen to be empty up to a side: its points lie over `cell` (N, 2), at z (N,)."""
+def _beside(bottom: Underside, cells: Cells, z: Array) -> Any:
+    """Return which cells (I, J) were seen to be empty up to a side: its points lie over `cells`, at z (N,)."""
     low, high = np.full(bottom.empty.shape, np.inf), np.full(bottom.empty.shape, -np.inf)
-    np.minimum.at(low, (cell[:, 0], cell[:, 1]), z)
-    np.maximum.at(high, (cell[:, 0], cell[:, 1]), z)
-    reach = _BESIDE * bottom.pitch
+    np.minimum.at(low, cells, z)
+    np.maximum.at(high, cells, z)
+    reach = _BESIDE * bottom.grid.pitch
     above = bottom.empty > ndimage.minimum_filter(low, 3) - reach
     return above & (bottom.empty < ndimage.maximum_filter(high, 3) + reach)
 
 
-def _sheer(cell: Any, up: Array, shape: tuple[int, ...]) -> Any:
+def _sheer(cells: Cells, up: Array, shape: tuple[int, ...]) -> Any:
     """Return near which cells (I, J) sides are sheer: `up` (N,) is how far normals of the surface point up."""
+    cell = np.ravel_multi_index(cells, shape)
 
     def count(rows: Any) -> Array:
-        found = np.bincount(np.ravel_multi_index(cell[rows].T, shape), minlength=int(np.prod(shape)))
+        found = np.bincount(cell[rows], minlength=int(np.prod(shape)))
         return np.asarray(_ABOUT**2 * ndimage.uniform_filter(found.reshape(shape).astype(float), _ABOUT))
 
     sides = count(up < _TOP)

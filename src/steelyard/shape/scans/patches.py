@@ -28,7 +28,8 @@ def surfels(scene: Scene, region: Region) -> Array:
     layers = int((_top(scene, region) - floor) / cell) + 2
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else STRIDE
-    found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *region[:3], cell, floor, layers, scene.noise)
+    where = region.mask, region.grid.low, region.grid.pitch
+    found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *where, cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= scene.enough])
     if not len(found):
         raise no_surface()
@@ -43,10 +44,9 @@ def _top(scene: Scene, region: Region) -> float:
     usual = REACHES[0] * scene.distance
     if region.highest <= usual:
         return region.highest
-    high, low, pitch = heights(scene)
-    xy = low + pitch * (np.argwhere(high > usual * _NEARLY) + 0.5)
-    over = region.holds(np.column_stack([xy, np.zeros(len(xy))]))
-    tallest = high[high > usual * _NEARLY][over].max(initial=0.0)
+    grid, high = heights(scene)
+    tall = high > usual * _NEARLY
+    tallest = high[tall][region.holds(grid.spots(tall))].max(initial=0.0)
     return min(region.highest, max(usual, float(tallest) / _NEARLY))
 
 
@@ -85,7 +85,7 @@ def surface_of(scene: Scene, patches: Array, region: Region, points: int) -> tup
     table = good & (normal[:, 2] > 0.9) & (np.abs(xyz[:, 2]) < 4 * scene.sigma)
     level, rough = 0.0, 0.1 * scene.sigma
     object_cells = ndimage.binary_erosion(mask, np.ones((3, 3)), iterations=3)
-    around = table & ~object_cells[region.cells_under(xyz)[0]]
+    around = table & ~object_cells[region.grid.cells_under(xyz)[0]]
     if around.sum() >= 20:
         level = float(np.median(xyz[around, 2]))
         rough = middle_half_std(xyz[around, 2])

@@ -11,6 +11,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.points.medians import middle_half_std
 from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.scene import Scene
 
 STRIDE = 3  # of the pixels that are averaged
@@ -30,27 +31,20 @@ _MARGIN = 0.008  # of table kept around the object [m]
 class Region(NamedTuple):
     """Where on the table the object lies.
 
-    mask     (I, J) cells of the map of heights, with a margin around the object
-    low      (2,) corner of the map [m]
-    pitch    edge of a cell [m]
+    grid     of the map of heights
+    mask     (I, J) cells of the object, with a margin around it
     stands   (I, J) cells in which the object stands out of the table
     highest  over the table that anything is measured there, noise added [m]
     others   objects that stand beside it
     cut      whether many images cut off a part of it
     """
 
+    grid: Grid
     mask: Any
-    low: Array
-    pitch: float
     stands: Any
     highest: float
     others: int
     cut: bool
-
-    def spots(self, cells: Any) -> Array:
-        """Return the middles (N, 3) of cells (I, J) on the table."""
-        xy = self.low + self.pitch * (np.argwhere(cells) + 0.5)
-        return np.column_stack([xy, np.zeros(len(xy))])
 
     @property
     def runs_off(self) -> bool:
@@ -58,16 +52,9 @@ class Region(NamedTuple):
         inner = (slice(_BRIM, -_BRIM),) * 2
         return bool(self.stands.sum() > self.stands[inner].sum())
 
-    def cells_under(self, points: Array) -> tuple[tuple[Any, Any], Any]:
-        """Return the cells i, j (N,) under points (N, 3), the nearest beyond the map, and which points are over it."""
-        i, j = np.floor((points[:, :2] - self.low) / self.pitch).astype(int).T
-        rows, columns = self.mask.shape
-        within = (i >= 0) & (j >= 0) & (i < rows) & (j < columns)
-        return (i.clip(0, rows - 1), j.clip(0, columns - 1)), within
-
     def holds(self, points: Array) -> Any:
         """Whether points (N, 3) lie over its cells."""
-        cells, within = self.cells_under(points)
+        cells, within = self.grid.cells_under(points)
         return within & self.mask[cells]
 
 
@@ -85,7 +72,7 @@ def followed(scene: Scene, region: Region) -> Region:
         if region.runs_off:
             # Ends that lie far off are seen by few pixels: all of them are needed.
             region = _object_within(scene, reach * scene.distance, 1)
-    spots, count = region.spots(region.stands), len(scene.R)
+    spots, count = region.grid.spots(region.stands), len(scene.R)
     held = np.percentile(scene.held(spots[:: max(1, len(spots) // _LOOKED_AT)])[:, 0], _ENDS)
     cut = bool(held < max(_CUT * count, min(_FULL, _SPARED * count)))
     return region._replace(cut=cut) if cut else region
@@ -95,13 +82,12 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     """Return where the largest object lies, of a map that reaches so far from where the cameras look [m]."""
     pitch = 2 * scene.pixel
     half, near = int(reach / pitch), int(REACHES[0] * scene.distance / pitch)
-    low = np.full(2, -half * pitch)
-    size = 2 * half
+    grid = Grid.about_origin(half, pitch)
     cap = max(6 * scene.sigma, _CAP * scene.distance)
     floor = 0.0 if scene.raised else -cap
-    sums = images.height_map(*scene.images(), stride, low, pitch, floor, cap, size, size)
+    sums = images.height_map(*scene.images(), stride, grid.low, pitch, floor, cap, *grid.shape)
     middle = (slice(half - near, half + near),) * 2
-    well, watched = _watched(scene, sums[..., 0], middle, low, pitch)
+    well, watched = _watched(scene, grid, sums[..., 0], middle)
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
     # Beside a stand what lies lower counts as no height at all, and says nothing of how even the stand is.
     even = mean[well & (mean > 0) & (mean < 3 * scene.sigma)] if scene.raised else mean[well]
@@ -126,7 +112,7 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     )
     mine &= ~stranger
     highest = float(sums[..., 2][mine].max()) + 2 * scene.sigma
-    return Region(mine, low, pitch, label == largest, highest, others, False)
+    return Region(grid, mine, label == largest, highest, others, False)
 
 
 def _with_its_floor(label: Any, largest: int, table: Any) -> Any:
@@ -142,21 +128,20 @@ def _with_its_floor(label: Any, largest: int, table: Any) -> Any:
     return np.where(own[hole] & (label > 0), largest, label)
 
 
-def heights(scene: Scene) -> tuple[Array, Array, float]:
-    """Return the mean height (I, J) [m] measured in the cells about where the cameras look, corner (2,) and pitch [m].
+def heights(scene: Scene) -> tuple[Grid, Array]:
+    """Return cells about where the cameras look, and the mean height (I, J) [m] measured in each.
 
     Cells in which too little was measured are 0.
     """
     pitch = 2 * scene.pixel
-    half = int(REACHES[0] * scene.distance / pitch)
-    low = np.full(2, -half * pitch)
-    sums = images.height_map(*scene.images(), STRIDE, low, pitch, -scene.distance, scene.distance, 2 * half, 2 * half)
+    grid, far = Grid.about_origin(int(REACHES[0] * scene.distance / pitch), pitch), scene.distance
+    sums = images.height_map(*scene.images(), STRIDE, grid.low, pitch, -far, far, *grid.shape)
     enough = sums[..., 0] >= _WATCHED * np.median(sums[..., 0][sums[..., 0] > 0])
-    return np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0), low, pitch
+    return grid, np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0)
 
 
-def _watched(scene: Scene, count: Array, middle: tuple[slice, slice], low: Array, pitch: float) -> tuple[Any, Any]:
-    """Return which cells (I, J) of a map hold enough pixels: in the middle as many as usual, and all that are followed.
+def _watched(scene: Scene, grid: Grid, count: Array, middle: tuple[slice, slice]) -> tuple[Any, Any]:
+    """Return which cells (I, J) of a grid hold pixels enough: in the middle as many as usual, all that are followed.
 
     count  (I, J) pixels in each
 
@@ -167,26 +152,26 @@ def _watched(scene: Scene, count: Array, middle: tuple[slice, slice], low: Array
     usual, apart = count >= _WATCHED * typical, np.ones(count.shape, bool)
     well = np.zeros(count.shape, bool)
     well[middle] = usual[middle]
-    held, density = _held(scene, count.shape, low, pitch)
+    held, density = _held(scene, grid)
     apart[middle] = held[middle] < _CUT * len(scene.R)
     apart &= held >= scene.enough
-    due = density * pitch**2
+    due = density * grid.pitch**2
     share = float(np.median(count[well] / np.maximum(due[well], 1e-9)))
     return well, usual | (apart & (count > 0) & (count >= _WATCHED * share * due))
 
 
-def _held(scene: Scene, shape: tuple[int, ...], low: Array, pitch: float) -> tuple[Array, Array]:
-    """Return how many images hold the cells (I, J) of a map, and how densely their pixels lie there [1/m^2]."""
-    i, j = (np.arange(-(-n // _COARSE)) + 0.5 for n in shape)
-    xy = low + pitch * _COARSE * np.stack(np.meshgrid(i, j, indexing="ij"), axis=-1).reshape(-1, 2)
-    coarse = scene.held(np.column_stack([xy, np.zeros(len(xy))])).reshape(len(i), len(j), 2)
-    fine = coarse.repeat(_COARSE, 0).repeat(_COARSE, 1)[: shape[0], : shape[1]]
+def _held(scene: Scene, grid: Grid) -> tuple[Array, Array]:
+    """Return how many images hold the cells (I, J) of a grid, and how densely their pixels lie there [1/m^2]."""
+    rows, columns = grid.shape
+    coarse = Grid(grid.low, grid.pitch * _COARSE, (-(-rows // _COARSE), -(-columns // _COARSE)))
+    held = scene.held(coarse.spots(np.ones(coarse.shape, bool))).reshape(*coarse.shape, 2)
+    fine = held.repeat(_COARSE, 0).repeat(_COARSE, 1)[:rows, :columns]
     return fine[..., 0], fine[..., 1]
 
 
 def lost_share(xyz: Array, region: Region) -> float:
     """Return the share of where the object stands that is far from all of its surface points (N, 3)."""
     covered = np.zeros_like(region.stands)
-    covered[region.cells_under(xyz)[0]] = True
+    covered[region.grid.cells_under(xyz)[0]] = True
     covered = ndimage.binary_dilation(covered, np.ones((3, 3)), iterations=_NEAR)
     return float((region.stands & ~covered).sum() / region.stands.sum())

@@ -17,6 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.shape.scans.common_table import laid
+from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.region import heights, object_on_table
 from steelyard.shape.scans.scene import Scene
 from steelyard.shape.scans.table_plane import NEAR, find_table
@@ -111,7 +112,8 @@ def _has_lower(scene: Scene) -> bool:
 
 def _stand_under(scene: Scene) -> _Stand | None:
     """Return what seems a stand under the object in the middle of the views, None where nothing does."""
-    high, low, pitch = heights(scene)
+    grid, high = heights(scene)
+    pitch = grid.pitch
     clear, thick = max(_CLEAR[0], _CLEAR[1] * scene.sigma), max(_BIN, 3 * scene.sigma)
     whole = _largest(high > clear)
     if not whole.any():
@@ -129,11 +131,9 @@ def _stand_under(scene: Scene) -> _Stand | None:
     is_cap = float(high[on].max()) < (1 + _STANDS_UP) * face and long < _LONG * wide and face > _FLAT * wide
     if sloping.sum() > _SHEER * whole.sum() or on[brim].mean() > _INSIDE or is_cap:
         return None
-    held, shown = (_held(scene, low + pitch * (np.argwhere(cells) + 0.5), high[cells]) for cells in (brim, on))
+    held, shown = (_held(scene, grid.spots(cells, high[cells])) for cells in (brim, on))
     passed, ratio = held < _CUT and shown > _WHOLE, bare.sum() / on.sum()
-    if ratio < _BARE or not (
-        passed or ratio >= _OF_ONE_COLOUR or _differ(scene, whole & ~brim, low, pitch, face, thick)
-    ):
+    if ratio < _BARE or not (passed or ratio >= _OF_ONE_COLOUR or _differ(scene, grid, whole & ~brim, face, thick)):
         return None
     area = float(whole.sum()) * pitch**2
     return _Stand(face, (area / wide, wide), float(on.sum() / whole.sum()), area * face, passed)
@@ -147,9 +147,9 @@ def _largest(up: Any) -> Any:
     return ndimage.binary_opening(label == 1 + np.argmax(np.bincount(label.ravel())[1:]), np.ones((3, 3)))
 
 
-def _held(scene: Scene, xy: Array, high: Array) -> float:
-    """Return the share of the images that hold spots (N, 2) at heights (N,), in the middle of them."""
-    return float(np.median(scene.held(np.column_stack([xy, high]))[:, 0])) / len(scene.R)
+def _held(scene: Scene, spots: Array) -> float:
+    """Return the share of the images that hold spots (N, 3), in the middle of them."""
+    return float(np.median(scene.held(spots)[:, 0])) / len(scene.R)
 
 
 def _face(high: Array) -> float:
@@ -158,14 +158,13 @@ def _face(high: Array) -> float:
     return float(np.median(high[np.abs(bins - np.argmax(np.bincount(bins))) <= 1]))
 
 
-def _differ(scene: Scene, inner: Any, low: Array, pitch: float, face: float, thick: float) -> bool:
+def _differ(scene: Scene, grid: Grid, inner: Any, face: float, thick: float) -> bool:
     """Whether what stands on a face, over cells (I, J), has other colours than it."""
     if scene.views.rgb is None:
         return False
     xyz, colour = scene.sampled(_PIXELS)[:, :3], scene.sampled_rgb(_PIXELS)
-    i, j = np.floor((xyz[:, :2] - low) / pitch).astype(int).T
-    over = (i >= 0) & (j >= 0) & (i < inner.shape[0]) & (j < inner.shape[1])
-    over[over] = inner[i[over], j[over]]
+    cells, over = grid.cells_under(xyz)
+    over &= inner[cells]
     bare, on = (colour[over & there] for there in (np.abs(xyz[:, 2] - face) < thick, xyz[:, 2] > face + 2 * thick))
     if not len(bare) or not len(on):
         return False

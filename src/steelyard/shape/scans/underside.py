@@ -20,7 +20,9 @@ from scipy.spatial import cKDTree
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.spatial import unit_vectors
 
 _WALL = 0.5  # a normal less upright than this belongs to a wall
 _FOOT, _HIGHEST_FOOT = 0.0005, 0.008  # steps in which the end of a wall is sought, and how far up [m]
@@ -33,16 +35,14 @@ _STEEPER = 1.3  # than the lowest sight line: a slope that is the object's own, 
 class Underside:
     """Height over the table at which the object begins, on a grid.
 
-    low     (2,) corner of the grid [m]
-    pitch   width of its cells [m]
+    grid    on the table
     height  (I, J) [m], inf where there is no object above
     seen    (I, J) whether surface points lie on that underside already
     top     (I, J) highest seen surface [m], -inf without
     empty   (I, J) height up to which views saw that nothing is there [m], 0 where there is no object above
     """
 
-    low: Array
-    pitch: float
+    grid: Grid
     height: Array
     seen: Any
     top: Array
@@ -51,21 +51,17 @@ class Underside:
     def points(self) -> tuple[Array, Array]:
         """Return points (N, 3) that close the underside, in the table's frame, and their normals (N, 3)."""
         under = np.isfinite(self.height)
-        i, j = np.nonzero(under & ~self.seen)
+        open_ = under & ~self.seen
         filled = np.where(under, self.height, np.nan)
-        slope = np.stack([_slope(filled, 0)[i, j], _slope(filled, 1)[i, j]]) / self.pitch
-        normal = np.stack([slope[0], slope[1], -np.ones(len(i))], axis=1)
-        normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-        xy = self.low + self.pitch * (np.stack([i, j], axis=1) + 0.5)
-        return np.column_stack([xy, self.height[i, j]]), normal
+        slope = np.stack([_slope(filled, 0)[open_], _slope(filled, 1)[open_]]) / self.grid.pitch
+        normal = unit_vectors(np.stack([slope[0], slope[1], -np.ones(slope.shape[1])], axis=1))
+        return self.grid.spots(open_, self.height[open_]), normal
 
     def below(self, points: Array) -> Any:
         """Return whether points (N, 3) lie under the table, under the object, or beside it where it covers no table."""
-        place = np.floor((points[:, :2] - self.low) / self.pitch).astype(int)
-        inside = ((place >= 0) & (place < self.height.shape)).all(1)
-        place = np.clip(place, 0, np.array(self.height.shape) - 1)
-        height = np.where(inside, self.height[place[:, 0], place[:, 1]], np.inf)
-        return (points[:, 2] < 0) | (points[:, 2] < height - 0.5 * self.pitch)
+        cells, within = self.grid.cells_under(points)
+        height = np.where(within, self.height[cells], np.inf)
+        return (points[:, 2] < 0) | (points[:, 2] < height - 0.5 * self.grid.pitch)
 
 
 def _slope(height: Array, axis: int) -> Array:
@@ -75,43 +71,36 @@ def _slope(height: Array, axis: int) -> Array:
 
 def closed_below(scene: Scene, xyz: Array, normal: Array, pitch: float) -> Underside:
     """Return the underside of the seen surface, points (N, 3) with normals, on a grid of `pitch` [m]."""
-    low = xyz[:, :2].min(0) - 2 * pitch
-    size = np.ceil((xyz[:, :2].max(0) + 2 * pitch - low) / pitch).astype(int)
-    cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
-    top = np.full(size, -np.inf)
-    np.maximum.at(top, (cell[:, 0], cell[:, 1]), xyz[:, 2])
+    grid = Grid.under(xyz, pitch)
+    top = np.full(grid.shape, -np.inf)
+    np.maximum.at(top, grid.cells_under(xyz)[0], xyz[:, 2])
     top = ndimage.maximum_filter(top, 3, mode="constant", cval=-np.inf)
-    i, j = np.nonzero(np.isfinite(top))
-    foot = np.column_stack([low + pitch * (np.stack([i, j], axis=1) + 0.5), np.zeros(len(i))])
+    high = np.isfinite(top)
+    foot = grid.spots(high)
     up = np.tile([0.0, 0.0, 1.0], (len(foot), 1))
     support = sight_lines.settled(*scene.images(), settled := foot.copy(), up, WINDOW, scene.noise, 2)
-    table = np.zeros(size, bool)
-    table[i, j] = (support[:, 0] + support[:, 1] >= LEAST_VIEWS) & (settled[:, 2] < 0.3 * scene.sigma)
-    empty_to = np.full(size, np.inf)
+    table = np.zeros(grid.shape, bool)
+    table[high] = (support[:, 0] + support[:, 1] >= LEAST_VIEWS) & (settled[:, 2] < 0.3 * scene.sigma)
+    empty_to = np.full(grid.shape, np.inf)
     sight = _lowest_sight(scene)
-    away = sight * pitch * ndimage.distance_transform_edt(table | ~np.isfinite(top))
-    empty_to[i, j] = _empty_to(scene, foot, table[i, j], top[i, j], pitch, away[i, j])
-    _raise_to_feet(scene, xyz, normal, low, pitch, empty_to, top)
-    return underside(xyz, normal, low, pitch, empty_to, top, sight)
+    away = sight * pitch * ndimage.distance_transform_edt(table | ~high)
+    empty_to[high] = _empty_to(scene, foot, table[high], top[high], pitch, away[high])
+    _raise_to_feet(scene, xyz, normal, grid, empty_to, top)
+    return _underside(xyz, normal, grid, empty_to, top, sight)
 
 
-def _raise_to_feet(
-    scene: Scene, xyz: Array, normal: Array, low: Array, pitch: float, empty_to: Array, top: Array
-) -> None:
+def _raise_to_feet(scene: Scene, xyz: Array, normal: Array, grid: Grid, empty_to: Array, top: Array) -> None:
     """Raise the empty height of the outermost columns under the object to where the walls over them end."""
     under = np.isfinite(empty_to) & (empty_to < top)
-    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    rim = rim_of(under)
     wall = np.abs(normal[:, 2]) < _WALL
     i, j = np.nonzero(rim)
-    at = low + pitch * (np.stack([i, j], axis=1) + 0.5)
     if not len(i) or not wall.any():
         return
-    away, nearest = cKDTree(xyz[wall, :2]).query(at, distance_upper_bound=2 * pitch)
+    away, nearest = cKDTree(xyz[wall, :2]).query(grid.spots(rim)[:, :2], distance_upper_bound=2 * grid.pitch)
     has = np.isfinite(away)
     i, j, nearest = i[has], j[has], nearest[has]
-    level = normal[wall][nearest].copy()
-    level[:, 2] = 0
-    level /= np.linalg.norm(level, axis=1, keepdims=True)
+    level = unit_vectors(normal[wall][nearest] * [1.0, 1.0, 0.0])
     foot = sight_lines.feet(
         *scene.images(), xyz[wall][nearest].copy(), level, _FOOT, int(_HIGHEST_FOOT / _FOOT), scene.noise
     )
@@ -141,32 +130,31 @@ def _empty_to(scene: Scene, foot: Array, table_seen: Any, top: Array, step: floa
     return out
 
 
-def underside(
-    xyz: Array, normal: Array, low: Array, pitch: float, empty_to: Array, top: Array, sight: float
-) -> Underside:
+def _underside(xyz: Array, normal: Array, grid: Grid, empty_to: Array, top: Array, sight: float) -> Underside:
     """Return where the object begins above the table.
 
     xyz, normal  (N, 3) the seen surface, in the table's frame
-    low, pitch   the grid
     empty_to     (I, J) height up to which each column was seen to be empty [m], inf if up to the top
     top          (I, J) highest seen surface in the column, -inf without
     sight        slope of the lowest sight lines
     """
     under = np.isfinite(empty_to) & (empty_to < top)
-    cell = np.floor((xyz[:, :2] - low) / pitch).astype(int)
-    down = cell[normal[:, 2] < DOWNWARD]
     seen = np.zeros(under.shape, np.bool_)
-    down = down[((down >= 0) & (down < under.shape)).all(1)]
-    seen[down[:, 0], down[:, 1]] = True
+    seen[grid.cells_under(xyz[normal[:, 2] < DOWNWARD])[0]] = True
     height = np.where(under, empty_to, 0.0)
     smooth = _smooth(ndimage.median_filter(height, 3), under)
-    steep = under & (_steepness(smooth, under) / pitch > _STEEPER * sight)
-    rim = under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
+    steep = under & (_steepness(smooth, under) / grid.pitch > _STEEPER * sight)
+    rim = rim_of(under)
     bare = rim & ~steep
     height = np.where(bare, median_along(height, rim), height)
     span = _spanned(height, rim, steep, under)
     closed = np.where(under, np.clip(span, 0.0, np.where(under, top, 0.0)), np.inf)
-    return Underside(low, pitch, closed, seen & under, top, np.where(under, empty_to, 0.0))
+    return Underside(grid, closed, seen & under, top, np.where(under, empty_to, 0.0))
+
+
+def rim_of(under: Any) -> Any:
+    """Return the outermost of cells (I, J)."""
+    return under & ~ndimage.binary_erosion(under, np.ones((3, 3)))
 
 
 def median_along(height: Array, rim: Any) -> Array:
