@@ -22,6 +22,7 @@ from steelyard.team.turns import turning_speed
 ALIKE, LEAVES = 0.9, 0.25
 # What is compared must be so much of the shorter track; longer ones are told in so many steps.
 OVERLAP, MOST_STEPS = 0.5, 6000
+LEAST = 1e-6  # of the square of its speeds: a robot that turned by less at a lag tells nothing of it
 
 
 def together(log: TeamLog) -> tuple[TeamLog, ClockErrors]:
@@ -54,12 +55,10 @@ def _late(recording: TeamRecording, reference: str, name: str) -> float | None:
         return 0.0
     step = max(STEP_S, max(spans) / MOST_STEPS)
     x, y = _speed(first, step), _speed(second, step)
-    begun = float(second.time[0] - first.time[0])
-    fewest = int(OVERLAP * min(len(x), len(y)))
-    lags = np.arange(fewest - len(x), len(y) - fewest + 1)
-    # A lag is where in y the first row of x is.
-    alike = np.array([_alike(x, y, int(lag)) for lag in lags])
-    late = begun + step * lags
+    # The first row of x is at row `lag` of y.
+    lags = np.arange(1 - len(x), len(y))
+    alike = _alike(x, y)
+    late = float(second.time[0] - first.time[0]) + step * lags
     near = np.abs(late) <= min(FARTHEST_S, SHARE * min(spans)) + step
     best, usual = float(alike.max()), float(alike[near].max(initial=0.0))
     if best < ALIKE or 1 - best**2 > LEAVES * (1 - usual**2):
@@ -72,12 +71,25 @@ def _speed(track: Track, step: float) -> Array:
     return turning_speed(track, np.arange(float(track.time[0]), float(track.time[-1]), step), step)
 
 
-def _alike(x: Array, y: Array, lag: int) -> float:
-    """Return the correlation of speeds whose first row of x is at row `lag` of y."""
-    begin, end = max(-lag, 0), min(len(x), len(y) - lag)
-    a, b = x[begin:end], y[begin + lag : end + lag]
-    good = np.isfinite(a) & np.isfinite(b)
-    a, b = a[good], b[good]
-    if len(a) < OVERLAP * len(good):
-        return 0.0
-    return correlation(np.array([len(a), a.sum(), b.sum(), a @ a, b @ b, a @ b]))
+def _alike(x: Array, y: Array) -> Array:
+    """Return the correlation of speeds x (N,) and y (M,) at lags 1 - N to M - 1; 0 where too few rows tell it.
+
+    The sums over what overlaps are themselves correlations over the lag, of what is known, speeds and squares, and
+    Fourier transforms find them for all lags at once.
+    """
+    X, Y = _powers(x), _powers(y)
+    count = len(x) + len(y) - 1
+    ahead, behind = np.fft.rfft(X[:, ::-1], count), np.fft.rfft(Y, count)
+    n, sx, sy, xx, yy, _ = total = np.fft.irfft(ahead[[0, 1, 0, 2, 0, 1]] * behind[[0, 0, 1, 0, 2, 1]], count)
+    overlap = np.minimum.reduce([np.arange(1, count + 1), np.arange(count, 0, -1), np.full(count, min(len(x), len(y)))])
+    told = (overlap >= OVERLAP * min(len(x), len(y))) & (n >= OVERLAP * overlap)
+    # What hardly turns in the rows that overlap is left to rounding.
+    told &= (n * xx - sx * sx > LEAST * n * X[2].sum()) & (n * yy - sy * sy > LEAST * n * Y[2].sum())
+    return np.where(told, correlation(total), 0.0)
+
+
+def _powers(speed: Array) -> Array:
+    """Return what is known of speeds (N,), the speeds about their mean, and the squares (3, N); 0 where unknown."""
+    good = np.isfinite(speed)
+    about = np.where(good, speed - (speed[good].mean() if good.any() else 0.0), 0.0)
+    return np.stack([good, about, about**2])

@@ -63,7 +63,7 @@ def far_lags(log: TeamLog) -> ClockErrors:
 
 def _best(sums: dict[int, Array], usual: int) -> int:
     """Return the shift at which robots turn far more alike than at the usual one, or that."""
-    alike = {shift: correlation(total) for shift, total in sums.items()}
+    alike = {shift: float(correlation(total)) for shift, total in sums.items()}
     best = max(alike, key=lambda shift: alike[shift], default=usual)
     return best if alike.get(best, 0.0) > max(ALIKE, alike.get(usual, 0.0) + MORE) else usual
 
@@ -86,8 +86,8 @@ def _products(recording: TeamRecording, reference: str, name: str) -> dict[int, 
     return sums
 
 
-def correlation(total: Array) -> float:
-    """Return the correlation of x and y from the sums (6,) of 1, x, y, x^2, y^2, x y."""
+def correlation(total: Array) -> Array:
+    """Return the correlation (..) of x and y by sums (6, ..) of 1, x, y, x^2, y^2, x y; 0 where one is constant."""
     n, x, y, xx, yy, xy = total
-    spread = max(n * xx - x * x, 0.0) * max(n * yy - y * y, 0.0)
-    return float((n * xy - x * y) / np.sqrt(spread)) if spread > 0 else 0.0
+    spread = np.maximum(n * xx - x * x, 0.0) * np.maximum(n * yy - y * y, 0.0)
+    return np.asarray(np.where(spread > 0, (n * xy - x * y) / np.sqrt(np.where(spread > 0, spread, 1.0)), 0.0))
