@@ -24,6 +24,7 @@ CENTRE, WIDTH = float(np.log(2500.0)), 1.3
 # How much densities of "one" material differ: from one part made of one piece to anything at all.
 LADDER = np.array([0.003, 0.01, 0.03, 0.1, 0.3, 1.0])
 STEPS, FALL = 30, 1e-7
+DEEPEST = 0.9  # of a density that one step may take
 # Curvatures below this count as this: the prior alone gives a free density half of one.
 FLATTEST = 1e-6
 MOST_MODELS = 600
@@ -38,25 +39,32 @@ TRUST = 0.5
 def mode(
     A: Array, b: Array, volume: Array, group: Integers, precision: Array, centre: Array, start: Array
 ) -> tuple[Array, float, Array]:
-    """Return the mode y (G,), its cost with the prior N(centre, precision^-1), and the Hessian (G, G), by Newton."""
+    """Return the mode y (G,), its cost with the prior N(centre, precision^-1), and the Hessian (G, G), by Newton.
+
+    Steps are straight in the densities, in which the data are quadratic: masses that trade against each other lie in a
+    valley that is straight there, and bent in log densities.
+    """
     y, step, share = start, np.zeros(len(start)), 0.0
     best, hessian = np.inf, precision
     for _ in range(STEPS + 1):
         # The first look is at the start itself; each further one is a step that is halved until the cost falls.
         for _ in range(20):
-            trial = moved(y, step, share)
+            trial = y + np.log1p(share * step)
             now, g, h = _cost(A, b, volume, group, precision, centre, trial)
             if share == 0.0 or now < best + 1e-12 * abs(best):
                 break
             share *= 0.5
         y, best, hessian = trial, now, h
-        step = downhill(g, h, FLATTEST)
+        # Of densities as shares of their own: less by the slope than that of their logs.
+        straight, deepest = h.copy(), 0.0
+        for k in range(len(y)):
+            straight[k, k] -= g[k]
+        step = downhill(g, straight, FLATTEST)
         if -inner(g, step) < FALL:
             break
-        longest = 1.0
         for k in range(len(y)):
-            longest = max(longest, abs(step[k]))
-        share = 1 / longest
+            deepest = max(deepest, -step[k])
+        share = DEEPEST / max(deepest, DEEPEST)
     return y, best, hessian
 
 
