@@ -16,12 +16,11 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.cost.dense import cholesky, moved, product, solved, times, transposed
 from steelyard.identify.cost.linear import inverse_scaled
-from steelyard.identify.masses.density_priors import log_det
+from steelyard.identify.masses.density_priors import DEEPEST, log_det
 from steelyard.logs.log import Integers
 
 STEPS, HALVINGS, FALL = 40, 12, 1e-3
-# The longest step in log densities, and in tilts.
-LONGEST_DENSITY, LONGEST_TILT = 1.0, 0.7
+LONGEST_TILT = 0.7  # in one step
 # A tilt beyond this puts the whole part into one point.
 STEEPEST = 30.0
 
@@ -90,25 +89,32 @@ def fitted(seen: Seen, free: Free, y: Array, tilts: Array) -> tuple[Array, Array
     d phi (10, q) and phi (10,), q = P + F f; y, tilts: where to start.
     """
     P = len(seen.volume)
-    longest = np.repeat([LONGEST_DENSITY, LONGEST_TILT], [P, len(free.variance)])
     x = np.concatenate([y, tilts])
     found = _cost(seen, free, x)
     for _ in range(STEPS):
         before, gradient, curve, hessian = found[:4]
-        step = _solve(hessian, curve, gradient)
+        step = _solve(hessian, curve - gradient[:P], gradient)
         if -(gradient @ step) < FALL:
             break
-        step /= max(1.0, float((np.abs(step) / longest).max()))
+        step *= _most(step[:P], step[P:])
         for _ in range(HALVINGS):
-            trial = _cost(seen, free, x + step)
+            # Straight in the densities, as in `density_priors.mode`.
+            moved_to = np.concatenate([x[:P] + np.log1p(step[:P]), x[P:] + step[P:]])
+            trial = _cost(seen, free, moved_to)
             if trial[0] < before:
-                x, found = x + step, trial
+                x, found = moved_to, trial
                 break
             step *= 0.5
         if before - found[0] < FALL:
             break
     cost, _, curve, hessian, J, phi = found
     return x[:P].copy(), x[P:].copy(), cost, curve, hessian, J, phi
+
+
+def _most(densities: Array, tilts: Array) -> float:
+    """Return the share of a step that takes no density, of itself, and no tilt too far."""
+    far = max(-densities.min(initial=0.0) / DEEPEST, np.abs(tilts).max(initial=0.0) / LONGEST_TILT)
+    return float(1 / max(far, 1.0))
 
 
 @numba.njit(cache=True, nogil=True)
