@@ -85,13 +85,18 @@ class PartCuts:
 
     def _weights(self, data: Effective, errors: list[Array]) -> Array:
         """Return the weight (K, S) of every cut in every place by prior and evidence; small ones are zero."""
-        evidence = self._evidence(data, errors)
+        evidence = self._evidence(data, errors) + np.log(self._chance())[:, None]
         if self.prior is not None:
             evidence = evidence + np.asarray(self.prior)[:, None, None]
         weight = np.exp(evidence - evidence.max((0, 1)))
         weight = np.asarray((weight / weight.sum((0, 1))).mean(2))
         weight[weight < LEAST_WEIGHT] = 0.0
         return np.asarray(weight / weight.sum())
+
+    def _chance(self) -> Array:
+        """Return how likely each place is (S,) before the log: the first, the surest, as much as all others."""
+        others = len(self.places) - 1
+        return np.repeat([1.0, 1 / max(others, 1)], [1, others]) / (1 + bool(others))
 
     def _evidence(self, data: Effective, errors: list[Array]) -> Array:
         """Return the log evidence (K, S, F) of every cut in every place per family of density models."""
