@@ -115,7 +115,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
         *rough,
         *hangs,
         *findings_of(scene, found, level, placed, mistake),
-        *few_seen(seen / len(xyz), len(scene.views)),
+        *few_seen(seen / len(xyz), len(scene.views), scene.enough),
     )
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
