@@ -53,7 +53,7 @@ class Scan:
     views      how many were fused
     noise_std  depth noise at the object's distance, found on the table [m]
     disagree   spread of the views about the surface, in depth noise: 1 where they agree
-    moved_m    rms shift of the cameras by registration along what the surface shows, None where the poses were good enough
+    moved_m    rms shift of the cameras along what the surface shows, None where the poses were good enough
     placement  what moved cameras say of where the cloud lies as a whole, None where the poses were good enough
     findings   what you must know
     stages     CPU time of each step [s]
