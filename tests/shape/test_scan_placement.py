@@ -9,7 +9,7 @@ import pytest
 from scipy.spatial import cKDTree
 
 from steelyard.shape.scan import fuse
-from steelyard.shape.scans.placement import placement
+from steelyard.shape.scans.placement import moved_m, placement
 from steelyard.simulate.camera import disturbed, wrist_arc
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
@@ -40,6 +40,23 @@ def both(X: Pose, rng: np.random.Generator) -> Pose:
 def moved_by(rng: np.random.Generator) -> Pose:
     """Return a motion of the whole scan, which its views cannot tell."""
     return Pose(Rotation.exp(0.01 * rng.normal(size=3)), 0.002 * rng.normal(size=3))
+
+
+@pytest.mark.parametrize(("long", "shown"), [(1.0, False), (2.0, True)], ids=["round", "flattened"])
+def test_turns_that_a_surface_does_not_show_do_not_count_as_moves(long: float, shown: bool) -> None:
+    rng = np.random.default_rng(0)
+    angle, z = rng.uniform(0, 2 * np.pi, 2000), rng.uniform(0, 0.1, 2000)
+    xyz = np.stack([0.03 * long * np.cos(angle), 0.03 * np.sin(angle), z], 1)
+    normal = np.stack([np.cos(angle), long * np.sin(angle), 0 * z], 1)
+    normal = normal / np.linalg.norm(normal, axis=1, keepdims=True) + 0.05 * rng.normal(size=xyz.shape)
+    given = wrist_arc(xyz.mean(0), 0.35, 36)
+    turns = np.radians(4.0) * rng.normal(size=36)[:, None] * [0.0, 0.0, 1.0]
+    about = Pose(Rotation.exp(np.zeros(3)), xyz.mean(0))
+    found = about @ Pose(Rotation.exp(turns), np.zeros((36, 3))) @ about.inverse() @ given
+    moved = np.sqrt(((found.position - given.position) ** 2).sum(1).mean())
+    assert moved > 0.01
+    seen = moved_m(given, found, xyz, normal)
+    assert seen > 0.9 * moved if shown else seen < 0.1 * moved
 
 
 def test_an_error_at_the_wrist_is_found_and_the_place_is_right() -> None:

@@ -22,7 +22,7 @@ from steelyard.shape.scans.common_table import levelled
 from steelyard.shape.scans.hanging import hanging
 from steelyard.shape.scans.lens_error import lens_by_table
 from steelyard.shape.scans.patches import surface_of, surfels
-from steelyard.shape.scans.placement import Placement, placement
+from steelyard.shape.scans.placement import Placement, moved_m, placement
 from steelyard.shape.scans.region import followed, lost_share
 from steelyard.shape.scans.registration import Seen, agreed
 from steelyard.shape.scans.scan_colours import colours_of
@@ -53,7 +53,7 @@ class Scan:
     views      how many were fused
     noise_std  depth noise at the object's distance, found on the table [m]
     disagree   spread of the views about the surface, in depth noise: 1 where they agree
-    moved_m    rms shift of the cameras by registration, None where the poses were good enough
+    moved_m    rms shift of the cameras along what the surface shows, None where the poses were good enough
     placement  what moved cameras say of where the cloud lies as a whole, None where the poses were good enough
     findings   what you must know
     stages     CPU time of each step [s]
@@ -115,7 +115,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
         *rough,
         *hangs,
         *findings_of(scene, found, level, placed, mistake),
-        *few_seen(seen / len(xyz), len(scene.views)),
+        *few_seen(seen / len(xyz), len(scene.views), scene.enough),
     )
     return Scan(
         cloud=cloud, spacing=spacing, table=scene.table, seen=seen, views=len(scene.views), noise_std=scene.sigma,
@@ -143,12 +143,13 @@ def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> Surface:
     seen = Seen.by(scene)
     clock.lap("object")
     seen = agreed(scene, seen, off)
-    moved = scene.p - (scene.X_WT.inverse() @ scene.views.X_WC).position
-    shift = float(np.sqrt((moved**2).sum(1).mean())) if np.abs(moved).max() > _STILL else None
+    given, poses = scene.X_WT.inverse() @ scene.views.X_WC, Pose(Rotation.nearest(scene.R), scene.p)
     clock.lap("registration")
     region = followed(scene, seen.region)
     patches = seen.patches if region is seen.region else surfels(scene, region)
     xyz, normal = surface_of(scene, patches, region, points)
+    still = np.abs(poses.position - given.position).max() <= _STILL
+    shift = None if still else moved_m(given, poses, xyz, normal)
     lost = lost_share(xyz, region)
     clock.lap("surface")
     return Surface(xyz, normal, region.others, seen.spread, shift, lost)

@@ -19,6 +19,7 @@ _WRIST = 0.3  # of what views are off by, each by itself: an error at the wrist 
 _BENT = 0.03  # of an error at the wrist: moves are put together as vectors, which they are not quite
 _FEW = 12  # views that can tell such an error from a wrong lens, and how theirs hang together
 _LEAST = 1e-12  # share of the moves that is no variance
+_SHOWN = 0.01  # mean square along normals of a move of 1 rms of the surface: of less only noise is seen
 _BLOCKS = 10  # of views one after the other, whose errors may hang together
 
 
@@ -35,6 +36,23 @@ class Placement:
     std_m: float
     std_rad: float
     at_wrist: tuple[float, float] | None
+
+
+def moved_m(given: Pose, found: Pose, xyz: Array, normal: Array) -> float:
+    """Return how far cameras (V,) were moved, rms [m], along what the surface (N, 3) with normals (N, 3) shows.
+
+    Moves that leave the surface on itself, such as turns of a bottle about its axis, are chance: they are left out.
+    """
+    middle = xyz.mean(0)
+    size = float(np.sqrt(((xyz - middle) ** 2).sum(1).mean()))
+    rows = np.concatenate([np.cross((xyz - middle) / size, normal), normal], axis=1)
+    shares, axes = np.linalg.eigh(rows.T @ rows / len(rows))
+    free = axes[:, shares < _SHOWN].T
+    arm = (given.position - middle)[:, None]
+    by_free = np.swapaxes(np.cross(free[:, :3] / size, arm) + free[:, 3:], 1, 2)
+    moves = (found.position - given.position)[..., None]
+    left = moves - by_free @ (np.linalg.pinv(by_free) @ moves)
+    return float(np.sqrt((left**2).sum((1, 2)).mean()))
 
 
 def placement(given: Pose, found: Pose, middle: Array) -> Placement:

@@ -56,7 +56,17 @@ class Seen:
         good = support[:, 0] >= scene.enough
         if not good.any():
             raise no_surface()
-        return cls(region, patches, float(np.median(support[good, 2] / _expected(scene, xyz[good], normal[good]))))
+        expected = _expected(scene, xyz[good], normal[good]) * _of_few(support[good, 0])
+        return cls(region, patches, float(np.median(support[good, 2] / expected)))
+
+
+def _of_few(views: Array) -> Array:
+    """Return the median spread (N,) of so many views about their own mean, in standard deviations of one.
+
+    Median of chi squared by Wilson and Hilferty: views that are few lie nearer to their mean than to the surface.
+    """
+    free = np.maximum(views - 1, 1)
+    return np.asarray(np.sqrt(free / (free + 1) * (1 - 2 / (9 * free)) ** 3))
 
 
 def _expected(scene: Scene, xyz: Array, normal: Array) -> Array:

@@ -11,7 +11,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding, counted
 from steelyard.shape.scans.image_borders import cut_off
 from steelyard.shape.scans.placement import Placement
-from steelyard.shape.scans.scene import LEAST_VIEWS, Scene
+from steelyard.shape.scans.scene import Scene
 from steelyard.shape.views import Intrinsics
 
 _WRONG = 2.5  # times the depth noise: views that spread more are wrong in something else than their noise
@@ -92,14 +92,17 @@ def findings_of(
     return tuple(found)
 
 
-def few_seen(share: float, views: int) -> tuple[Finding, ...]:
-    """Return the finding on a surface that is mostly what closes it; `share` of the points were seen."""
+def few_seen(share: float, views: int, enough: int) -> tuple[Finding, ...]:
+    """Return the finding on a surface that is mostly what closes it; `share` of the points were seen.
+
+    enough  views that must see a place of the surface
+    """
     if share >= _LEAST_SEEN:
         return ()
     text = (
         f"Only {100 * share:.0f} % of the points were seen, in {counted(views, 'view')}; the rest closes what is left."
     )
-    remedy = f"Take more views, from all sides and heights: {LEAST_VIEWS} must see each place of the surface."
+    remedy = f"Take more views, from all sides and heights: {enough} must see each place of the surface."
     return (Finding("surface-open", text, remedy),)
 
 

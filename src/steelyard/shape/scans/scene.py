@@ -17,6 +17,7 @@ from steelyard.shape.views import TablePlane, Views
 from steelyard.spatial import Pose
 
 LEAST_VIEWS = 3  # that must agree before something is believed
+_SHOW = 4  # one view in so many sees a given place
 WINDOW = 0.002  # how far from a settled point a measurement of it may lie, beside its noise [m]
 _SAMPLES = 30_000  # points that find the table
 
@@ -66,8 +67,8 @@ class Scene:
 
     @property
     def enough(self) -> int:
-        """How many views must agree before something is believed: of one or two all."""
-        return min(LEAST_VIEWS, len(self.R))
+        """How many views must agree before something is believed: all of two, and two where few places show in more."""
+        return min(LEAST_VIEWS if len(self.R) >= _SHOW * LEAST_VIEWS else LEAST_VIEWS - 1, len(self.R))
 
     def sampled(self, pixels: int) -> Array:
         """Return about so many even pixels as points (N, 5): x, y, z in T, depth [m] and number of the view."""

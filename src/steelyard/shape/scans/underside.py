@@ -21,7 +21,7 @@ from steelyard.check import Array
 from steelyard.shape.mesh import Integers
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.grid import Grid
-from steelyard.shape.scans.scene import LEAST_VIEWS, WINDOW, Scene
+from steelyard.shape.scans.scene import WINDOW, Scene
 from steelyard.spatial import unit_vectors
 
 _WALL = 0.5  # a normal less upright than this belongs to a wall
@@ -80,7 +80,7 @@ def closed_below(scene: Scene, xyz: Array, normal: Array, pitch: float) -> Under
     up = np.tile([0.0, 0.0, 1.0], (len(foot), 1))
     support = sight_lines.settled(*scene.images(), settled := foot.copy(), up, WINDOW, scene.noise, 2)
     table = np.zeros(grid.shape, bool)
-    table[high] = (support[:, 0] + support[:, 1] >= LEAST_VIEWS) & (settled[:, 2] < 0.3 * scene.sigma)
+    table[high] = (support[:, 0] + support[:, 1] >= scene.enough) & (settled[:, 2] < 0.3 * scene.sigma)
     empty_to = np.full(grid.shape, np.inf)
     sight = _lowest_sight(scene)
     away = sight * pitch * ndimage.distance_transform_edt(table | ~high)
