@@ -79,7 +79,7 @@ def test_intervals_of_free_masses_hold_masses_near_zero() -> None:
 
 def test_error_bars_count_a_difference_of_evidence_half_and_the_mean_counts_it_whole() -> None:
     masses, evidence = np.array([[1.0], [2.0]]), np.array([0.0, -4.0])
-    mean, covariance = averaged([(masses, evidence, np.full((2, 1, 1), 0.01))])
+    mean, covariance = averaged(masses, evidence, np.full((2, 1, 1), 0.01))
     whole, half = 1 / (1 + np.exp(4)), 1 / (1 + np.exp(2))
     assert mean[0] == pytest.approx(1 + whole)
     assert covariance[0, 0] == pytest.approx(0.01 + (1 - half) * whole**2 + half * (1 - whole) ** 2)
@@ -87,5 +87,5 @@ def test_error_bars_count_a_difference_of_evidence_half_and_the_mean_counts_it_w
 
 def test_decided_models_keep_their_own_error_bars() -> None:
     masses, evidence = np.array([[1.0], [2.0]]), np.array([0.0, -200.0])
-    mean, covariance = averaged([(masses, evidence, np.full((2, 1, 1), 0.01))])
+    mean, covariance = averaged(masses, evidence, np.full((2, 1, 1), 0.01))
     np.testing.assert_allclose([mean[0], covariance[0, 0]], [1.0, 0.01])

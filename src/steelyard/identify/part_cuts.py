@@ -85,11 +85,11 @@ class PartCuts:
 
     def _weights(self, data: Effective, errors: list[Array]) -> Array:
         """Return the weight (K, S) of every cut in every place by prior and evidence; small ones are zero."""
-        evidence = self._evidence(data, errors) + np.log(self._chance())[:, None]
+        evidence = self._evidence(data, errors) + np.log(self._chance())
         if self.prior is not None:
-            evidence = evidence + np.asarray(self.prior)[:, None, None]
-        weight = np.exp(evidence - evidence.max((0, 1)))
-        weight = np.asarray((weight / weight.sum((0, 1))).mean(2))
+            evidence = evidence + np.asarray(self.prior)[:, None]
+        weight = np.exp(evidence - evidence.max())
+        weight /= weight.sum()
         weight[weight < LEAST_WEIGHT] = 0.0
         return np.asarray(weight / weight.sum())
 
@@ -99,11 +99,11 @@ class PartCuts:
         return np.repeat([1.0, 1 / max(others, 1)], [1, others]) / (1 + bool(others))
 
     def _evidence(self, data: Effective, errors: list[Array]) -> Array:
-        """Return the log evidence (K, S, F) of every cut in every place per family of density models."""
+        """Return the log evidence (K, S) of every cut in every place."""
         cost = np.array([data.cost_of(error) for error in errors])
         blurred = [data.blurred(error) for error in errors]
         found = [[log_evidence(seen, cut) for seen in blurred] for cut in self.cuts]
-        return np.asarray(np.array(found) - (cost - cost[0])[:, None])
+        return np.asarray(np.array(found) - (cost - cost[0]))
 
     def _seen(self, problem: Problem) -> tuple[Effective, list[Array]]:
         """Return what the log says of the whole body, and what errors (10, 10) of shape and place do to that."""

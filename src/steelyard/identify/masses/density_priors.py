@@ -251,20 +251,16 @@ def first_partitions(start: Array) -> Integers:
     return np.stack(out)
 
 
-def averaged(families: list[tuple[Array, Array, Array]]) -> tuple[Array, Array]:
+def averaged(masses: Array, evidence: Array, spread: Array) -> tuple[Array, Array]:
     """Return mean masses (P,) and their covariance (P, P) with the spread between models.
 
-    Each family brings masses (N, P), log evidence (N,) and covariances (N, P, P). Within a family models count by their
-    evidence; families count alike, since Laplace's evidence does not compare across them: with parts cut in pieces the
-    better family is often the one it disfavours. The covariance is that about the mean with evidence annealed: a model
-    that is simple and slightly wrong wins by more than it should where noise hides what it leaves out.
+    masses (N, P), log evidence (N,), spread (N, P, P)
+
+    Models count by their evidence, whatever their family. The covariance is that about the mean with evidence annealed:
+    a model that is simple and slightly wrong wins by more than it should where noise hides what it leaves out.
     """
-    weights = _weights(families, 1.0)
-    mean = sum((w @ m for w, (m, _, _) in zip(weights, families, strict=True)), np.zeros(families[0][0].shape[1]))
-    covariance = np.zeros((len(mean), len(mean)))
-    for w, (m, _, c) in zip(_weights(families, TRUST), families, strict=True):
-        covariance += spread_of(w, m - mean, c)
-    return mean, covariance
+    mean = _weights(evidence) @ masses
+    return mean, spread_of(_weights(TRUST * evidence), masses - mean, spread)
 
 
 def spread_of(weight: Array, off: Array, covariance: Array) -> Array:
@@ -272,7 +268,6 @@ def spread_of(weight: Array, off: Array, covariance: Array) -> Array:
     return np.asarray(np.tensordot(weight, covariance, 1) + (weight * off.T) @ off)
 
 
-def _weights(families: list[tuple[Array, Array, Array]], trust: float) -> list[Array]:
-    """Return the weights of each family's models by evidence to the power `trust`; families count alike."""
-    weights = [np.exp(trust * (e - e.max())) for _, e, _ in families]
-    return [w / (w.sum() * len(families)) for w in weights]
+def _weights(evidence: Array) -> Array:
+    weights = np.exp(evidence - evidence.max())
+    return np.asarray(weights / weights.sum())

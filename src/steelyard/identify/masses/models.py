@@ -42,16 +42,16 @@ def averaged_masses(data: Effective, parts: Parts) -> Masses:
     A, b = _in_masses(data, parts)
     if len(parts) == 1:
         return free_masses(data, parts)
-    return Masses(*density_priors.averaged(_families(A, b, parts.volume)))
+    return Masses(*density_priors.averaged(*_models(A, b, parts.volume)))
 
 
-def log_evidence(data: Effective, parts: Parts) -> Array:
-    """Return the log evidence (F,) of the parts, summed over the models of each family.
+def log_evidence(data: Effective, parts: Parts) -> float:
+    """Return the log evidence of the parts, summed over all models of their densities.
 
     Up to a constant of the data alone, so that different cuts of one object compare.
     """
-    families = _families(*_in_masses(data, parts), parts.volume)
-    return np.array([float(np.logaddexp.reduce(evidence)) for _, evidence, _ in families])
+    _, evidence, _ = _models(*_in_masses(data, parts), parts.volume)
+    return float(np.logaddexp.reduce(evidence))
 
 
 def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]) -> Masses:
@@ -75,11 +75,14 @@ def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:
     return B.T @ data.information @ B, B.T @ data.pull
 
 
-def _families(A: Array, b: Array, volume: Array) -> list[tuple[Array, Array, Array]]:
-    """Return both families of density models: masses, log evidence and covariances of each model."""
+def _models(A: Array, b: Array, volume: Array) -> tuple[Array, Array, Array]:
+    """Return masses (N, P), log evidence (N,) and covariances (N, P, P) of the models of both families."""
     start = np.full(len(volume), np.log(max(float(nonnegative_masses(A, b).sum()), 1e-6) / volume.sum()))
     common = density_priors.common_density(A, b, volume, start)
     widest = np.log(common[0][-1] / volume)
     starts = density_priors.first_partitions(widest)
-    masses, evidence, spread, looked = density_priors.equal_groups(A, b, volume, widest, starts)
-    return [common, (masses[:looked], evidence[:looked], spread[:looked])]
+    *groups, looked = density_priors.equal_groups(A, b, volume, widest, starts)
+    masses, evidence, spread = (
+        np.concatenate([one, other[:looked]]) for one, other in zip(common, groups, strict=True)
+    )
+    return masses, evidence, spread
