@@ -24,7 +24,7 @@ from steelyard.shape.scans.lens_error import lens_by_table
 from steelyard.shape.scans.patches import surface_of, surfels
 from steelyard.shape.scans.placement import Placement, moved_m, placement
 from steelyard.shape.scans.region import followed, lost_share
-from steelyard.shape.scans.registration import Seen, agreed
+from steelyard.shape.scans.registration import Seen, agreed, left_open
 from steelyard.shape.scans.scan_colours import colours_of
 from steelyard.shape.scans.scan_findings import TABLE_OFF, Level, Surface, few_seen, findings_of
 from steelyard.shape.scans.scene import Scene, scene_of
@@ -109,7 +109,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     cloud = Cloud(xyz, rgb, None, normal, coloured).in_frame(scene.X_WT)
     rough, more = uneven(scene, bottom, found.disagree)
     hangs, closed = hanging(scene, bottom, found.xyz, found.normal)
-    unsure_m3 = float(np.linalg.norm([unsure, more, closed]))
+    unsure_m3 = float(np.linalg.norm([unsure, more, closed, found.unsure_m3]))
     findings = (
         *said,
         *rough,
@@ -127,7 +127,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
 def _placed(scene: Scene, middle: Array) -> Placement:
     """Move the scene to where the reported poses have it, all together, and return how surely."""
     found = Pose(Rotation.nearest(scene.R), scene.p)
-    placed = placement(scene.X_WT.inverse() @ scene.views.X_WC, found, middle)
+    placed = placement(scene.given, found, middle)
     scene.X_WT = scene.X_WT @ placed.common.inverse()
     return placed
 
@@ -143,7 +143,7 @@ def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> Surface:
     seen = Seen.by(scene)
     clock.lap("object")
     seen = agreed(scene, seen, off)
-    given, poses = scene.X_WT.inverse() @ scene.views.X_WC, Pose(Rotation.nearest(scene.R), scene.p)
+    given, poses = scene.given, Pose(Rotation.nearest(scene.R), scene.p)
     clock.lap("registration")
     region = followed(scene, seen.region)
     patches = seen.patches if region is seen.region else surfels(scene, region)
@@ -151,8 +151,9 @@ def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> Surface:
     still = np.abs(poses.position - given.position).max() <= _STILL
     shift = None if still else moved_m(given, poses, xyz, normal)
     lost = lost_share(xyz, region)
+    by_poses = left_open(scene, seen, xyz, normal)
     clock.lap("surface")
-    return Surface(xyz, normal, region.others, seen.spread, shift, lost)
+    return Surface(xyz, normal, region.others, seen.spread, shift, lost, by_poses)
 
 
 class _Clock:

@@ -108,7 +108,7 @@ def held(camera: Any, R: Any, p: Any, height: int, width: int, points: Any) -> A
 
 
 @numba.njit(cache=True, nogil=True)
-def _normal_of(
+def normal_of(
     image: Any, unit: float, fx: float, fy: float, a: float, b: float, z: float, u: int, v: int, step: int, noise: float
 ) -> tuple[bool, float, float]:  # fmt: skip
     """Return whether the neighbours of pixel (u, v) give a normal toward the camera, and its x and y there, z being -1.
@@ -169,10 +169,10 @@ def surfels(
                 layer = int(np.floor((h - floor) / cell))
                 if layer < 0 or layer >= layers:
                     continue
-                faces, nx, ny = _normal_of(depth[k], unit, fx, fy, a, b, z, u, v, step, noise)
+                faces, nx, ny = normal_of(depth[k], unit, fx, fy, a, b, z, u, v, step, noise)
                 if not faces:
                     continue
-                nx, ny, nz = _turned(R, k, nx, ny)
+                nx, ny, nz = turned(R, k, nx, ny)
                 main = _main_direction(nx, ny, nz)
                 i, j = int((x - low[0]) / cell) - i0, int((y - low[1]) / cell) - j0
                 row = index[main, layer, i, j]
@@ -225,7 +225,7 @@ def _facing(
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
-def _turned(R: Any, k: int, x: float, y: float) -> tuple[float, float, float]:
+def turned(R: Any, k: int, x: float, y: float) -> tuple[float, float, float]:
     """Return a normal (x, y, -1) in the axes of camera k in those of the table."""
     return (
         R[k, 0, 0] * x + R[k, 0, 1] * y - R[k, 0, 2],

@@ -12,10 +12,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.shape.scans.pose_errors import Shared
 from steelyard.spatial import Pose, Rotation
 
 _ROUNDS = 50  # of the variances
-_WRIST = 0.3  # of what views are off by, each by itself: an error at the wrist is believed to be no less, rms
 _BENT = 0.03  # of an error at the wrist: moves are put together as vectors, which they are not quite
 _FEW = 12  # views that can tell such an error from a wrong lens, and how theirs hang together
 _LEAST = 1e-12  # share of the moves that is no variance
@@ -106,23 +106,13 @@ class _Moves:
 
     @classmethod
     def _if_each_its_own(cls, moves: Array, R: Array) -> _Moves:
-        """Return the parts of moves (V, 3) of cameras with axes R (V, 3, 3) whose errors have nothing in common.
-
-        How large h and e are is found with them, by expectation and maximisation: without an error at the wrist h goes
-        to nothing, and g is the mean.
-        """
-        A = np.concatenate([R, np.broadcast_to(np.eye(3), R.shape)], axis=2).reshape(-1, 6)
-        b, n = moves.reshape(-1), moves.size
-        normal, right = A.T @ A, A.T @ b
-        least = _LEAST * float(b @ b) / n + 1e-30
-        of_own = of_each = float(b @ b) / n + least
+        """Return the parts of moves (V, 3) of cameras with axes R (V, 3, 3) whose errors have nothing in common."""
+        square = float((moves**2).mean())
+        least = _LEAST * square + 1e-30
+        found = Shared.unknown(square + least)
         for _ in range(_ROUNDS):
-            covariance = np.linalg.inv(normal / of_each + np.diag([1 / of_own] * 3 + [0.0] * 3))
-            x = covariance @ right / of_each
-            rest = b - A @ x
-            of_each = float(rest @ rest + np.trace(normal @ covariance)) / n + least
-            of_own = max(float(x[:3] @ x[:3] + np.trace(covariance[:3, :3])) / 3, _WRIST**2 * of_each)
-        apart = moves - moves.mean(0)
-        left = np.sqrt(float(rest @ rest) / max(float((apart**2).sum()), least))
-        std = np.sqrt((np.trace(covariance[3:, 3:]) + _BENT**2 * (x[:3] @ x[:3])) / 3)
-        return cls(x[3:], float(std), x[:3], float(left))
+            found = found.of(moves, R, 0.0, least)
+        rest, apart = moves - found.mean(R), moves - moves.mean(0)
+        left = np.sqrt(float((rest**2).sum()) / max(float((apart**2).sum()), least))
+        std = np.sqrt((np.trace(found.covariance[3:, 3:]) + _BENT**2 * (found.own @ found.own)) / 3)
+        return cls(found.common, float(std), found.own, float(left))

@@ -3,7 +3,8 @@
 from __future__ import annotations
 
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 from scipy.spatial import cKDTree
@@ -13,22 +14,28 @@ from steelyard.errors import CannotAnswer
 from steelyard.shape.scans.common_table import slid
 from steelyard.shape.scans.depth_images import FACING
 from steelyard.shape.scans.patches import no_surface, settled, settled_patches, surface_of, surfels
+from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.region import Region, object_on_table
 from steelyard.shape.scans.scene import WINDOW, Scene
 from steelyard.shape.scans.table_plane import INCIDENCE
-from steelyard.shape.scans.view_steps import moved, steps_together
-from steelyard.spatial import Rotation
+from steelyard.shape.scans.unsure_volume import unsure_volume
+from steelyard.shape.scans.view_steps import Sights, moved, moved_together
 
-_POSE_STD = (0.01, np.radians(2.0))  # how far reported poses may be off [m, rad]
+_REPORTED = np.radians(2.0), 0.01  # how far poses may be off before anything was seen of it, per axis [rad], [m]
+_ANYWHERE = np.radians(15.0), 0.07  # the same where views are to show by themselves whether they are
 _APART = 0.8  # of the depth noise: views that one fit moves apart by less are left where they are, rms
-_NEARBY = 0.001  # views that one fit moves apart by less need no search [m], rms
-_FINE = (0.006, 0.006, 0.003, 0.003, 0.003, 0.003)  # how far off the surface views may be, round by round [m]
-_TOGETHER = 0.003  # in rounds of that and less all views step at once: farther off, one side may pass for another [m]
+_NEARBY = 0.003  # views that one fit moves apart by less need no search [m], rms
+_UNTOLD = 0.001  # nor those that it moves by less and whose table does not tell that they are off
+_FINE = (0.006, 0.006, *[0.003] * 6)  # how far off the surface views may be, round by round [m]
+_TOGETHER = 0.006  # in rounds of that and less all views step at once: farther off, one side may pass for another [m]
+_FOOT = 0.003  # from what stands on the table: there it shows in some views only [m]
+_LEVEL = 0.97  # cosine of the normals of a table with the vertical
 _WINDOWS = (0.012, 0.012, *_FINE)
 _FAR = (0.02, 0.02, 0.02, *_WINDOWS)
 _MODEL = 2500  # points that views are fitted to
 _NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
 _STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
+_WIDER = 3.0  # times as wide as before its views were moved: no object is
 _SAME = 0.1  # of the depth noise: views that spread by less are as good as each other
 _ON = 3.0  # times the depth noise: so near the surface a pixel lies on it
 _SAMPLES = 200_000  # pixels that are asked whether they do
@@ -40,11 +47,13 @@ class Seen:
 
     region   where it lies      patches  (N, 8) of its surface and of the table around it
     spread   median spread of the views about the surface, in standard deviations of depth
+    errors   what is believed of the reported poses, None where the cameras are still there
     """
 
     region: Region
     patches: Array
     spread: float
+    errors: PoseErrors | None = None
 
     @classmethod
     def by(cls, scene: Scene) -> Seen:
@@ -126,11 +135,11 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
     if len(scene.R) < 2 or _apart(scene, first, _FINE[-1], off > 0) < _APART * scene.sigma:
         return first
     given, tries = (scene.R, scene.p), []
-    near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < _NEARBY
+    near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < (_NEARBY if off else _UNTOLD)
     for fit in (_left, _fit_fine) if near else (_left, _fit_far, _fit_slid) if off else (_left, _fit_far):
         scene.R, scene.p = given
         with suppress(CannotAnswer):
-            tries.append(_Try.of(scene, fit(scene, first)))
+            tries.append(_Try.of(scene, _no_wrinkle(fit(scene, first), first)))
     if not tries:
         raise no_surface()
     # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
@@ -139,6 +148,23 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
     best = min(tries, key=lambda each: each.crossed - each.shown / max(most, 1) + each.seen.spread / least)
     scene.R, scene.p = best.R, best.p
     return best.seen
+
+
+def _no_wrinkle(seen: Seen, first: Seen) -> Seen:
+    """Return what is seen; CannotAnswer where that is a table that views bent: views that agree blur an object less."""
+    if seen.region.mask.sum() > _WIDER * first.region.mask.sum():
+        raise no_surface()
+    return seen
+
+
+def left_open(scene: Scene, seen: Seen, xyz: Array, normal: Array) -> float:
+    """Return the standard deviation of the volume [m^3] that moved cameras leave open, 0 where they are as reported.
+
+    xyz, normal  even points (N, 3) of the object's surface and their normals
+    """
+    if seen.errors is None:
+        return 0.0
+    return unsure_volume(_sights(scene, seen, _FINE[-1]), seen.errors, xyz, normal)
 
 
 def _left(_: Scene, first: Seen) -> Seen:
@@ -164,7 +190,9 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
     wrong  whether poses are known to be: else moves along the surface, such as those of a ruler along itself, are
            chance, and count as little as they show
     """
-    R, p, xyz, normal = _fit(scene, seen, window)
+    sights = _sights(scene, seen, window)
+    *_, R, p = moved(sights, PoseErrors.unknown(scene.given.rotation.matrix, *_ANYWHERE)).images
+    xyz, normal = sights.xyz, sights.normal
     high = xyz[:, 2] > _STANDS_OUT * scene.sigma
     xyz, normal = (xyz[high], normal[high]) if high.any() else (xyz, normal)
     shares, axes = np.linalg.eigh(normal.T @ normal / len(normal))
@@ -182,26 +210,19 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
 
 def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
     """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
+    errors = PoseErrors.unknown(scene.given.rotation.matrix, *_REPORTED)
     for window in windows:
-        scene.R, scene.p, xyz, normal = _fit(scene, seen, window)
-        if window <= _TOGETHER:
-            steps = steps_together(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
-            scene.R, scene.p = _stepped(scene.R, scene.p, xyz.mean(0), steps)
-        seen = Seen.by(scene)
+        sights = _sights(scene, seen, window)
+        errors = errors.seen(sights.off(), *sights.each_by_itself())
+        *_, scene.R, scene.p = (moved_together if window <= _TOGETHER else moved)(sights, errors).images
+        seen = replace(Seen.by(scene), errors=errors)
     return seen
 
 
-def _stepped(R: Array, p: Array, middle: Array, steps: Array) -> tuple[Array, Array]:
-    """Return poses (V, 3, 3), (V, 3) after steps (V, 6), turns [rad] about `middle` (3,) and shifts [m]."""
-    turn = np.asarray(Rotation.exp(steps[:, :3]).matrix)
-    return turn @ R, middle + np.einsum("vij,vj->vi", turn, p - middle) + steps[:, 3:]
-
-
-def _fit(scene: Scene, seen: Seen, window: float) -> tuple[Array, Array, Array, Array]:
-    """Return poses (V, 3, 3), (V, 3) that fit the views to their own surface, and its points and normals (N, 3)."""
+def _sights(scene: Scene, seen: Seen, window: float) -> Sights:
+    """Return the views and the surface that they give together, which may be off by a window [m]."""
     xyz, normal = _model(scene, seen.patches, window)
-    R, p = moved(*scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, _POSE_STD)
-    return R, p, xyz, normal
+    return Sights(scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, scene.given, xyz.mean(0))
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
@@ -213,4 +234,17 @@ def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
     good = support[:, 0] >= scene.enough
     if not good.any():
         raise no_surface()
-    return xyz[good], normal[good]
+    xyz, normal = xyz[good], normal[good]
+    clear = _clear_of_feet(xyz, normal, 4 * scene.sigma, _FOOT + 4 * scene.sigma)
+    return (xyz[clear], normal[clear]) if clear.any() else (xyz, normal)
+
+
+def _clear_of_feet(xyz: Array, normal: Array, low: float, near: float) -> Any:
+    """Return which of points (N, 3) do not lie where things meet the table: no higher than `low` [m], and `near` [m].
+
+    From one side views have the table there, from the other what stands on it: they would never agree, and push each
+    other away from it.
+    """
+    on_table = xyz[:, 2] < low
+    away, _ = cKDTree(xyz[~on_table, :2]).query(xyz[:, :2], distance_upper_bound=near)
+    return ~on_table | ((away >= near) & (normal[:, 2] >= _LEVEL))

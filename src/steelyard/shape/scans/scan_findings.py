@@ -29,6 +29,7 @@ class Surface:
     disagree  spread of the views, in depth noise
     shift     rms move of the cameras that made them agree [m], None where none was needed
     lost      share of where the object stands without surface
+    unsure_m3  standard deviation of the volume that moved cameras leave open [m^3]
     """
 
     xyz: Array
@@ -37,6 +38,7 @@ class Surface:
     disagree: float
     shift: float | None
     lost: float
+    unsure_m3: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -52,6 +52,11 @@ class Scene:
         return TablePlane(normal, float(normal @ self.X_WT.position))
 
     @property
+    def given(self) -> Pose:
+        """The poses (V,) of the cameras in T as they were reported."""
+        return self.X_WT.inverse() @ self.views.X_WC
+
+    @property
     def pixel(self) -> float:
         """Width of a pixel at the object [m]."""
         return self.distance / self.views.intrinsics.fx

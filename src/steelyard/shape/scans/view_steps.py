@@ -4,56 +4,123 @@ Fitted to their common surface one by one, each view goes only a small part of t
 its own: what a camera askew at the wrist does to all views alike, an object that swells or shrinks, then takes hundreds
 of rounds. Here the surface goes along. At each of its points the height on which the views agree is free, and what is
 left is how far they have it apart: one system of equations for all of their steps.
+
+Two sides of a thing that no view shows together are tied by little but its rims. What holds them is where the cameras
+were reported, as far as those poses prove right where the views do tell.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.scans.depth_images import FACING, pixel_of
+from steelyard.shape.scans.depth_images import FACING, normal_of, pixel_of, turned
+from steelyard.shape.scans.pose_errors import PoseErrors
+from steelyard.spatial import Pose, Rotation
 
 _STEPS = 3  # of Gauss and Newton, per view
 _ALIKE = 50.0  # neighbours on the surface whose errors are one: an edge that blurs does so on its whole length
 _PAIRS = 90_000  # of a point and a view that are looked at, about: of many views a share of the points is enough
+_BESIDE = 2  # pixels from one whose normal is taken to its neighbours
+_SAME_WAY = 0.7  # cosine of two normals of one surface
 _FLOOR = 1e-4  # of the surface: it is known no better [m]
 
 
-def moved(
-    depth: Any, unit: float, camera: Array, R: Array, p: Array, xyz: Array, normal: Array, window: float, noise: float,
-    loose: tuple[float, float],
-) -> tuple[Array, Array]:  # fmt: skip
-    """Return poses (V, 3, 3), (V, 3) from which the views measure the surface of patches (N, 3) with normals (N, 3).
+@dataclass(frozen=True, eq=False)
+class Sights:
+    """Views and the surface that they are fitted to.
 
-    Point-to-plane distances of the pixels that patches fall on, Huber-weighted, three Gauss-Newton steps per view.
-    window  distances beyond it are another surface [m]
-    loose   standard deviations of the reported poses, [m] and [rad]: how freely a view may leave its pose
+    images  depth (V, H, W), its unit, the camera and its poses R (V, 3, 3), p (V, 3)
+    xyz     (N, 3) points of the surface with normals (N, 3)
+    window  distances from it beyond which something else was measured [m]
+    noise   standard deviation of depth at 1 m
+    given   reported poses (V,) of the cameras
+    middle  (3,) point about which views turn
     """
-    R, p = R.copy(), p.copy()
-    middle = xyz.mean(0)
-    for k in range(len(R)):
-        for _ in range(_STEPS):
-            H, g = _of_view(depth, unit, camera, R, p, k, xyz, normal, middle, window, noise)
-            H[np.arange(6), np.arange(6)] += 1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2
-            step = np.linalg.solve(H, -g)
-            turn = _rotation(step[:3])
-            R[k] = turn @ R[k]
-            p[k] = middle + turn @ (p[k] - middle) + step[3:]
-    return R, p
+
+    images: tuple[Any, float, Array, Array, Array]
+    xyz: Array
+    normal: Array
+    window: float
+    noise: float
+    given: Pose
+    middle: Array
+
+    def off(self) -> Array:
+        """Return turns and shifts (V, 6) by which the views have left their reported poses."""
+        _, _, _, R, p = self.images
+        move = Pose(Rotation.nearest(R), p) @ self.given.inverse()
+        return np.concatenate([move.rotation.log(), move.apply(self.middle) - self.middle], axis=1)
+
+    def after(self, steps: Array) -> Sights:
+        """Return the views after steps (V, 6), turns [rad] and shifts [m]."""
+        depth, unit, camera, R, p = self.images
+        turn = np.asarray(Rotation.exp(steps[:, :3]).matrix)
+        p = self.middle + np.einsum("vij,vj->vi", turn, p - self.middle) + steps[:, 3:]
+        return replace(self, images=(depth, unit, camera, turn @ R, p))
+
+    def each_by_itself(self) -> tuple[Array, Array]:
+        """Return Hessians (V, 6, 6) and gradients (V, 6) of half the squared distances from the surface."""
+        H, g = _of_views(*self.images, self.xyz, self.normal, self.middle, self.window, self.noise)
+        return H / _ALIKE, g / _ALIKE
+
+    def together(self) -> tuple[Array, Array]:
+        """Return the Hessian (6 V, 6 V) and gradient (6 V,) of half the squared distances of the views from their mean.
+
+        Of many points and views a share of the points is enough.
+        """
+        step = max(1, -(-len(self.xyz) * len(self.images[0]) // _PAIRS))
+        H, g = _together(*self.images, self.xyz[::step], self.normal[::step], self.middle, self.window, self.noise)
+        return H * (step / _ALIKE), g * (step / _ALIKE)
+
+
+def moved(sights: Sights, errors: PoseErrors) -> Sights:
+    """Return views that measure the surface, each fitted to it by itself, by what is believed of their poses.
+
+    Point-to-plane distances of the pixels that its points fall on, Huber-weighted, three Gauss-Newton steps.
+    """
+    for _ in range(_STEPS):
+        H, g = sights.each_by_itself()
+        pull = errors.precision * (errors.mean - sights.off())
+        steps = np.linalg.solve(H + np.diag(errors.precision), (pull - g)[..., None])
+        sights = sights.after(np.asarray(steps[..., 0]))
+    return sights
+
+
+def moved_together(sights: Sights, errors: PoseErrors) -> Sights:
+    """Return views that agree best, by what is believed of their poses."""
+    information = errors.information()
+    for _ in range(_STEPS):
+        sights = sights.after(steps_together(sights, information))
+    return sights
+
+
+def steps_together(sights: Sights, information: Array) -> Array:
+    """Return steps (V, 6), turns [rad] and shifts [m], after which the views agree best.
+
+    information  (6 V, 6 V) precision of their reported poses
+    """
+    H, g = sights.together()
+    # All together are free to go anywhere: they stay.
+    H[np.diag_indices(len(H))] += 1.0
+    steps = np.linalg.solve(H + information, -g - information @ sights.off().reshape(-1)).reshape(-1, 6)
+    return np.asarray(steps - steps.mean(0))
 
 
 @numba.njit(cache=True, nogil=True)
-def _rotation(w: Any) -> Any:
-    """Return the rotation (3, 3) by a vector w (3,) [rad]."""
-    angle = np.sqrt((w * w).sum())
-    if angle < 1e-12:
-        return np.eye(3)
-    a = w / angle
-    K = np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
-    return np.eye(3) + np.sin(angle) * K + (1 - np.cos(angle)) * (K @ K)
+def _of_views(
+    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
+    noise: float,
+) -> Any:  # fmt: skip
+    """Return the Hessian (V, 6, 6) and gradient (V, 6) of each view, see `_of_view`."""
+    H, g = np.empty((len(R), 6, 6)), np.empty((len(R), 6))
+    for k in range(len(R)):
+        H[k], g[k] = _of_view(depth, unit, camera, R, p, k, xyz, normal, middle, window, noise)
+    return H, g
 
 
 @numba.njit(cache=True, nogil=True)
@@ -64,10 +131,10 @@ def _of_view(
     """Return the Hessian (6, 6) and gradient (6,) of half the squared distances, in standard deviations of depth."""
     H, g, row = np.zeros((6, 6)), np.zeros(6), np.empty(6)
     for i in range(len(xyz)):
-        heard, over, sigma = _measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row, middle, noise)
+        heard, over, sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row, middle, noise)
         if not heard or abs(over) > window:
             continue
-        weight = _weight(over, sigma)
+        weight = weight_of(over, sigma)
         for r in range(6):
             g[r] += weight * row[r] * over
             for c in range(6):
@@ -76,29 +143,9 @@ def _of_view(
 
 
 @numba.njit(cache=True, nogil=True)
-def _weight(over: float, sigma: float) -> float:
+def weight_of(over: float, sigma: float) -> float:
     """Return Huber's weight [1/m^2] of a distance `over` with standard deviation sigma [m]."""
     return 1 / sigma**2 * min(1.0, 2 * sigma / (abs(over) + 1e-12))
-
-
-def steps_together(
-    depth: Any, unit: float, camera: Array, R: Array, p: Array, xyz: Array, normal: Array, window: float, noise: float,
-    loose: tuple[float, float],
-) -> Array:  # fmt: skip
-    """Return steps (V, 6), turns [rad] about the middle of the points and shifts [m], after which the views agree best.
-
-    xyz     (N, 3) points of the surface with normals (N, 3)
-    window  distances from it beyond which something else was measured [m]
-    noise   standard deviation of depth at 1 m
-    loose   standard deviations of the poses, [m] and [rad]: how freely a view may leave its pose
-    """
-    step = -(-len(xyz) * len(R) // _PAIRS)
-    H, g = _together(depth, unit, camera, R, p, xyz[::step], normal[::step], xyz.mean(0), window, noise)
-    H, g = H * (step / _ALIKE), g * (step / _ALIKE)
-    H[np.diag_indices(len(H))] += np.tile(1 / np.array([loose[1]] * 3 + [loose[0]] * 3) ** 2, len(R))
-    steps = np.linalg.solve(H, -g).reshape(-1, 6)
-    # All together are free to go anywhere: they stay.
-    return np.asarray(steps - steps.mean(0))
 
 
 @numba.njit(cache=True, nogil=True)
@@ -112,11 +159,11 @@ def _together(
     for i in range(len(xyz)):
         n, total, mean = 0, 0.0, 0.0
         for k in range(len(R)):
-            heard, over, sigma = _measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row[n], middle, noise)
+            heard, over, sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row[n], middle, noise)
             if not heard or abs(over) > window:
                 continue
             view[n], height[n] = k, over
-            weight[n] = _weight(over, sigma)
+            weight[n] = weight_of(over, sigma)
             total += weight[n]
             mean += weight[n] * over
             n += 1
@@ -126,7 +173,7 @@ def _together(
 
 
 @numba.njit(cache=True, nogil=True)
-def _measured(
+def measured(
     depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, x: Any, n: Any, row: Any, middle: Any, noise: float
 ) -> Any:
     """Return whether view k faces a point x (3,) with normal n (3,), how high over it it measures and how surely [m].
@@ -136,10 +183,13 @@ def _measured(
     dx, dy, dz = x[0] - p[k, 0], x[1] - p[k, 1], x[2] - p[k, 2]
     cosine = -(dx * n[0] + dy * n[1] + dz * n[2]) / np.sqrt(dx * dx + dy * dy + dz * dz)
     z, u, v = pixel_of(camera, R, p, k, x[0], x[1], x[2])
-    if cosine < FACING or u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1] or depth[k, v, u] == 0:
+    if cosine < FACING or u < _BESIDE or v < _BESIDE or u >= depth.shape[2] - _BESIDE or v >= depth.shape[1] - _BESIDE:
         return False, 0.0, 1.0
     m = depth[k, v, u] * unit
-    a, b = m * (u - camera[2]) / camera[0], m * (v - camera[3]) / camera[1]
+    a, b = (u - camera[2]) / camera[0], (v - camera[3]) / camera[1]
+    if m == 0 or not _faces_alike(depth[k], unit, camera, R, k, u, v, a, b, m, n, noise):
+        return False, 0.0, 1.0
+    a, b = m * a, m * b
     over = 0.0
     for c in range(3):
         at = R[k, c, 0] * a + R[k, c, 1] * b + R[k, c, 2] * m + p[k, c]
@@ -149,6 +199,22 @@ def _measured(
     row[0], row[1], row[2] = ay * n[2] - az * n[1], az * n[0] - ax * n[2], ax * n[1] - ay * n[0]
     row[3], row[4], row[5] = n[0], n[1], n[2]
     return True, over, noise * z * z * cosine + _FLOOR
+
+
+@numba.njit(cache=True, nogil=True)
+def _faces_alike(
+    image: Any, unit: float, camera: Any, R: Any, k: int, u: int, v: int, a: float, b: float, m: float, n: Any,
+    noise: float,
+) -> bool:  # fmt: skip
+    """Whether the surface at pixel (u, v), of depth m [m], faces about as n (3,) does.
+
+    What stands before a point is nearer, but may be no farther off its plane than the window.
+    """
+    faces, x, y = normal_of(image, unit, camera[0], camera[1], a, b, m, u, v, _BESIDE, noise)
+    if not faces:
+        return False
+    x, y, z = turned(R, k, x, y)
+    return bool(x * n[0] + y * n[1] + z * n[2] > _SAME_WAY * np.sqrt(x * x + y * y + z * z))
 
 
 @numba.njit(cache=True, nogil=True)
