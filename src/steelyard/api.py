@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 from steelyard.errors import BadDescription, BadInput, BadValue, CannotAnswer
 from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording, read_result
-from steelyard.io.in_file import in_file
-from steelyard.io.object_pose import ObjectPose, read_object_pose
+from steelyard.io.contents import in_file
 from steelyard.io.ply_files import read_mesh_noting
+from steelyard.io.recordings.description import ObjectPose, read_object_pose
 from steelyard.io.team_files import read_team
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording

@@ -10,7 +10,7 @@ import pytest
 import steelyard as sy
 from steelyard.identify.estimate import Estimate
 from steelyard.sanity.fitted import soft_arm
-from steelyard.sanity.fitted.soft_arm import USUAL, Softness, allow_softness
+from steelyard.sanity.fitted.yielding import USUAL, Softness, allow_softness
 from steelyard.simulate import hammer
 
 MOVED = np.array([0.0, 0, 0, 0, 2e-4, 0, 0, 1e-4, 0, 2e-4])

@@ -11,7 +11,7 @@ from scipy.ndimage import gaussian_filter1d
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted import two_masses as two_masses_module
-from steelyard.sanity.fitted.two_masses import TwoMasses, examine_masses, two_masses
+from steelyard.sanity.fitted.load_motion import TwoMasses, examine_masses, two_masses
 from steelyard.simulate.logs import simulate_log
 
 MOTIONS = ("stop_go", "dyn_slow", "dyn_fast")

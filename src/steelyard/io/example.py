@@ -1,10 +1,9 @@
-"""An example of a description, in the file's own words where they are known."""
+"""An example of a description, in the file's own words where they are known, and text as TOML writes it."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
-
-from steelyard.io.toml_string import toml_string
 
 HEAD = """\
 [log]
@@ -37,6 +36,12 @@ urdf        = "arm.urdf"     # put the file of your arm here
 sensor_link = "tool0"        # S: a link at the sensor's origin, along its axes
 """
 _WIDTH = 8
+
+
+def toml_string(text: str) -> str:
+    """Return a text in quotes, as a TOML file in UTF-8 holds it."""
+    # TOML knows no surrogate pairs, and takes no delete character as it is.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007F")
 
 
 def lines_of(rows: Mapping[str, str]) -> str:

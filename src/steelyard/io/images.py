@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
-from steelyard.io.bounds import read_whole
+from steelyard.io.contents import read_whole
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.views import Depths
 from steelyard.whole_files import write_bytes

@@ -13,9 +13,8 @@ from steelyard.datasets.track import MOTION, Track
 from steelyard.errors import BadFile
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.io.documents import load_json
+from steelyard.io.contents import in_file, load_json
 from steelyard.io.entries import is_number
-from steelyard.io.in_file import in_file
 from steelyard.io.json_arrays import Shape, array_of
 from steelyard.io.ply_files import read_mesh
 from steelyard.io.tables.array_table import ArrayTable, read_numbers

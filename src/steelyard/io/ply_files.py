@@ -10,8 +10,7 @@ import numpy as np
 
 from steelyard.errors import BadFile
 from steelyard.io.ascii_columns import numbers, typed
-from steelyard.io.bounds import read_whole
-from steelyard.io.in_file import in_file
+from steelyard.io.contents import in_file, read_whole
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
 

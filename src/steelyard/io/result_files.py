@@ -13,7 +13,7 @@ from steelyard.check import Array
 from steelyard.evidence import Evidence, PartMass
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import forms
-from steelyard.io.results.team_results import team_entries
+from steelyard.io.teams.team_results import team_entries
 from steelyard.team.estimate import TeamEstimate
 from steelyard.whole_files import write_text
 

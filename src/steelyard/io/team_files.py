@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
-from steelyard.io.documents import load_toml
+from steelyard.io.contents import load_toml
 from steelyard.io.recordings.arm_joints import arm_of, pose_channels, posed, with_joints_in_order
 from steelyard.io.recordings.description import default_gravity
 from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of

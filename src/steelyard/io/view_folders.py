@@ -14,11 +14,9 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.bounds import require_bounded
-from steelyard.io.documents import load_json, small_text
+from steelyard.io.contents import in_file, load_json, require_bounded, small_text
 from steelyard.io.entries import is_number
 from steelyard.io.images import MOST_PIXELS, read_colour, read_depth, require_images, write_image
-from steelyard.io.in_file import in_file
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
 from steelyard.whole_files import whole_folder, write_text

@@ -27,13 +27,13 @@ from steelyard.pipelines.options import Options
 from steelyard.sanity import examine_place, examine_room_bias, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
 from steelyard.sanity.aside import stands_aside
+from steelyard.sanity.fitted.biases import SeenRoomBias
 from steelyard.sanity.fitted.full_fit import force_left
 from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
-from steelyard.sanity.fitted.room_bias import SeenRoomBias
 from steelyard.sanity.fitted.sensor_matrix import turn_of
 from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
-from steelyard.sanity.holding.small_slip import small_slip
+from steelyard.sanity.holding.load_change import small_slip
 
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"

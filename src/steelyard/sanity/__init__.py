@@ -2,18 +2,14 @@
 
 from steelyard.sanity.after import of_answer, of_rows, row_noise
 from steelyard.sanity.before import examine
+from steelyard.sanity.fitted.biases import drift_of, examine_room_bias
 from steelyard.sanity.fitted.density import impossible_density, maybe_hollow
-from steelyard.sanity.fitted.drift import drift_of
-from steelyard.sanity.fitted.free_motion import examine_motion
 from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
+from steelyard.sanity.fitted.load_motion import examine_masses, examine_motion
 from steelyard.sanity.fitted.misplaced import examine_place
 from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
-from steelyard.sanity.fitted.room_bias import examine_room_bias
-from steelyard.sanity.fitted.sagging import allow_sag
 from steelyard.sanity.fitted.sensor_matrix import examine_sensor
-from steelyard.sanity.fitted.slow_sensor import allow_filter
-from steelyard.sanity.fitted.soft_arm import allow_softness
-from steelyard.sanity.fitted.two_masses import examine_masses
+from steelyard.sanity.fitted.yielding import allow_filter, allow_sag, allow_softness
 from steelyard.sanity.one_body import one_body
 from steelyard.sanity.rows.frozen_rows import dead_channels
 

@@ -17,7 +17,6 @@ from steelyard.io.entries import listed
 from steelyard.io.recordings.counted import counted, part_names
 from steelyard.io.recordings.description import ASSUMED, Description, default_gravity
 from steelyard.io.recordings.not_told import cannot_tell, left_out, numbered_lines, own_lines, require_told
-from steelyard.io.recordings.sizes import SLOWEST, median_size, stamp_unit, unit_by_size
 from steelyard.io.streams.channels import channel_with_gaps
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.streams.missing_rows import stand_apart
@@ -34,7 +33,7 @@ from steelyard.io.streams.usual_names import (
 )
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table
-from steelyard.io.units import UNITS, converted
+from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_unit, unit_by_size
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 _UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")

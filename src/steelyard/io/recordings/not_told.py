@@ -9,7 +9,6 @@ from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
 from steelyard.io.recordings.controllers import known_lines
 from steelyard.io.recordings.counted import joints, open_pose, open_quaternion, values
-from steelyard.io.recordings.sizes import SLOWEST, angle_unit, length_unit, stamp_unit
 from steelyard.io.streams.usual_names import (
     ANGLES,
     Names,
@@ -22,7 +21,7 @@ from steelyard.io.streams.usual_names import (
     vectors_named,
 )
 from steelyard.io.tables.files import Table
-from steelyard.io.units import ANGLE, UNITS
+from steelyard.io.units import ANGLE, SLOWEST, UNITS, angle_unit, length_unit, stamp_unit
 
 ATTITUDES = {"rotation", "gravity", "specific_force"}
 _ORDERS = ("quaternion-xyzw", "quaternion-wxyz")

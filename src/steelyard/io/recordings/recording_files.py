@@ -9,11 +9,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.example import columns_text
+from steelyard.io.example import columns_text, toml_string
 from steelyard.io.recordings.description import NOISE, SIGNS, Description, default_gravity
 from steelyard.io.streams.entries import FRAMED
 from steelyard.io.tables.files import TEXT
-from steelyard.io.toml_string import toml_string
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream
 from steelyard.spatial import Pose, Rotation
 from steelyard.whole_files import whole_folder, write_text

@@ -1,4 +1,8 @@
-"""The streams of a description opened and read: columns, channels in SI, seconds on one origin, names."""
+"""The streams of a description opened and read: columns, channels in SI, seconds on one origin, names.
+
+Of topics joined by time in one table (an outer join, as PlotJuggler and pandas write it) a row belongs to the streams
+that it holds numbers of: where one has a sample, the cells of the others are empty.
+"""
 
 from __future__ import annotations
 
@@ -8,13 +12,12 @@ from pathlib import Path
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
 from steelyard.io.entries import listed
 from steelyard.io.streams.channels import channel_with_gaps, require_one_length
-from steelyard.io.streams.clocks import Clock, common_origin, require_likely_step, steady
+from steelyard.io.streams.clocks import Clock, common_origin, one_column, require_likely_step, steady
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
-from steelyard.io.streams.split_stamps import one_column
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
 from steelyard.logs.recording import Stream
@@ -160,3 +163,24 @@ def _names(specs: Sequence[StreamSpec]) -> list[str]:
         before = called[:i].count(name)
         names.append(f"{name}#{before + 1}" if before else name)
     return names
+
+
+def own_rows(specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Columns]) -> list[Columns]:
+    """Return the cells of every stream without rows in which all its quantities are empty, where others share its file.
+
+    Streams without stamps keep all: their rows belong to those of the others by number.
+    """
+    shared = [id(table) for table in tables]
+    stamps = [time_columns(spec, table) for spec, table in zip(specs, tables, strict=True)]
+    return [
+        _own(mine, clock) if clock and shared.count(table) > 1 else mine
+        for mine, clock, table in zip(cells, stamps, shared, strict=True)
+    ]
+
+
+def _own(cells: Columns, clock: Sequence[int]) -> Columns:
+    """Return the rows that hold a quantity; all where none does, or where lengths differ, which others refuse."""
+    if len({len(column) for column in cells.values()}) > 1:
+        return cells
+    empty: Mask = np.logical_and.reduce([np.isnan(column) for n, column in cells.items() if n not in clock])
+    return cells if empty.all() or not empty.any() else {n: column[~empty] for n, column in cells.items()}

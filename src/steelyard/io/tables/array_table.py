@@ -20,7 +20,7 @@ import numpy as np
 from numpy.lib import format as npy
 
 from steelyard.errors import BadFile
-from steelyard.io.bounds import require_bounded
+from steelyard.io.contents import require_bounded
 from steelyard.io.table_header import Columns, Header
 
 _WIDEST = 4096

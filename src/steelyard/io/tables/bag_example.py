@@ -1,13 +1,14 @@
-"""An example of a description of a bag, in its own topics where their messages are the usual ones."""
+"""An example of a description of a bag, in its own topics and frames where its messages are the usual ones."""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import islice
+from typing import Any
 
-from steelyard.io.bags import TRANSFORMS, Topic
-from steelyard.io.example import HEAD, lines_of
-from steelyard.io.tables.bag_frames import Frames
-from steelyard.io.toml_string import toml_string
+from steelyard.io.bags import TRANSFORMS, Bag, Topic
+from steelyard.io.example import HEAD, lines_of, toml_string
 
 _WRENCH = {
     "geometry_msgs/msg/WrenchStamped": ("wrench.force", "wrench.torque"),
@@ -22,6 +23,10 @@ _POSE = {
 _JOINTS = {"joint_position": '{ columns = ["position"], unit = "rad" }'}
 _FELT = {"specific_force": '{ columns = ["linear_acceleration"], unit = "m/s^2" }   # an accelerometer on the sensor'}
 _ROBOT = 'urdf        = "arm.urdf"   # put the file of your arm here\n'
+
+_BASE, _SENSOR = "base_link", "tool0"  # where the bag tells none
+_IN_FRAMES = ("geometry_msgs/msg/PoseStamped", "geometry_msgs/msg/TransformStamped")
+_LOOKED_AT = 500  # messages of a topic: publishers of transforms take turns
 
 
 def bag_example(path: str, topics: Sequence[Topic], frames: Frames) -> str:
@@ -59,3 +64,49 @@ def first_wrench(topics: Sequence[Topic]) -> Topic | None:
 
 def _stream(path: str, topic: Topic, lines: dict[str, str]) -> str:
     return lines_of({"path": toml_string(path), "topic": toml_string(topic.name), **lines})
+
+
+@dataclass(frozen=True)
+class Frames:
+    """The frames of the base and of the sensor, and whether the wrench is in the base's axes."""
+
+    base: str
+    sensor: str
+    felt_in_base: bool
+
+
+def frames_of(bag: Bag, wrench: str | None) -> Frames:
+    """Return the frames beside those of the topic `wrench`.
+
+    The base is the frame that carries the sensor's, "base_link" where that is on the way up. A wrench whose frame is
+    the one that poses are told in, and hangs on nothing, is in the base's axes, as some controllers give it.
+    """
+    felt = next((_frame(message) for _, message in bag.messages(wrench)), "") if wrench else ""
+    parent = _parents(bag)
+    told = {frame for topic in bag.topics if topic.kind in _IN_FRAMES for frame in _frames(bag, topic.name)}
+    if felt and felt not in parent and felt in {*parent.values(), *told}:
+        return Frames(felt, _SENSOR, True)
+    line = [felt or _SENSOR]
+    while line[-1] in parent and parent[line[-1]] not in line:
+        line.append(parent[line[-1]])
+    return Frames(_BASE if _BASE in line or len(line) == 1 else line[-1], line[0], False)
+
+
+def _parents(bag: Bag) -> dict[str, str]:
+    """Return the first parent that transforms name of each frame."""
+    out: dict[str, str] = {}
+    for topic in bag.topics:
+        if topic.kind in TRANSFORMS:
+            for _, message in islice(bag.messages(topic.name), _LOOKED_AT):
+                for each in message.transforms:
+                    out.setdefault(each.child_frame_id.lstrip("/"), _frame(each))
+    return out
+
+
+def _frames(bag: Bag, topic: str) -> set[str]:
+    return {_frame(message) for _, message in islice(bag.messages(topic), 1)}
+
+
+def _frame(message: Any) -> str:
+    """Return the frame that a message's header names, "" where it has none."""
+    return str(getattr(getattr(message, "header", None), "frame_id", "")).lstrip("/")

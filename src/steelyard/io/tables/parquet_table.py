@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
-from steelyard.io.bounds import require_bounded
+from steelyard.io.contents import require_bounded
 from steelyard.io.table_header import Columns, Header
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from steelyard.check import Integers
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
-from steelyard.io.bounds import require_bounded
+from steelyard.io.contents import require_bounded
 from steelyard.io.entries import listed
 from steelyard.io.rotations import NORM, rotation_of
 from steelyard.io.streams.missing_rows import MOST_MISSING

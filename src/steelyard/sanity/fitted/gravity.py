@@ -8,8 +8,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.axis_words import direction_words
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.words import direction_words
 from steelyard.spatial import Rotation
 
 _ROUNDS, _FEWEST_ROWS = 4, 8

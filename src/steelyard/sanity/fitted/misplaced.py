@@ -15,13 +15,12 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.aside import stands_aside
-from steelyard.sanity.axis_words import axis_words
-from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
+from steelyard.sanity.fitted.full_fit import CALM, NOISE, Rows, moves, noise_share
+from steelyard.sanity.fitted.load_motion import two_masses
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
-from steelyard.sanity.fitted.two_masses import two_masses
 from steelyard.sanity.readings.levers import UNITS, compared
 from steelyard.sanity.readings.torques import opposed
+from steelyard.sanity.words import axis_words
 from steelyard.spatial import cross_matrix, lever_matrix
 
 # A point this far [m] from S is worth a word, if it is so many standard deviations from none, by leaving out stretches,

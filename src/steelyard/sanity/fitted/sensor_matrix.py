@@ -19,10 +19,9 @@ from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.aside import stands_aside
-from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.readings.glance import stream_of
+from steelyard.sanity.words import axis_words, mount_of, mount_remedy, vector
 from steelyard.spatial import Rotation, cross_matrix
 
 # A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many

@@ -15,7 +15,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import REMEDIES, Finding, percent
 from steelyard.logs.recording import Recording
-from steelyard.sanity.readings.blind_tilt import blind_tilt
 from steelyard.sanity.readings.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.readings.glance import Glance, glance
 from steelyard.sanity.readings.level import examine_level
@@ -30,10 +29,9 @@ from steelyard.sanity.readings.rivals import (
     rival_findings,
     sign_of,
 )
-from steelyard.sanity.readings.swapped import examine_swapped
-from steelyard.sanity.readings.tilt import blind_axis
-from steelyard.sanity.readings.torques import examine_torques
-from steelyard.sanity.readings.weightless import require_weight
+from steelyard.sanity.readings.silent import require_weight
+from steelyard.sanity.readings.tilt import blind_axis, blind_tilt
+from steelyard.sanity.readings.torques import examine_swapped, examine_torques
 from steelyard.sanity.rows.leaps import examine_leaps
 
 # So many mistakes of one description are put right.

@@ -8,13 +8,11 @@ import numpy as np
 
 from steelyard.findings import Finding, percent
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.axis_words import direction_words
-from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.readings.glance import Glance
-from steelyard.sanity.readings.mirrored import Mirror, mirrored
 from steelyard.sanity.readings.rivals import LEVEL, MUCH_BETTER, STEEP, Reading, sign_of
 from steelyard.sanity.readings.static_fit import StaticFit
-from steelyard.sanity.readings.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
+from steelyard.sanity.readings.tilt import GlanceTilt, Mirror, Turn, mirrored, tilt_of, turned_sensor
+from steelyard.sanity.words import direction_words, mount_of, mount_remedy, vector
 
 # With fewer poses or stretches than this, a direction of gravity fits by chance.
 FEWEST_BLOCKS = 6

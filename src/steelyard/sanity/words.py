@@ -1,9 +1,27 @@
-"""The mount that puts a turned wrench right, as a description has it."""
+"""Axes and directions as findings tell them, and the mount that puts a turned wrench right as a description has it."""
 
 from __future__ import annotations
 
+import numpy as np
+
+from steelyard.check import Array
 from steelyard.logs.recording import Stream
 from steelyard.spatial import Rotation
+
+
+def axis_words(axis: Array) -> str:
+    """Return an axis (3,), which points either way, with its largest component positive."""
+    return _listed(axis * np.sign(axis[np.abs(axis).argmax()]), 2)
+
+
+def direction_words(vector: Array) -> str:
+    """Return where a vector (3,) points."""
+    return _listed(vector / np.linalg.norm(vector), 3)
+
+
+def _listed(vector: Array, places: int) -> str:
+    # Adding zero turns a minus zero, which rounding leaves, into a plain one.
+    return ", ".join(f"{v:.{places}f}" for v in np.round(vector, places) + 0.0)
 
 
 def mount_of(stream: Stream, turn: Rotation) -> Rotation:

@@ -1,17 +1,49 @@
-"""JSON and TOML files read whole, with or without the mark that Windows editors put in front of UTF-8."""
+"""Files read whole, no larger than is bounded, JSON and TOML of them as tables; what is wrong names the file.
+
+A few kB from a stranger may claim, or unpack to, many GB.
+"""
 
 from __future__ import annotations
 
 import json
 import tomllib
+from collections.abc import Callable
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
 
-from steelyard.errors import BadDescription, BadFile
+from steelyard.errors import BadDescription, BadFile, BadValue
+
+MOST_BYTES = 2 * 1024**3  # six hours of a log at 1 kHz, 80 million points
 
 _LARGEST_JSON = 64_000_000
 _LARGEST_TOML = 4_000_000
 _MOST_DOTS = 200  # in a line: Python takes the square of their number of steps for a key with dots
+
+T = TypeVar("T")
+
+
+def require_bounded(path: Path, size: int, most: int | None = None) -> None:
+    """Raise BadFile where reading would take more memory than `most`, MOST_BYTES if left out.
+
+    size  [bytes] what would be unpacked, known before it is
+    """
+    most = MOST_BYTES if most is None else most
+    if size > most:
+        raise BadFile(
+            f"{path}: holds {size / 1024**2:.0f} MiB, more than the {most // 1024**2} MiB that are read. "
+            "Give fewer rows, points or views at once."
+        )
+
+
+def read_whole(path: Path) -> bytes:
+    """Return the content of a file; raises BadFile where it cannot be read, is too large or a device."""
+    try:
+        if path.is_char_device():
+            raise BadFile(f"{path}: this is a device, which has no end. Give a file.")
+        require_bounded(path, path.stat().st_size)
+        return path.read_bytes()
+    except OSError as error:
+        raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
 
 
 def load_json(path: Path, what: str, hint: str) -> dict[str, Any]:
@@ -65,3 +97,11 @@ def small_text(path: Path, what: str, kind: str, largest: int) -> str:
     except OSError as error:
         raise BadFile(f"{path}: cannot be read ({error.strerror}).") from None
     return content.decode("utf-8-sig")
+
+
+def in_file(path: Path, make: Callable[[], T]) -> T:
+    """Return make(), with the path in front of what is wrong with the numbers."""
+    try:
+        return make()
+    except BadValue as error:
+        raise BadFile(f"{path}: {error}") from None
