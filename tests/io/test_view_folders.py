@@ -13,8 +13,8 @@ import pytest
 
 from steelyard.errors import BadFile
 from steelyard.io import contents, view_folders
+from steelyard.io.object_folders import write_object_views
 from steelyard.io.recordings.description import read_object_pose
-from steelyard.io.shapes.object_writing import write_object_views
 from steelyard.io.view_folders import read_views, write_views
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation

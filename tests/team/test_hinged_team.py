@@ -17,8 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.inertia.regressor import basis
-from steelyard.io.result_files import result_dict, write_result
-from steelyard.io.result_reading import read_result
+from steelyard.io.result_files import read_result, result_dict, write_result
 from steelyard.report import render
 from steelyard.report.team_page import team_page
 from steelyard.simulate.team import TeamTrial, simulate_team

@@ -1,4 +1,4 @@
-"""Files read whole, no larger than is bounded, JSON and TOML of them as tables; what is wrong names the file.
+"""Files read whole, no larger than is bounded: JSON and TOML as tables, words as numbers; what is wrong names the file.
 
 A few kB from a stranger may claim, or unpack to, many GB.
 """
@@ -7,10 +7,13 @@ from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
+import numpy as np
+
+from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadValue
 
 MOST_BYTES = 2 * 1024**3  # six hours of a log at 1 kHz, 80 million points
@@ -20,6 +23,8 @@ _LARGEST_TOML = 4_000_000
 _MOST_DOTS = 200  # in a line: Python takes the square of their number of steps for a key with dots
 
 T = TypeVar("T")
+
+_LONGEST_NUMBER = 400  # characters: the longest that Python writes of a double has some 330
 
 
 def require_bounded(path: Path, size: int, most: int | None = None) -> None:
@@ -105,3 +110,31 @@ def in_file(path: Path, make: Callable[[], T]) -> T:
         return make()
     except BadValue as error:
         raise BadFile(f"{path}: {error}") from None
+
+
+def numbers(path: Path, what: str, words: Sequence[bytes]) -> Array:
+    """Return words (N,) as numbers; raises BadFile, which names `what` they are of, where one is none."""
+    other = BadFile(f"{path}: {what} holds a word that is no number.")
+    if max(map(len, words), default=0) > _LONGEST_NUMBER:
+        raise other  # an array of words gives each of them the room of the longest
+    try:
+        return np.array(words, dtype="S").astype(np.float64)
+    except ValueError:
+        raise other from None
+
+
+def typed(path: Path, what: str, values: Array, kind: str | np.dtype[Any]) -> np.ndarray[Any, np.dtype[Any]]:
+    """Return values (N, ..) as `kind`; raises BadFile where `what` counts in integers and a value does not fit.
+
+    NaN and numbers beyond the range would become any integer, and of fractions the whole part would be left.
+    """
+    dtype = np.dtype(kind)
+    if dtype.kind in "iu":
+        low, high = int(np.iinfo(dtype).min), int(np.iinfo(dtype).max)
+        good = (values >= low) & (values < float(high) + 1) & (values == np.rint(values))
+        if not good.all():
+            raise BadFile(
+                f"{path}: {what} holds {values[~good].flat[0]:g}; expected integers from {low} to {high}. "
+                "Save the file again."
+            )
+    return values.astype(dtype)

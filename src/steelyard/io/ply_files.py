@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.ascii_columns import numbers, typed
-from steelyard.io.contents import in_file, read_whole
+from steelyard.io.contents import in_file, numbers, read_whole, typed
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
 

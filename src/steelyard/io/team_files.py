@@ -19,7 +19,6 @@ from steelyard.io.recordings.stream_files import open_tables, read_cells, stream
 from steelyard.io.streams.entries import StreamSpec
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, find_file
-from steelyard.io.teams.joint_angles import require_likely
 from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, parse_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
@@ -29,6 +28,9 @@ from steelyard.robots.omnid import Omnid
 from steelyard.robots.serial import SerialArm
 
 _FEWEST = 50  # rows in which a torque shows
+
+# Readings may pass a stop by play and by the zero of an encoder; where most do by more than this [rad] they are others.
+_BEYOND = np.deg2rad(25.0)
 
 
 def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
@@ -205,7 +207,7 @@ def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
     joints = channels["joint_position"]
     good: Mask = np.asarray(np.isfinite(joints).all(1))
     robot = Omnid()
-    require_likely(robot, joints[good])
+    _require_likely(robot, joints[good])
     out |= pose_channels(robot.pose(joints[good]), good)
     if "joint_torque" in channels:
         _require_live(channels["joint_torque"])
@@ -223,3 +225,39 @@ def _require_live(torques: Array) -> None:
             f"torque {int(dead.argmax()) + 1} of 3 is exactly 0 in all {len(torques)} rows and the others are not: its "
             "channel is dead. Repair it, or leave the torques of this recording out."
         )
+
+
+def _require_likely(robot: Omnid, joints: Array) -> None:
+    """Raise BadValue where joint angles (T, 6) [rad] are those of no Omnid, so that columns or units are others.
+
+    Radians read as degrees keep every arm within two degrees of level, where the platform is below what it works at.
+    """
+    if not len(joints):
+        return
+    low, high = robot.arm_limits
+    x, y, z = (stop + _BEYOND for stop in robot.gimbal_stops)
+    wide = replace(robot, arm_limits=(low - _BEYOND, high + _BEYOND), gimbal_stops=(x, y, z))
+    middle = np.median(joints, axis=0)
+    if not _works(wide, middle, joints):
+        for said, looks, factor in (("rad", "degrees", np.pi / 180), ("deg", "radians", 180 / np.pi)):
+            if _works(wide, factor * middle, factor * joints):
+                raise BadValue(
+                    f'joint angles look like {looks} that are read as "{said}": they would be between '
+                    f"{np.rad2deg(joints.min()):.3g} and {np.rad2deg(joints.max()):.3g} deg, where no Omnid works. Set "
+                    f'unit = "{looks[:3]}" for "joint_position".'
+                )
+    try:
+        wide.require_within(middle)
+    except BadValue:
+        wide.require_within(joints)
+
+
+def _works(robot: Omnid, middle: Array, joints: Array) -> bool:
+    """Return whether arms and gimbal are mostly within their stops and the platform no lower than it works."""
+    try:
+        robot.require_within(middle)
+        robot.require_within(np.quantile(joints, (0.05, 0.95), axis=0))
+        height = robot.pose(middle).position[2] + robot.home_height
+    except BadValue:
+        return False
+    return bool(robot.work_box[2] <= height <= robot.work_box[3] + 0.1)

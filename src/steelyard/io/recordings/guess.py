@@ -17,9 +17,8 @@ from steelyard.io.entries import listed
 from steelyard.io.recordings.counted import counted, part_names
 from steelyard.io.recordings.description import ASSUMED, Description, default_gravity
 from steelyard.io.recordings.not_told import cannot_tell, left_out, numbered_lines, own_lines, require_told
-from steelyard.io.streams.channels import channel_with_gaps
+from steelyard.io.streams.channels import channel_with_gaps, stand_apart
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
-from steelyard.io.streams.missing_rows import stand_apart
 from steelyard.io.streams.usual_names import (
     STEMS,
     Names,

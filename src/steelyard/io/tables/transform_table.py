@@ -23,7 +23,7 @@ from steelyard.io.bags import TRANSFORMS, Bag, open_bag
 from steelyard.io.contents import require_bounded
 from steelyard.io.entries import listed
 from steelyard.io.rotations import NORM, rotation_of
-from steelyard.io.streams.missing_rows import MOST_MISSING
+from steelyard.io.streams.channels import MOST_MISSING
 from steelyard.io.table_header import Columns, Header
 from steelyard.io.tables.bag_table import STAMP, stamps_of
 from steelyard.spatial import Pose, Rotation

@@ -13,8 +13,7 @@ import numpy as np
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.repeated_rows import columns_of, repeats, rising
-from steelyard.sanity.rows.clipped_rows import clipped_table, known_gravity, without_clipped
-from steelyard.sanity.rows.frozen_rows import without_frozen
+from steelyard.sanity.rows.stuck_rows import clipped_table, known_gravity, without_clipped, without_frozen
 
 
 def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:

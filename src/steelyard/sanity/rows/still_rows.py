@@ -1,4 +1,9 @@
-"""Rows of still poses: which belong together, and their means over windows of time or of rows."""
+"""Rows of still poses: which belong together, their means over windows of time or of rows, and those that err alike.
+
+Noise below the rate of a sensor makes rows remember each other; stiction, hysteresis and models of an arm shift all
+rows of a pose. Such rows are worth fewer than they are, and their error bars would be too narrow. Means over several
+times as many rows as noise remembers are no longer alike, and are read instead: in the end one mean for each pose.
+"""
 
 from __future__ import annotations
 
@@ -8,10 +13,20 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
-from steelyard.logs.recording import Stream
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.readings.glance import channel
 from steelyard.spatial import Rotation
 
 _KEPT = ("force", "torque", "rotation", "gravity", "specific_force")
+
+# Gravity turns by less between rows of one pose [rad], of which there are so many on average.
+SAME, FEWEST_ROWS = np.radians(2.0), 8.0
+# Rows remember each other where they are worth fewer by this factor; means are over so many times the factor.
+WORTH_LESS, TIMES = 1.5, 3.0
+# Correlations below this are chance.
+LEAST = 0.05
+# One log in so many whose poses scatter as their rows say is taken for one whose poses do not.
+CHANCE = 1e-4
 
 
 def spans(stretch: Integers) -> Integers:
@@ -65,3 +80,95 @@ def _means(values: Array, first: Integers, last: Integers) -> Array:
     sums = np.concatenate([np.zeros_like(values[:1]), np.cumsum(values - values[:1], axis=0)])
     count = np.maximum(last - first, 1).reshape(-1, *(1,) * (values.ndim - 1))
     return np.asarray((sums[last] - sums[first]) / count + values[:1])
+
+
+def examine_memory(recording: Recording) -> Recording:
+    """Return a table of still poses with rows that remember each other averaged; a note says so."""
+    if not all(s.time is None and s.poses for s in recording.streams):
+        return recording
+    down = next((d for s in recording.streams if (d := _down(s)) is not None), None)
+    felt = [s.channels[q] for s in recording.streams for q in ("force", "torque") if q in s.channels]
+    if down is None or any(len(values) != len(down) for values in felt):
+        return recording
+    poses = spans(np.cumsum(np.append(False, _apart(down[:-1], down[1:]) > SAME)))
+    middle = np.repeat(down[poses.mean(1).astype(np.int64)], np.diff(poses, axis=1)[:, 0], axis=0)
+    # Rows that turn little by little are a motion.
+    if len(down) < FEWEST_ROWS * len(poses) or (_apart(middle, down) > SAME).any():
+        return recording
+    worth = _worth(np.hstack(felt), poses)
+    pull = down if down.ndim == 2 else np.swapaxes(down, 1, 2) @ recording.gravity
+    apart = _apart_by(recording, pull, poses, worth)
+    if apart < WORTH_LESS and worth < WORTH_LESS:
+        return recording
+    length = np.inf if apart >= WORTH_LESS else float(np.ceil(TIMES * worth))
+    clocks = [replace(s, time=np.arange(len(s), dtype=np.float64)) for s in recording.streams]
+    streams, rows = as_table(clocks, split(poses - np.array([0.0, 1.0]), length))
+    note = f"rows of one pose remember each other over {worth:.0f} rows: means over {length:.0f} were read"
+    if apart >= WORTH_LESS:
+        note = f"poses scatter {apart:.2g} times as much as their rows tell: one mean for each pose was read"
+    return replace(recording, streams=streams, notes=(*recording.notes, f"{note}, {rows} in all"))
+
+
+def _down(stream: Stream) -> Array | None:
+    """Return rotations (N, 3, 3) of a stream, or else gravity (N, 3) as one of its channels tells it."""
+    return next((stream.channels[q] for q in ("rotation", "gravity", "specific_force") if q in stream.channels), None)
+
+
+def _apart(down: Array, other: Array) -> Array:
+    """Return the angle (N,) [rad] between rows of rotations (N, 3, 3) or of vectors (N, 3)."""
+    if down.ndim == 3:
+        return angles(np.swapaxes(down, 1, 2) @ other)
+    sizes = np.linalg.norm(down, axis=1) * np.linalg.norm(other, axis=1)
+    return np.asarray(np.arccos(np.clip((down * other).sum(1) / np.maximum(sizes, 1e-300), -1.0, 1.0)))
+
+
+def _worth(values: Array, poses: Integers) -> float:
+    """Return how many rows of values (N, k) are worth one, by how alike neighbours in a pose are; 1 of white noise."""
+    count = np.diff(poses, axis=1)[:, 0]
+    means = np.add.reduceat(values, poses[:, 0], axis=0) / count[:, None]
+    left = values - np.repeat(means, count, axis=0)
+    left = left / np.maximum(left.std(0), 1e-300)
+    number = np.repeat(np.arange(len(poses)), count)
+    worth = 1.0
+    for lag in range(1, int(count.max()) // 2):
+        pairs = number[lag:] == number[:-lag]
+        alike = float((left[lag:] * left[:-lag])[pairs].sum() / max(float((left**2).sum()), 1e-300))
+        if alike < LEAST:
+            break
+        worth += 2 * alike
+    return worth
+
+
+def _apart_by(recording: Recording, pull: Array, poses: Integers, worth: float) -> float:
+    """Return how many times more than by their rows' scatter the poses' means are off; 0 where chance may do it.
+
+    `worth` rows of a pose are worth one. Off from what is linear in gravity `pull` (N, 3) in S, up to a constant turn,
+    so that gains, signs, and where and how the sensor sits, do not count.
+    """
+    from scipy.special import gammaincc
+
+    felt = _felt(recording)
+    if felt is None:
+        return 0.0
+    count = np.diff(poses, axis=1)[:, 0]
+    means, down = (np.add.reduceat(v, poses[:, 0], axis=0) / count[:, None] for v in (felt, pull))
+    within = np.square(felt - np.repeat(means, count, axis=0)).sum(0) / max(len(felt) - len(poses), 1)
+    heard, root = within > 0, np.sqrt(count)[:, None]
+    A = root * np.concatenate([np.ones((len(poses), 1)), down], axis=1)
+    fit, _, rank, _ = np.linalg.lstsq(A, root * means, rcond=1e-6)
+    excess = float((np.square(root * means - A @ fit).sum(0)[heard] / within[heard]).sum()) / worth
+    freedom = int(heard.sum()) * (len(poses) - int(rank))
+    return float(np.sqrt(excess / freedom)) if freedom and gammaincc(freedom / 2, excess / 2) < CHANCE else 0.0
+
+
+def _felt(recording: Recording) -> Array | None:
+    """Return torque and force (N, 6) in S, up to where and how the sensor sits; None where no rotation leads there."""
+    turn = next((v for _, _, v in channel(recording, "rotation")), None)
+    parts = []
+    for stream, part, values in channel(recording, "torque", "force"):
+        if stream.frames.get(part, "S") == "W":
+            if turn is None:
+                return None
+            values = np.einsum("nji,nj->ni", turn, values)
+        parts.append(values)
+    return np.concatenate(parts, axis=1)
