@@ -175,7 +175,8 @@ def _entry(given: Any, where: str) -> Entry:
 def _stream(entry: Entry, name: str) -> tuple[StreamSpec, Columns]:
     """Return one stream as a description would tell it, and its columns; raises BadInput."""
     where, cells = entry.where, list[Given]()
-    zero = _is_zero(entry.values.get("torque"))
+    torque = entry.values.get("torque")
+    zero = isinstance(torque, str) and torque == "zero"
     given = [key for key in _KEYS if key in entry and not (zero and key == "torque")]
     if not given:
         raise entry.error(f"no quantity is given, so there are no data. Example: {_CALL}")
@@ -193,10 +194,6 @@ def _stream(entry: Entry, name: str) -> tuple[StreamSpec, Columns]:
     delay = entry.bounded("delay", entry.number("delay"), LONGEST_DELAY) if "delay" in entry else None
     mount = _mount(entry, given) if "mount" in entry else None
     return StreamSpec(called, tuple(quantities), where, time, poses, zero, delay, mount), dict(enumerate(cells))
-
-
-def _is_zero(torque: Any) -> bool:
-    return isinstance(torque, str) and torque == "zero"
 
 
 def _time(entry: Entry, poses: bool, cells: list[Given]) -> TimeSpec | None:
@@ -254,7 +251,8 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
         )
     if form not in possible:
         said = f'form="{form}" does not fit' if form else "does not say what the numbers are"
-        raise BadValue(f"{where}: shape {np.shape(given)} {said}. Say form={_one_of(possible)}; it turns S into W.")
+        forms = " or ".join(f'"{name}"' for name in possible)
+        raise BadValue(f"{where}: shape {np.shape(given)} {said}. Say form={forms}; it turns S into W.")
     if form in ANGULAR and float(np.nanmax(np.abs(values), initial=0.0)) > TURNS:
         raise BadValue(
             f"{where}: angles are in rad, and these reach {np.nanmax(np.abs(values)):.4g}, which looks like degrees. "
@@ -263,27 +261,18 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
     return values, form
 
 
-def _one_of(names: Sequence[str]) -> str:
-    return " or ".join(f'"{name}"' for name in names)
-
-
 def _frames(entry: Entry, given: Sequence[str]) -> dict[str, str]:
     """Return in which axes quantities are given; raises BadInput."""
     framed = [key for key in given if key in FRAMED]
     said = entry.values.get("frame", "S")
     frames = dict(said) if isinstance(said, Mapping) else dict.fromkeys(framed, said)
-    for key, frame in frames.items():
-        if key not in framed:
+    for key, frame in frames.items() if isinstance(said, Mapping) else [(None, said)]:
+        if key is not None and key not in framed:
             raise entry.error(f"frame is of {listed(framed) or 'nothing'} here; got {key!r}.")
-        _require_frame(frame, f"{entry.where}, frame")
-    if not isinstance(said, Mapping):
-        _require_frame(said, f"{entry.where}, frame")
+        if frame not in ("S", "W"):
+            wanted = '"S" (axes of the sensor) or "W" (of the world, the base)'
+            raise BadValue(f"{entry.where}, frame: expected {wanted}; got {frame!r}.")
     return frames | ({"position": "W"} if "position" in given else {})
-
-
-def _require_frame(frame: object, where: str) -> None:
-    if frame not in ("S", "W"):
-        raise BadValue(f'{where}: expected "S" (axes of the sensor) or "W" (of the world, the base); got {frame!r}.')
 
 
 def _mount(entry: Entry, given: Sequence[str]) -> Mount:

@@ -15,7 +15,7 @@ import numpy as np
 from steelyard.errors import BadFile, BadValue
 from steelyard.findings import REMEDIES, Finding
 from steelyard.io.contents import in_file
-from steelyard.io.ply_files import read_ply
+from steelyard.io.ply_files import ply, read_ply
 from steelyard.io.shapes.pcd_files import read_pcd
 from steelyard.io.tables.array_table import ArrayTable, npz, read_numbers
 from steelyard.shape.cloud import Cloud
@@ -94,15 +94,12 @@ def _of_arrays(path: Path) -> Cloud:
     if "xyz" not in header.groups:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
-    wanted = ("xyz", _coloured(header.groups), "label", "normals", "seen")
+    # Other programs call colours by other names.
+    coloured = next((name for name in ("rgb", "colors", "colours") if name in header.groups), "rgb")
+    wanted = ("xyz", coloured, "label", "normals", "seen")
     found = read_numbers(path, [name for name in (*wanted, SCAN, CELLS) if name in header.shapes])
     kept = kept_of(path, found.get(SCAN), found.get(CELLS))
     return _checked(path, tuple(found.get(name) for name in wanted), kept)
-
-
-def _coloured(names: Any) -> str:
-    """Return the name of the array that holds colours, as other programs call it too."""
-    return next((name for name in ("rgb", "colors", "colours") if name in names), "rgb")
 
 
 def _checked(path: Path, points: tuple[Any, ...], kept: Kept | None) -> Cloud:
@@ -155,13 +152,8 @@ def _ply(cloud: Cloud) -> bytes:
     table = np.zeros(len(cloud), [(name, kind) for name, _, kind, _ in fields])
     for name, _, _, values in fields:
         table[name] = values
-    header = ["ply", "format binary_little_endian 1.0", "comment units metres", f"element vertex {len(cloud)}"]
-    header += [f"property {word} {name}" for name, word, _, _ in fields]
-    beside = _beside(cloud)
-    for name, values in beside.items():
-        header += [f"element {name} {len(values)}", "property uchar value"]
-    body = [table.tobytes(), *(values.tobytes() for values in beside.values())]
-    return ("\n".join([*header, "end_header"]) + "\n").encode() + b"".join(body)
+    beside = {name: (["uchar value"], values) for name, values in _beside(cloud).items()}
+    return ply({"vertex": ([f"{word} {name}" for name, word, _, _ in fields], table), **beside})
 
 
 def bytes_of(kept: Kept) -> Any:

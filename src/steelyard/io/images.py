@@ -17,17 +17,13 @@ from steelyard.whole_files import write_bytes
 MOST_PIXELS = 64_000_000
 
 
-def _pillow() -> Any:
+def require_images() -> Any:
+    """Return what reads and writes images; raises MissingDependency where nothing does here."""
     try:
         import PIL.Image
     except ImportError:
         raise MissingDependency.of("pillow", "images", "Reading and writing images") from None
     return PIL.Image
-
-
-def require_images() -> None:
-    """Raise MissingDependency where nothing reads and writes images here."""
-    _pillow()
 
 
 def read_depth(path: Path) -> Depths:
@@ -47,7 +43,7 @@ def read_colour(path: Path) -> Colours:
 
 
 def _opened(path: Path, formats: tuple[str, ...]) -> Any:
-    pillow = _pillow()
+    pillow = require_images()
     if not path.exists():
         raise BadFile(f"{path}: this image is missing.")
     content = read_whole(path)
@@ -72,5 +68,5 @@ def _pixels(path: Path, image: Any, mode: str | None = None) -> Any:
 def write_image(path: Path, pixels: Depths | Colours) -> None:
     """Write (H, W) uint16 or (H, W, 3) uint8 as PNG; raises BadFile."""
     content = io.BytesIO()
-    _pillow().fromarray(np.ascontiguousarray(pixels)).save(content, "PNG", compress_level=1)
+    require_images().fromarray(np.ascontiguousarray(pixels)).save(content, "PNG", compress_level=1)
     write_bytes(path, content.getvalue())

@@ -33,6 +33,20 @@ def array_or_none(path: Path, entry: Mapping[str, Any], key: str, shape: Shape) 
     return np.array(value, np.float64) if _fits(value, shape) else None
 
 
+def object_of(path: Path, entry: Mapping[str, Any], key: str, of: str = "") -> Mapping[str, Any]:
+    """Return the object under `key`, empty where it is missing or null; raises BadFile, which says what it is `of`."""
+    value = entry.get(key) or {}
+    if not isinstance(value, dict):
+        raise BadFile(f'{path}: "{key}" must be one object{of}.')
+    return value
+
+
+def arrays_of(path: Path, entry: Mapping[str, Any], key: str, shape: Shape, of: str) -> dict[str, Array]:
+    """Return the arrays of one shape that the object under `key` names; raises BadFile."""
+    values = object_of(path, entry, key, of)
+    return {str(name): array_of(path, values, name, shape, f" of {key}") for name in values}
+
+
 def _fits(value: Any, shape: Shape, gaps: bool = False) -> bool:
     """Whether a value is lists of lists of finite numbers, or with `gaps` of null, as long as the shape says."""
     if not shape:

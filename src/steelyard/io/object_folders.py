@@ -95,19 +95,21 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
     cloud = _cloud(folder / "points.npz", mesh)
     truth, X_SO = truth_in_sensor(folder / "truth.json", facts)
     unseen = unseen_finding(parts, cloud)
+    rows = _rows(facts, parts)
+    names, gradings = (tuple(str(row.get(key, "")) for row in rows) for key in ("name", "grading"))
     return KnownObject(
         name=str(facts.get("slug", folder.resolve().name)),
         mesh=mesh,
         parts=parts,
-        part_masses=_masses(folder / "truth.json", facts, parts),
-        part_materials=tuple(str(row.get("material_fitted") or "") for row in _rows(facts, parts)),
+        part_masses=_masses(folder / "truth.json", rows),
+        part_materials=tuple(str(row.get("material_fitted") or "") for row in rows),
         truth=truth,
         X_SO=X_SO,
         cloud=cloud,
         box=np.asarray(facts["reference_extents_sensor_m"], float),
         track=read_track(folder / "motion.npz") if motion else None,
-        part_names=_names(facts, parts),
-        gradings=_gradings(facts, parts),
+        part_names=names if all(names) else (),
+        gradings=gradings if any(gradings) else (),
         facts=facts,
         findings=tuple(finding for finding in (overlapping, unseen) if finding),
     )
@@ -158,21 +160,9 @@ def _rows(facts: dict[str, Any], parts: Parts) -> list[dict[str, Any]]:
     return [said.get(label, {}) for label in parts.label.tolist()]
 
 
-def _names(facts: dict[str, Any], parts: Parts) -> tuple[str, ...]:
-    """Return the name of each part where all have one."""
-    names = tuple(str(row.get("name", "")) for row in _rows(facts, parts))
-    return names if all(names) else ()
-
-
-def _gradings(facts: dict[str, Any], parts: Parts) -> tuple[str, ...]:
-    """Return how the density changes within each part; empty where all are homogeneous."""
-    said = tuple(str(row.get("grading", "")) for row in _rows(facts, parts))
-    return said if any(said) else ()
-
-
-def _masses(path: Path, facts: dict[str, Any], parts: Parts) -> Array | None:
+def _masses(path: Path, rows: list[dict[str, Any]]) -> Array | None:
     """Return the true mass (P,) of each part where all are known."""
-    masses = [row.get("mass_kg", row.get("mass_fitted_kg")) for row in _rows(facts, parts)]
+    masses = [row.get("mass_kg", row.get("mass_fitted_kg")) for row in rows]
     if any(mass is None for mass in masses):
         return None
     values = np.asarray(masses, float)

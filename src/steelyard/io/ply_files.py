@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -193,10 +194,15 @@ def write_mesh(mesh: TriangleMesh, path: Path | str) -> None:
         vertex[axis] = mesh.vertices[:, k]
     face = np.zeros(len(mesh), [("n", "u1"), ("v", "<i4", 3), ("rgb", "u1", 3), ("part", "<i4")])
     face["n"], face["v"], face["rgb"], face["part"] = 3, mesh.triangles, rgb, mesh.part
-    header = (
-        f"ply\nformat binary_little_endian 1.0\ncomment units metres\nelement vertex {len(vertex)}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(face)}\nproperty list uchar int vertex_indices\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int part\nend_header\n"
-    )
-    write_bytes(path, header.encode() + vertex.tobytes() + face.tobytes())
+    colours = (f"uchar {name}" for name in ("red", "green", "blue"))
+    places, faces = [f"double {axis}" for axis in "xyz"], ["list uchar int vertex_indices", *colours, "int part"]
+    write_bytes(path, ply({"vertex": (places, vertex), "face": (faces, face)}))
+
+
+def ply(elements: Mapping[str, tuple[Sequence[str], Column]]) -> bytes:
+    """Return a binary PLY file of elements: type and name of their properties, and their records (N,), packed alike."""
+    lines = ["ply", "format binary_little_endian 1.0", "comment units metres"]
+    for name, (properties, records) in elements.items():
+        lines += [f"element {name} {len(records)}", *(f"property {each}" for each in properties)]
+    body = b"".join(records.tobytes() for _, records in elements.values())
+    return "\n".join([*lines, "end_header", ""]).encode() + body

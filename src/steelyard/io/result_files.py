@@ -20,7 +20,7 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters, forms
 from steelyard.io.contents import in_file, load_json
-from steelyard.io.json_arrays import array_of, array_or_none
+from steelyard.io.json_arrays import array_of, array_or_none, object_of
 from steelyard.io.teams.team_results import team_entries, team_of
 from steelyard.team.estimate import TeamEstimate
 from steelyard.whole_files import write_text
@@ -34,6 +34,12 @@ ROUNDED = 0.01
 _WRITE_ONE = "Write one with: steelyard identify LOG -o FILE."
 
 MOST_PARTS = 100_000
+# Evidence that is one number, and what stands for it where it is not known.
+_EVIDENCE: dict[str, float | None] = {
+    "rank": 0, "condition": math.nan, "samples": 0, "still_samples": 0, "residual_force_N": math.nan,
+    "residual_torque_Nm": math.nan, "chi2_per_dof": None, "holdout_force_N": None, "holdout_torque_Nm": None,
+}  # fmt: skip
+_COUNTS = ("rank", "samples", "still_samples")
 
 
 def result_dict(estimate: Estimate) -> dict[str, Any]:
@@ -99,15 +105,7 @@ def _people(values: Array) -> dict[str, Any]:
 def _evidence(evidence: Evidence) -> dict[str, Any]:
     jackknife = evidence.jackknife_people
     return {
-        "rank": evidence.rank,
-        "condition": evidence.condition,
-        "samples": evidence.samples,
-        "still_samples": evidence.still_samples,
-        "residual_force_N": evidence.residual_force_N,
-        "residual_torque_Nm": evidence.residual_torque_Nm,
-        "chi2_per_dof": evidence.chi2_per_dof,
-        "holdout_force_N": evidence.holdout_force_N,
-        "holdout_torque_Nm": evidence.holdout_torque_Nm,
+        **{name: getattr(evidence, name) for name in _EVIDENCE},
         "spread": evidence.spread,
         "jackknife_std": None if jackknife is None else _people(jackknife),
     }
@@ -246,33 +244,16 @@ def _required(path: Path, row: Mapping[str, Any], key: str, where: str) -> float
 
 def _read_evidence(path: Path, values: Mapping[str, Any]) -> Evidence:
     """Return the evidence, that of no data where there is none; raises BadFile."""
-    seen = values.get("evidence") or {}
-    if not isinstance(seen, dict):
-        raise BadFile(f'{path}: "evidence" must be one object.')
+    seen = object_of(path, values, "evidence")
+    found: dict[str, Any] = {}
+    for name, unknown in _EVIDENCE.items():
+        value = _number(path, seen, name)
+        found[name] = unknown if value is None else int(value) if name in _COUNTS else value
     return Evidence(
-        rank=_count(path, seen, "rank"),
-        condition=_or_nan(path, seen, "condition"),
-        samples=_count(path, seen, "samples"),
-        still_samples=_count(path, seen, "still_samples"),
-        residual_force_N=_or_nan(path, seen, "residual_force_N"),
-        residual_torque_Nm=_or_nan(path, seen, "residual_torque_Nm"),
-        chi2_per_dof=_number(path, seen, "chi2_per_dof"),
-        holdout_force_N=_number(path, seen, "holdout_force_N"),
-        holdout_torque_Nm=_number(path, seen, "holdout_torque_Nm"),
+        **found,
         spread=array_or_none(path, seen, "spread", (10,)),
         jackknife_people=_read_people(path, seen.get("jackknife_std")),
     )
-
-
-def _count(path: Path, entry: Mapping[str, Any], key: str) -> int:
-    """Return a whole number, 0 where there is none."""
-    return int(_number(path, entry, key) or 0)
-
-
-def _or_nan(path: Path, entry: Mapping[str, Any], key: str) -> float:
-    """Return a number, NaN where there is none."""
-    value = _number(path, entry, key)
-    return float("nan") if value is None else value
 
 
 def _read_people(path: Path, entry: Any) -> Array | None:
@@ -291,9 +272,7 @@ def _read_people(path: Path, entry: Any) -> Array | None:
 
 def _delays(path: Path, values: Mapping[str, Any]) -> dict[str, float]:
     """Return the delay [s] of every stream; raises BadFile."""
-    entry = values.get("delays_s") or {}
-    if not isinstance(entry, dict):
-        raise BadFile(f'{path}: "delays_s" must be one object of numbers.')
+    entry = object_of(path, values, "delays_s", " of numbers")
     return {str(key): _number(path, entry, key) or 0.0 for key in entry}
 
 

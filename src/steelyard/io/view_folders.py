@@ -37,8 +37,9 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         raise BadFile(f"{folder}: no such folder. Views are a folder with camera.json, poses.csv and depth/.")
     camera = _camera(folder / "camera.json")
     names, X_WC = _poses(folder / "poses.csv")
-    intrinsics = in_file(folder / "camera.json", lambda: _intrinsics(camera))
-    size = (intrinsics.height, intrinsics.width)
+    size = int(camera["height"]), int(camera["width"])
+    lens = [camera[key] for key in ("fx", "fy", "cx", "cy")]
+    intrinsics = in_file(folder / "camera.json", lambda: Intrinsics(size[1], size[0], *lens))
     coloured = (folder / "color").is_dir()
     require_bounded(folder, len(names) * size[0] * size[1] * (5 if coloured else 2))
     depth = np.zeros((len(names), *size), np.uint16)
@@ -88,10 +89,6 @@ def _camera(path: Path) -> dict[str, float]:
             f'{path}: "depth_unit_m" must be metres per step, 0.001 for millimetres; got {camera["depth_unit_m"]:g}.'
         )
     return camera
-
-
-def _intrinsics(camera: dict[str, float]) -> Intrinsics:
-    return Intrinsics(int(camera["width"]), int(camera["height"]), *(camera[key] for key in ("fx", "fy", "cx", "cy")))
 
 
 def _rows(path: Path) -> list[tuple[int, dict[str, Any]]]:
@@ -194,9 +191,10 @@ def write_views(views: Views, folder: Path | str, beside: Mapping[str, str] | No
     _require_unread(views, folder, old)
     with whole_folder(folder) as new:
         for k, name in enumerate(names):
-            _write_image(new / "depth" / f"{name}.png", views.depth[k])
-            if views.rgb is not None:
-                _write_image(new / "color" / f"{name}.png", views.rgb[k])
+            for kind, images in (("depth", views.depth), ("color", views.rgb)):
+                if images is not None:
+                    (new / kind).mkdir(exist_ok=True)
+                    write_image(new / kind / f"{name}.png", images[k])
         lens = views.intrinsics
         camera = {key: getattr(lens, key) for key in _CAMERA[:-1]} | {"depth_unit_m": views.depth_unit}
         write_text(new / "camera.json", json.dumps(camera, indent=1))
@@ -213,11 +211,6 @@ def write_views(views: Views, folder: Path | str, beside: Mapping[str, str] | No
         path.unlink(missing_ok=True)
     if views.rgb is None and (folder / "color").is_dir():
         (folder / "color").rmdir()
-
-
-def _write_image(path: Path, pixels: Any) -> None:
-    path.parent.mkdir(exist_ok=True)
-    write_image(path, pixels)
 
 
 def _written_before(folder: Path) -> list[Path]:

@@ -122,12 +122,9 @@ def parse_gravity(entry: Entry) -> Array:
     if not gravity.any():
         raise entry.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
     if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
-        raise entry.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
+        shown = ", ".join(f"{v:g}" for v in gravity)
+        raise entry.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got [{shown}].')
     return gravity
-
-
-def _short(values: Array) -> str:
-    return f"[{', '.join(f'{v:g}' for v in values)}]"
 
 
 def parse_noise(entry: Entry) -> dict[str, float]:

@@ -190,12 +190,8 @@ def _csv(stream: Stream) -> str:
         columns.append(stream.time[:, None])
     for quantity, values in _tabled(stream).items():
         names += _COLUMNS[quantity][0]
-        columns.append(_cells(quantity, values))
+        columns.append(Rotation(values).quaternion_wxyz() if quantity == "rotation" else values)
     rows = np.concatenate(columns, axis=1)
     digits = [12 if name == "t" else 9 for name in names]
     body = "\n".join(",".join(f"{v:.{k}g}" for v, k in zip(row, digits, strict=True)) for row in rows)
     return ",".join(names) + "\n" + body + "\n"
-
-
-def _cells(quantity: str, values: Array) -> Array:
-    return Rotation(values).quaternion_wxyz() if quantity == "rotation" else values

@@ -187,14 +187,11 @@ def _told(stream: Stream, rows: Mask, others: bool) -> Finding:
     missing = np.flatnonzero(~rows)
     named = [name for name, values in stream.channels.items() if not known_rows(values).all()]
     named += ["time"] if stream.time is not None and not known_rows(stream.time).all() else []
+    last = "" if rows[-1] else " (the last)"
     with_others = ", with the same rows of the other streams" if others and stream.time is None else ""
     message = (
         f"{len(missing)} of {len(rows)} rows of '{stream.name}' miss a number in {', '.join(named)}: "
-        f"{rows_text(missing)}{_cut(missing, len(rows))}. {'They were' if len(missing) > 1 else 'It was'} left out"
+        f"{rows_text(missing)}{last}. {'They were' if len(missing) > 1 else 'It was'} left out"
         f"{with_others}."
     )
     return Finding.of("rows-missing", message)
-
-
-def _cut(missing: np.ndarray[Any, np.dtype[np.int64]], count: int) -> str:
-    return " (the last)" if missing[-1] == count - 1 else ""

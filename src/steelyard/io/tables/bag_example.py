@@ -83,7 +83,8 @@ def frames_of(bag: Bag, wrench: str | None) -> Frames:
     """
     felt = next((_frame(message) for _, message in bag.messages(wrench)), "") if wrench else ""
     parent = _parents(bag)
-    told = {frame for topic in bag.topics if topic.kind in _IN_FRAMES for frame in _frames(bag, topic.name)}
+    firsts = (islice(bag.messages(topic.name), 1) for topic in bag.topics if topic.kind in _IN_FRAMES)
+    told = {_frame(message) for first in firsts for _, message in first}
     if felt and felt not in parent and felt in {*parent.values(), *told}:
         return Frames(felt, _SENSOR, True)
     line = [felt or _SENSOR]
@@ -101,10 +102,6 @@ def _parents(bag: Bag) -> dict[str, str]:
                 for each in message.transforms:
                     out.setdefault(each.child_frame_id.lstrip("/"), _frame(each))
     return out
-
-
-def _frames(bag: Bag, topic: str) -> set[str]:
-    return {_frame(message) for _, message in islice(bag.messages(topic), 1)}
 
 
 def _frame(message: Any) -> str:

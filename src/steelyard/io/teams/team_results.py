@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadInput
 from steelyard.identify.estimate import Estimate
-from steelyard.io.json_arrays import array_of, array_or_none
+from steelyard.io.json_arrays import array_of, array_or_none, arrays_of
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
 
@@ -63,7 +63,7 @@ def team_of(path: Path, values: Mapping[str, Any], plain: Estimate) -> TeamEstim
         grasps={str(name): _grasp(path, str(name), entry) for name, entry in grasps.items()},
         clock_offsets_s=_seconds(path, values, "clock_offsets_s"),
         clock_offset_std_s=_seconds(path, values, "clock_offset_std_s"),
-        wrench_biases=_biases(path, values),
+        wrench_biases=arrays_of(path, values, "wrench_biases", (6,), " with six numbers for every recording"),
         wrench_maps=_maps(path, values),
         hinge=hinge_of(path, values),
     )
@@ -91,20 +91,9 @@ def _grasp(path: Path, name: str, entry: Any) -> GraspEstimate:
     return GraspEstimate(Pose(turn, place), covariance, lost)
 
 
-def _biases(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
-    """Return the bias (6,) of every recording, none where a result says nothing of it."""
-    entry = values.get("wrench_biases") or {}
-    if not isinstance(entry, dict):
-        raise BadFile(f'{path}: "wrench_biases" must be one object with six numbers for every recording.')
-    return {str(name): array_of(path, entry, name, (6,), " of wrench_biases") for name in entry}
-
-
 def _maps(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
     """Return what (6, 6) makes of each wrench taken otherwise than given what it was taken for; raises BadFile."""
-    entry = values.get("wrench_maps") or {}
-    if not isinstance(entry, dict):
-        raise BadFile(f'{path}: "wrench_maps" must be one object with 6 x 6 numbers for every robot.')
-    maps = {str(name): array_of(path, entry, name, (6, 6), " of wrench_maps") for name in entry}
+    maps = arrays_of(path, values, "wrench_maps", (6, 6), " with 6 x 6 numbers for every robot")
     for name, taken in maps.items():
         if not all(np.linalg.det(block) for block in (taken[:3, :3], taken[3:, 3:])):
             raise BadFile(f'{path}: "{name}" of wrench_maps must leave something of moment and force; found zeros.')
@@ -112,10 +101,7 @@ def _maps(path: Path, values: Mapping[str, Any]) -> dict[str, Array]:
 
 
 def _seconds(path: Path, values: Mapping[str, Any], key: str) -> dict[str, float]:
-    entry = values.get(key) or {}
-    if not isinstance(entry, dict):
-        raise BadFile(f'{path}: "{key}" must be one object of numbers.')
-    return {str(name): float(array_of(path, entry, name, (), f" of {key}")) for name in entry}
+    return {name: float(value) for name, value in arrays_of(path, values, key, (), " of numbers").items()}
 
 
 def hinge_entries(hinge: HingeEstimate | None) -> dict[str, Any]:

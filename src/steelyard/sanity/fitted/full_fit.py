@@ -98,7 +98,9 @@ class Rows:
     def _made(cls, log: MotionLog, drift: bool) -> tuple[Rows, Integers]:
         pick = picked(len(log), _MOST_ROWS)
         thin = log.rows(pick)
-        rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
+        first = ~thin.dead / np.maximum(thin.wrench.var(0), _SMALLEST)
+        weights = np.broadcast_to(first, thin.wrench.shape).copy()
+        rows = cls(thin, cls.columns_of(thin), thin.wrench, weights, _blocks(thin))
         if drift:
             rows = replace(rows, columns=np.concatenate([rows.columns, rows.drifting()], 2))
         for _ in range(2):
@@ -189,11 +191,6 @@ def _gram(rows: Array) -> Array:
 
 def _solution(scatter: Array, size: int) -> Array:
     return np.asarray(inverse_scaled(scatter[:size, :size].copy(), RANK) @ scatter[:size, size])
-
-
-def _first_weights(log: MotionLog) -> Array:
-    spread = np.maximum(log.wrench.var(0), _SMALLEST)
-    return np.broadcast_to(~log.dead / spread, log.wrench.shape).copy()
 
 
 def _weights(rows: Rows, solution: Array) -> Array:

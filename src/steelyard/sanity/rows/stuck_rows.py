@@ -42,7 +42,9 @@ def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
                 found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
                 frozen |= rows
     rest, then = left_out(stream, frozen)
-    return rest, tuple(_stuck(stream, name, what, then) for name, what in found)
+    words = [(f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}", what) for name, what in found]
+    done = [(text, "it was not used" if "at all" in what else then) for text, what in words]
+    return rest, tuple(Finding.of("channel-stuck", f"{text}; {end}.") for text, end in done)
 
 
 def dead_channels(recording: Recording) -> tuple[bool, ...]:
@@ -103,11 +105,6 @@ def _frozen_rows(column: Array, time: Array) -> Mask:
 
 def _rows_needed(time: Array) -> float:
     return max(FROZEN_ROWS, FROZEN_S * (len(time) - 1) / max(float(time[-1] - time[0]), 1e-9))
-
-
-def _stuck(stream: Stream, name: str, what: str, then: str) -> Finding:
-    done = "it was not used" if "at all" in what else then
-    return Finding.of("channel-stuck", f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}; {done}.")
 
 
 def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
