@@ -1,13 +1,14 @@
-"""Files read whole, no larger than is bounded: JSON and TOML as tables, words as numbers; what is wrong names the file.
+"""Files read whole, no larger than is bounded: JSON and TOML as tables, words and JSON as numbers of a known shape.
 
-A few kB from a stranger may claim, or unpack to, many GB.
+What is wrong names the file. A few kB from a stranger may claim, or unpack to, many GB; true is no 1 in JSON, and "0.7"
+no 0.7.
 """
 
 from __future__ import annotations
 
 import json
 import tomllib
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -15,6 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, BadValue
+from steelyard.io.entries import is_number
 
 MOST_BYTES = 2 * 1024**3  # six hours of a log at 1 kHz, 80 million points
 
@@ -25,6 +27,8 @@ _MOST_DOTS = 200  # in a line: Python takes the square of their number of steps 
 T = TypeVar("T")
 
 _LONGEST_NUMBER = 400  # characters: the longest that Python writes of a double has some 330
+
+Shape = tuple[int | None, ...]  # () is one number, None any length
 
 
 def require_bounded(path: Path, size: int, most: int | None = None) -> None:
@@ -138,3 +142,56 @@ def typed(path: Path, what: str, values: Array, kind: str | np.dtype[Any]) -> np
                 "Save the file again."
             )
     return values.astype(dtype)
+
+
+def array_of(path: Path, entry: Mapping[str, Any], key: str, shape: Shape, of: str = "") -> Array:
+    """Return the finite numbers of a shape under `key`; raises BadFile, which says what they are `of` in words."""
+    value = entry.get(key)
+    if not _fits(value, shape):
+        raise _unfit(path, key, of, f"{_counted(shape)} finite {_numbers_word(shape)}")
+    return np.array(value, np.float64)
+
+
+def array_or_none(path: Path, entry: Mapping[str, Any], key: str, shape: Shape) -> Array | None:
+    """Return the same, None where the entry is missing or null, whole or in part."""
+    value = entry.get(key)
+    if value is None:
+        return None
+    if not _fits(value, shape, gaps=True):
+        raise _unfit(path, key, "", f"{_counted(shape)} {_numbers_word(shape)} or null")
+    return np.array(value, np.float64) if _fits(value, shape) else None
+
+
+def object_of(path: Path, entry: Mapping[str, Any], key: str, of: str = "") -> Mapping[str, Any]:
+    """Return the object under `key`, empty where it is missing or null; raises BadFile, which says what it is `of`."""
+    value = entry.get(key) or {}
+    if not isinstance(value, dict):
+        raise BadFile(f'{path}: "{key}" must be one object{of}.')
+    return value
+
+
+def arrays_of(path: Path, entry: Mapping[str, Any], key: str, shape: Shape, of: str) -> dict[str, Array]:
+    """Return the arrays of one shape that the object under `key` names; raises BadFile."""
+    values = object_of(path, entry, key, of)
+    return {str(name): array_of(path, values, name, shape, f" of {key}") for name in values}
+
+
+def _fits(value: Any, shape: Shape, gaps: bool = False) -> bool:
+    """Whether a value is lists of lists of finite numbers, or with `gaps` of null, as long as the shape says."""
+    if not shape:
+        return is_number(value) or (gaps and value is None)
+    if not isinstance(value, list) or shape[0] not in (None, len(value)):
+        return False
+    return all(_fits(item, shape[1:], gaps) for item in value)
+
+
+def _counted(shape: Shape) -> str:
+    return " x ".join("n" if length is None else str(length) for length in shape) or "one"
+
+
+def _numbers_word(shape: Shape) -> str:
+    return "numbers" if shape else "number"
+
+
+def _unfit(path: Path, key: str, of: str, wanted: str) -> BadFile:
+    return BadFile(f'{path}: "{key}"{of} must be {wanted}; found something else.')

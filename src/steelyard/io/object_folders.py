@@ -18,9 +18,8 @@ from steelyard.datasets.track import MOTION, Track
 from steelyard.errors import BadFile, BadValue
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.io.contents import in_file, load_json
+from steelyard.io.contents import Shape, array_of, in_file, load_json
 from steelyard.io.entries import is_number
-from steelyard.io.json_arrays import Shape, array_of
 from steelyard.io.ply_files import read_mesh, write_mesh
 from steelyard.io.recordings.recording_files import object_table
 from steelyard.io.tables.array_table import ArrayTable, npz, read_numbers

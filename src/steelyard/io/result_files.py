@@ -19,8 +19,7 @@ from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.inertia import InertialParameters, forms
-from steelyard.io.contents import in_file, load_json
-from steelyard.io.json_arrays import array_of, array_or_none, object_of
+from steelyard.io.contents import array_of, array_or_none, in_file, load_json, object_of
 from steelyard.io.teams.team_results import team_entries, team_of
 from steelyard.team.estimate import TeamEstimate
 from steelyard.whole_files import write_text

@@ -22,13 +22,7 @@ from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
 from steelyard.io.streams.usual_names import (
     STEMS,
     Names,
-    clock_by_unit,
     compared,
-    rotation_named,
-    said_unit,
-    said_units,
-    time_columns,
-    vector_named,
 )
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table
@@ -43,13 +37,13 @@ _NEW_POSE = float(np.cos(np.radians(5)))
 def describe(table: Table) -> tuple[Description, Columns]:
     """Return what the names in the file say, and its cells; raises BadDescription with an example."""
     names = _simplified(table)
-    vectors = {quantity: found for quantity in STEMS if (found := vector_named(names, quantity))}
-    rotation = rotation_named(names)
-    stamps = next(time_columns(names), ())
+    vectors = {quantity: found for quantity in STEMS if (found := names.vector(quantity))}
+    rotation = names.rotation()
+    stamps = next(names.time_columns(), ())
     require_told(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     cells = table.read(sorted({*map(int, wanted), *stamps}), stamps)
-    if stamps and stamps == clock_by_unit(names) and not _rises(cells[stamps[0]]):
+    if stamps and stamps == names.clock_by_unit() and not _rises(cells[stamps[0]]):
         stamps = ()
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
@@ -127,7 +121,7 @@ def _vector_spec(
     table: Table, names: Names, quantity: str, numbers: tuple[int, ...], cells: Columns
 ) -> QuantitySpec | None:
     """Return the vector with its unit, None where its size does not tell what it is."""
-    said = said_units(names, quantity, numbers)
+    said = names.said_units(quantity, numbers)
     if len(said) > 1:
         reason = f"the columns of {quantity} have different units, {' and '.join(said)}; write them in one"
         raise cannot_tell(table, reason, own_lines(table, names))
@@ -143,7 +137,7 @@ def _vector_spec(
 
 def _time_unit(table: Table, names: Names, number: int, cells: Columns) -> str:
     """Return the unit from the name (t_ms, t [ms]), from the size of stamps since 1970, or seconds."""
-    said = said_unit(names, number)
+    said = names.said_unit(number)
     if said is not None:
         return said
     if cells[number].dtype.kind == "M":

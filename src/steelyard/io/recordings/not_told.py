@@ -7,18 +7,10 @@ from collections.abc import Mapping, Sequence
 from steelyard.errors import NoDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
-from steelyard.io.recordings.controllers import known_lines
 from steelyard.io.recordings.counted import joints, open_pose, open_quaternion, values
 from steelyard.io.streams.usual_names import (
     ANGLES,
     Names,
-    rotation_named,
-    rotations_named,
-    said_unit,
-    said_units,
-    time_columns,
-    vector_named,
-    vectors_named,
 )
 from steelyard.io.tables.files import Table
 from steelyard.io.units import ANGLE, SLOWEST, UNITS, angle_unit, length_unit, stamp_unit
@@ -34,7 +26,7 @@ def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
     if missing:
         lines = own_lines(table, names)
         reason = f"no {' and no '.join(missing)} was recognised"
-        if all(len(vectors_named(names, name)) > 1 for name in missing):
+        if all(len(names.vectors(name)) > 1 for name in missing):
             reason = f"several columns may be the {' and the '.join(missing)}"
         elif set(missing) <= set(lines):
             reason = f"{' and '.join(missing)} are a controller's, whose axes, units and settings only you can confirm"
@@ -102,19 +94,19 @@ def _lying(table: Table) -> str:
 def own_lines(table: Table, names: Names) -> dict[str, str]:
     """Return quantity -> its line of a description, for those whose columns were recognised."""
     lines = {}
-    stamps = next(time_columns(names), ())
+    stamps = next(names.time_columns(), ())
     if stamps:
         lines["time"] = _time_line(table, names, stamps)
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
         if line := _vector_line(table, names, quantity):
             lines[quantity] = line
     lines |= _open_lines(table, names)
-    if turn := rotation_named(names):
+    if turn := names.rotation():
         lines["rotation"] = _line(table, [int(n) for n in turn.columns], f'form = "{turn.form}"', "S to W")
-    elif (rotations := rotations_named(names))[1]:
+    elif (rotations := names.rotations())[1]:
         form, turns = rotations
         lines["rotation"] = _line(table, turns[0], f'form = "{form}"', f"S to W{_or(table, turns)}")
-    for quantity, columns, rest, remark in known_lines(names):
+    for quantity, columns, rest, remark in names.of_controllers():
         lines[quantity] = _line(table, columns, rest, remark)
     if not ATTITUDES & set(lines) and (found := joints(names)):
         unit = angle_unit(values(table, found)) or "rad"
@@ -137,7 +129,7 @@ def numbered_lines(table: Table) -> dict[str, str]:
 def _time_line(table: Table, names: Names, stamps: Sequence[int]) -> str:
     if len(stamps) > 1:
         return _line(table, stamps, 'unit = ["s", "ns"]')
-    if told := said_unit(names, stamps[0]):
+    if told := names.said_unit(stamps[0]):
         return _line(table, stamps, f'unit = "{told}"')
     found = values(table, stamps) if stamps[0] not in names.dates else None
     unit, step = stamp_unit(found[:, 0]) if found is not None else (None, 0.0)
@@ -148,9 +140,9 @@ def _time_line(table: Table, names: Names, stamps: Sequence[int]) -> str:
 
 def _vector_line(table: Table, names: Names, quantity: str) -> str | None:
     """Return the line of a vector, with the other columns that may be meant; None where there is none."""
-    several = vectors_named(names, quantity)
-    found = vector_named(names, quantity) or next(iter(several), ())
-    said = said_units(names, quantity, found)
+    several = names.vectors(quantity)
+    found = names.vector(quantity) or next(iter(several), ())
+    said = names.said_units(quantity, found)
     if not found or len(said) > 1:
         return None
     unit, remark = next(iter(UNITS[quantity])), ""

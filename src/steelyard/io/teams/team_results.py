@@ -12,7 +12,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadInput
 from steelyard.identify.estimate import Estimate
-from steelyard.io.json_arrays import array_of, array_or_none, arrays_of
+from steelyard.io.contents import array_of, array_or_none, arrays_of
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
 
