@@ -70,7 +70,7 @@ def build(
     as_json: bool,
 ) -> None:
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
-    from steelyard.io.images import require_images
+    from steelyard.io.view_folders import require_images
     from steelyard.workshop.catalogue import FAMILIES, build_graded, require
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED

@@ -1,4 +1,7 @@
-"""Folders of posed RGB-D views: camera.json, poses.csv, depth/NAME.png, color/NAME.png or .jpg, perhaps table.json."""
+"""Folders of posed RGB-D views: camera.json, poses.csv, depth/NAME.png, color/NAME.png or .jpg, perhaps table.json.
+
+Images, colour of 8 bits (PNG, JPEG) and depth of 16 (PNG): the one module that imports pillow (extra `images`).
+"""
 
 from __future__ import annotations
 
@@ -13,13 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile
-from steelyard.io.contents import in_file, load_json, require_bounded, small_text
+from steelyard.errors import BadFile, MissingDependency
+from steelyard.io.contents import in_file, load_json, read_whole, require_bounded, small_text
 from steelyard.io.entries import is_number
-from steelyard.io.images import MOST_PIXELS, read_colour, read_depth, require_images, write_image
-from steelyard.shape.views import Intrinsics, TablePlane, Views
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.views import Depths, Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
-from steelyard.whole_files import whole_folder, write_text
+from steelyard.whole_files import whole_folder, write_bytes, write_text
 
 _COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
 _HEADER = ",".join(_COLUMNS)
@@ -28,6 +31,8 @@ _COLOUR = ("png", "jpg", "jpeg")
 MOST_VIEWS = 10_000
 _LARGEST_CSV = 16_000_000
 _UNIT = 1e-3  # how far from 1 the length of a quaternion may be
+
+MOST_PIXELS = 64_000_000
 
 
 def read_views(folder: Path | str, progress: Callable[[int, int], None] | None = None) -> Views:
@@ -232,3 +237,58 @@ def _require_unread(views: Views, folder: Path, old: list[Path]) -> None:
     for what, lacks, there in (("colour", views.rgb is None, colour), ("table", views.table is None, table)):
         if lacks and (others := [path for path in there if path not in old]):
             raise BadFile(f"{others[0]}: these views have no {what}; move this file away or write into another folder.")
+
+
+def require_images() -> Any:
+    """Return what reads and writes images; raises MissingDependency where nothing does here."""
+    try:
+        import PIL.Image
+    except ImportError:
+        raise MissingDependency.of("pillow", "images", "Reading and writing images") from None
+    return PIL.Image
+
+
+def read_depth(path: Path) -> Depths:
+    """Return a depth image (H, W) uint16; raises BadFile where it has not one channel of 16 bits."""
+    image = _opened(path, ("PNG",))
+    if not image.mode.startswith("I"):
+        raise BadFile(f"{path}: depth must be a PNG with one channel of 16 bits; this one has mode {image.mode}.")
+    return np.asarray(_pixels(path, image), np.uint16)
+
+
+def read_colour(path: Path) -> Colours:
+    """Return a colour image (H, W, 3) uint8; raises BadFile."""
+    image = _opened(path, ("PNG", "JPEG"))
+    if image.mode not in ("RGB", "RGBA", "L", "P", "LA"):
+        raise BadFile(f"{path}: colour must be RGB or grey with 8 bits per channel; this image has mode {image.mode}.")
+    return np.asarray(_pixels(path, image, "RGB"), np.uint8)
+
+
+def _opened(path: Path, formats: tuple[str, ...]) -> Any:
+    pillow = require_images()
+    if not path.exists():
+        raise BadFile(f"{path}: this image is missing.")
+    content = read_whole(path)
+    try:
+        image = pillow.open(io.BytesIO(content), formats=formats)
+    except pillow.DecompressionBombError:
+        raise BadFile(f"{path}: this image has more pixels than any depth camera.") from None
+    except (OSError, ValueError, SyntaxError):
+        raise BadFile(f"{path}: expected a {' or '.join(formats)} image; found something else.") from None
+    if image.width * image.height > MOST_PIXELS:
+        raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than any depth camera has.")
+    return image
+
+
+def _pixels(path: Path, image: Any, mode: str | None = None) -> Any:
+    try:
+        return np.asarray(image if mode is None else image.convert(mode))
+    except (OSError, ValueError, SyntaxError) as error:
+        raise BadFile(f"{path}: this image is damaged ({error}). Save it again.") from None
+
+
+def write_image(path: Path, pixels: Depths | Colours) -> None:
+    """Write (H, W) uint16 or (H, W, 3) uint8 as PNG; raises BadFile."""
+    content = io.BytesIO()
+    require_images().fromarray(np.ascontiguousarray(pixels)).save(content, "PNG", compress_level=1)
+    write_bytes(path, content.getvalue())

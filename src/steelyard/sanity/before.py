@@ -13,8 +13,7 @@ from steelyard.sanity.readings.silent import without_silent
 from steelyard.sanity.readings.turning import examine_turning
 from steelyard.sanity.readings.units import examine_units
 from steelyard.sanity.rows.judged import dead_channels, examine_rows
-from steelyard.sanity.rows.leaps import examine_sparse
-from steelyard.sanity.rows.still_rows import examine_memory
+from steelyard.sanity.rows.still_rows import examine_memory, examine_sparse
 
 # A motion is told from its neighbours in time.
 FEWEST_ROWS = 12

@@ -5,6 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.findings import percent
 from steelyard.logs.recording import Stream
 from steelyard.spatial import Rotation
 
@@ -17,6 +18,11 @@ def axis_words(axis: Array) -> str:
 def direction_words(vector: Array) -> str:
     """Return where a vector (3,) points."""
     return _listed(vector / np.linalg.norm(vector), 3)
+
+
+def unexplained(left: float, before: float, of: str = "their") -> str:
+    """Say what share of the variance `of` something another reading leaves, beside what is left as given."""
+    return f"{percent(left)} of {of} variance is left unexplained instead of {percent(before)}"
 
 
 def _listed(vector: Array, places: int) -> str:

@@ -184,6 +184,14 @@ def _lettered(name: str, letters: tuple[str, ...] = _XYZ) -> tuple[str, ...]:
     return tuple(f"{name}_{letter}" for letter in letters)
 
 
+def _wrench(name: str, force: str, torque: str, axes: str = "") -> tuple[tuple[str, tuple[str, ...], str, str], ...]:
+    """Return what is known of six columns that are a force, then a torque, and what their user must know of each."""
+    return (
+        ("force", _numbered(name, 0, 1, 2), f'unit = "N"{axes}', force),
+        ("torque", _numbered(name, 3, 4, 5), f'unit = "N*m"{axes}', torque),
+    )
+
+
 # Lines of their own: what must be set in the controller before a run, which no name of a column shows.
 _PAYLOAD = "\n# the payload that is set in the controller is taken away from this wrench: set none before the run"
 _TCP = "\n# the TCP that is set in the controller must be S"
@@ -196,8 +204,7 @@ _TURNS = "KUKA turns by A about z first; Doosan and Kawasaki about z, y, z: a, b
 # Quantity, names as they are simplified, the rest of its line, what its user must know. Franka's O_T_EE needs no line:
 # a 4 x 4 matrix shows itself how it is written.
 _KNOWN = (
-    ("force", _numbered("actual_tcp_force", 0, 1, 2), 'unit = "N", frame = "W"', _BASE.format("UR") + _PAYLOAD),
-    ("torque", _numbered("actual_tcp_force", 3, 4, 5), 'unit = "N*m", frame = "W"', _BASE.format("UR")),
+    *_wrench("actual_tcp_force", _BASE.format("UR") + _PAYLOAD, _BASE.format("UR"), ', frame = "W"'),
     (
         "position",
         _numbered("actual_tcp_pose", 0, 1, 2),
@@ -205,15 +212,13 @@ _KNOWN = (
         f"of the TCP in W{_TCP}: the flange (TCP all zero) on an e-Series",
     ),
     ("rotation", _numbered("actual_tcp_pose", 3, 4, 5), 'form = "rotation-vector", unit = "rad"', "S to W"),
-    ("force", _numbered("o_f_ext_hat_k", 0, 1, 2), 'unit = "N", frame = "W"', _BASE.format("Franka") + _PAYLOAD),
-    (
-        "torque",
-        _numbered("o_f_ext_hat_k", 3, 4, 5),
-        'unit = "N*m", frame = "W"',
+    *_wrench(
+        "o_f_ext_hat_k",
+        _BASE.format("Franka") + _PAYLOAD,
         _BASE.format("Franka") + ", about K, which is EE unless it was set",
+        ', frame = "W"',
     ),
-    ("force", _numbered("k_f_ext_hat_k", 0, 1, 2), 'unit = "N"', "of K; S must be there" + _PAYLOAD),
-    ("torque", _numbered("k_f_ext_hat_k", 3, 4, 5), 'unit = "N*m"', "of K; S must be there"),
+    *_wrench("k_f_ext_hat_k", "of K; S must be there" + _PAYLOAD, "of K; S must be there"),
     ("time", ("duration",), 'unit = "ms"', "as libfranka logs it; check the unit"),
     (
         "force",
@@ -224,10 +229,8 @@ _KNOWN = (
     ("torque", _lettered("tool_external_wrench_torque"), 'unit = "N*m", frame = "W"', "as the force"),
     ("position", _lettered("tool_pose"), 'unit = "m"', _HAND.format("the tool")),
     ("rotation", _lettered("tool_pose_theta"), 'form = "rpy", unit = "deg"', "S to W"),
-    ("force", _numbered("ft_raw_force", 0, 1, 2), 'unit = "N"', "of UFACTORY's sensor, without its compensation"),
-    ("torque", _numbered("ft_raw_force", 3, 4, 5), 'unit = "N*m"', "as the force"),
-    ("force", _numbered("ft_ext_force", 0, 1, 2), 'unit = "N"', "UFACTORY takes the payload away; log ft_raw_force"),
-    ("torque", _numbered("ft_ext_force", 3, 4, 5), 'unit = "N*m"', "as the force"),
+    *_wrench("ft_raw_force", "of UFACTORY's sensor, without its compensation", "as the force"),
+    *_wrench("ft_ext_force", "UFACTORY takes the payload away; log ft_raw_force", "as the force"),
     ("time", ("ipoc",), 'unit = "ms"', "as KUKA's RSI counts it"),
     ("position", _lettered("rist"), 'unit = "mm"', f"of the TCP in W{_TCP}"),
     ("rotation", _lettered("rist", _CBA), 'form = "rpy", unit = "deg"', "S to W"),

@@ -22,7 +22,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import CALM, FEWEST_BLOCKS, NOISE, Rows, at_rest, moves, noise_share
 from steelyard.sanity.fitted.yielding import taken_away
-from steelyard.sanity.readings.both_masses import clock_words, compensated
+from steelyard.sanity.readings.static_fit import clock_words, compensated
 from steelyard.spatial import cross_matrix
 
 # They differ where that is so many standard deviations, by leaving out stretches, beyond this share of the mass or this

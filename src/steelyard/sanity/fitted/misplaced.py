@@ -116,7 +116,10 @@ class Misplaced:
     def finding(self) -> Finding:
         """What is said of it."""
         what, such, remedy = self._what
-        text = f"The load moves as if {what} a point {self._size}{such}{self._blind_words}. The answer assumes this."
+        blind = ""
+        if self.blind is not None:
+            blind = f"; where it is along ({axis_words(self.blind)}) of S, turns about that axis alone do not show"
+        text = f"The load moves as if {what} a point {self._size}{such}{blind}. The answer assumes this."
         return Finding("motion-mismatch", text, remedy)
 
     @property
@@ -132,13 +135,6 @@ class Misplaced:
             return "the accelerations were those of", "", "Correct the accelerometer's mount by as much."
         remedy = "Set the controller's TCP to S, or correct the positions."
         return "the positions were those of", ", such as the tip of a tool", remedy
-
-    @property
-    def _blind_words(self) -> str:
-        """Say along which axis the point may lie anywhere."""
-        if self.blind is None:
-            return ""
-        return f"; where it is along ({axis_words(self.blind)}) of S, turns about that axis alone do not show"
 
     def allowed(self, estimate: Estimate) -> Estimate:
         """Return the estimate of the origin of S with bars that hold all that the point would change."""

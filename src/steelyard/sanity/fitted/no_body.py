@@ -14,7 +14,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import PartMass
 from steelyard.findings import Finding
@@ -228,10 +227,7 @@ def _said(mass: float, std: float, volume: float, share: float) -> str:
 
 def _scale(density: float) -> str:
     """Return what scale of the shape would leave a usual density."""
-    factors: Array = np.array([factor for factor, _ in _SCALES])
-    found = density / factors**3
-    fits = [k for k in range(len(_SCALES)) if USUAL[0] <= found[k] <= USUAL[1]]
-    if not fits:
-        return ""
-    said = " or ".join(f"{found[k]:.3g} with a shape {_SCALES[k][0]:g} times as large ({_SCALES[k][1]})" for k in fits)
-    return f" It would be {said}."
+    found = ((density / factor**3, factor, mistake) for factor, mistake in _SCALES)
+    usual = [each for each in found if USUAL[0] <= each[0] <= USUAL[1]]
+    said = " or ".join(f"{would:.3g} with a shape {factor:g} times as large ({why})" for would, factor, why in usual)
+    return f" It would be {said}." if usual else ""

@@ -18,9 +18,9 @@ from steelyard.check import Array
 from steelyard.findings import Finding, percent
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.readings.both_masses import both_masses
 from steelyard.sanity.readings.glance import glance, resampled, stream_of
 from steelyard.sanity.readings.rivals import best_rival, reading_of
+from steelyard.sanity.readings.static_fit import both_masses
 from steelyard.spatial import Rotation
 
 # Turns are judged from so many rows on.

@@ -69,11 +69,6 @@ class Glance:
         return len(self.wrench)
 
     @property
-    def halves(self) -> tuple[Array, Array]:
-        """Torque and force (N, 3), each in its own axes."""
-        return self.wrench[:, :3], self.wrench[:, 3:]
-
-    @property
     def still(self) -> Glance:
         """The same as if nothing told the acceleration."""
         return replace(self, acceleration=None)
@@ -95,7 +90,7 @@ class Glance:
         wrench = np.concatenate(
             [
                 _into_sensor(rotation, v) if part in self.world else v
-                for part, v in zip(_PARTS, self.halves, strict=True)
+                for part, v in zip(_PARTS, np.split(self.wrench, 2, 1), strict=True)
             ],
             1,
         )

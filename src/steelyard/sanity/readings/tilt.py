@@ -43,13 +43,6 @@ class GlanceTilt:
     torque_share: float
     blind: Array | None = None
 
-    @property
-    def blind_words(self) -> str:
-        """Say which part of a tilt stays unseen."""
-        if self.blind is None:
-            return ""
-        return f"; a tilt toward ({axis_words(self.blind)}) of W cannot be seen in this motion"
-
 
 @dataclass(frozen=True, eq=False)
 class Turn:

@@ -13,7 +13,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding, percent
+from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.readings.glance import Glance, Seen, glance, in_axes
 from steelyard.sanity.readings.levers import by_motion
@@ -21,6 +21,7 @@ from steelyard.sanity.readings.rivals import BESIDE, Reading, best_rival, misrea
 from steelyard.sanity.readings.rivals import MUCH_BETTER as RIVAL_BETTER
 from steelyard.sanity.readings.static_fit import columns, fit, solve
 from steelyard.sanity.readings.tilt import REFLECTIONS, in_words
+from steelyard.sanity.words import unexplained
 
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
 # second share, and fit well where they leave less than the third.
@@ -86,15 +87,12 @@ def _elsewhere(
     alike = [words for left, words in fitting if BESIDE * left < least or doubtful]
     if len(alike) > 1 or doubtful:
         text = (
-            f"The torques fit one body where {'; or where '.join(alike)}: so read, {percent(least)} of their "
-            f"variance is left unexplained instead of {percent(share)}. The answer does not assume this."
+            f"The torques fit one body where {'; or where '.join(alike)}: so read, "
+            f"{unexplained(least, share)}. The answer does not assume this."
         )
         return recording, (Finding("wrench-unexplained", text, WHICH, left_in=True),)
     if fitting and fitting[0] == axes:
-        text = (
-            f"T{axes[1][1:]}: so read, {percent(axes[0])} of their variance is left unexplained "
-            f"instead of {percent(share)}. The answer assumes this."
-        )
+        text = f"T{axes[1][1:]}: so read, {unexplained(axes[0], share)}. The answer assumes this."
         remedy = f'Set frame = "{"S" if "torque" in view.world else "W"}" in the torque of this stream.'
         return in_axes(recording, view.world ^ {"torque"}), (Finding("gravity-frame", text, remedy),)
     if view.position is None:
@@ -104,8 +102,8 @@ def _elsewhere(
     if left > MUCH_BETTER * share:
         return recording, ()
     text = (
-        f"The torques are about the origin of W, not of S: so read, {percent(left)} of their variance is left "
-        f"unexplained instead of {percent(share)}; the answer does not assume this."
+        f"The torques are about the origin of W, not of S: so read, {unexplained(left, share)}; the answer does not "
+        "assume this."
     )
     return recording, (Finding("wrench-unexplained", text, ABOUT_S, left_in=True),)
 
@@ -126,8 +124,8 @@ def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array)
     # Either sign fits as well: the force decides, or else fewer changes are likelier.
     side = float(moment[:3] @ felt) or float(X.sum())
     text = (
-        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {percent(left)} of "
-        f"their variance is left unexplained instead of {percent(share)}; the answer does not assume this."
+        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, "
+        f"{unexplained(left, share)}; the answer does not assume this."
     )
     return (Finding("force-unit", text, REMEDY, left_in=True),)
 
@@ -173,8 +171,8 @@ def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, tupl
     if _explained(recording, view, Reading("", recording.gravity, seen.rotation, found, view=seen)):
         return recording, ()
     text = (
-        f"Forces and torques are in each other's columns: exchanged, {percent(found.force_share)} of the force "
-        f"variance is left unexplained instead of {percent(given.force_share)}. The answer assumes this."
+        "Forces and torques are in each other's columns: exchanged, "
+        f"{unexplained(found.force_share, given.force_share, 'the force')}. The answer assumes this."
     )
     remedy = "Exchange the columns of force and torque in the description."
     return other, (Finding("force-unit", text, remedy),)
