@@ -20,9 +20,9 @@ from steelyard.io.contents import load_json, parse_toml
 from steelyard.io.moment_files import read_moments
 from steelyard.io.object_folders import read_track
 from steelyard.io.ply_files import read_mesh
+from steelyard.io.recordings.stream_files import open_table
 from steelyard.io.shapes.parts_files import read_parts
 from steelyard.io.shapes.pcd_files import read_pcd
-from steelyard.io.tables.files import open_table
 
 TOO_MUCH = "F: holds 3 MiB, more than the 1 MiB that are read. Give fewer rows, points or views at once."
 

@@ -25,7 +25,7 @@ from steelyard.io.recordings.description import (
 )
 from steelyard.io.rotations import ANGULAR, FORMS, TURNS
 from steelyard.io.streams.entries import FRAMED, LONGEST_DELAY, MOUNTED, QuantitySpec, StreamSpec, TimeSpec
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.tables.files import Columns, Header
 from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, QUANTITIES, Mount, Recording
 from steelyard.spatial import Pose, Rotation

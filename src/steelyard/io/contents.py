@@ -148,7 +148,7 @@ def array_of(path: Path, entry: Mapping[str, Any], key: str, shape: Shape, of: s
     """Return the finite numbers of a shape under `key`; raises BadFile, which says what they are `of` in words."""
     value = entry.get(key)
     if not _fits(value, shape):
-        raise _unfit(path, key, of, f"{_counted(shape)} finite {_numbers_word(shape)}")
+        raise _unfit(path, f'"{key}"{of}', "finite ", shape, "")
     return np.array(value, np.float64)
 
 
@@ -158,7 +158,7 @@ def array_or_none(path: Path, entry: Mapping[str, Any], key: str, shape: Shape) 
     if value is None:
         return None
     if not _fits(value, shape, gaps=True):
-        raise _unfit(path, key, "", f"{_counted(shape)} {_numbers_word(shape)} or null")
+        raise _unfit(path, f'"{key}"', "", shape, " or null")
     return np.array(value, np.float64) if _fits(value, shape) else None
 
 
@@ -185,13 +185,7 @@ def _fits(value: Any, shape: Shape, gaps: bool = False) -> bool:
     return all(_fits(item, shape[1:], gaps) for item in value)
 
 
-def _counted(shape: Shape) -> str:
-    return " x ".join("n" if length is None else str(length) for length in shape) or "one"
-
-
-def _numbers_word(shape: Shape) -> str:
-    return "numbers" if shape else "number"
-
-
-def _unfit(path: Path, key: str, of: str, wanted: str) -> BadFile:
-    return BadFile(f'{path}: "{key}"{of} must be {wanted}; found something else.')
+def _unfit(path: Path, what: str, finite: str, shape: Shape, or_else: str) -> BadFile:
+    count = " x ".join("n" if length is None else str(length) for length in shape) or "one"
+    numbers = "numbers" if shape else "number"
+    return BadFile(f"{path}: {what} must be {count} {finite}{numbers}{or_else}; found something else.")

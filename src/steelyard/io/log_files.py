@@ -12,11 +12,10 @@ from steelyard.io.contents import load_toml
 from steelyard.io.recordings import guess
 from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.recordings.description import Description, parse_description
-from steelyard.io.recordings.stream_files import open_tables, own_rows, read_cells, streams_of
+from steelyard.io.recordings.stream_files import open_table, open_tables, own_rows, read_cells, streams_of
 from steelyard.io.streams.channels import without_missing
 from steelyard.io.streams.entries import StreamSpec
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table, find_file, open_table
+from steelyard.io.tables.files import Columns, Table, find_file
 from steelyard.logs.recording import QUANTITIES, Recording, Stream
 from steelyard.robots.serial import SerialArm
 

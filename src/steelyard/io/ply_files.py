@@ -32,7 +32,7 @@ _ONE_PART = 'its faces have no "part": all of it was taken as one part of one de
 class _Element:
     name: str
     count: int
-    fields: tuple[tuple[str, str, str], ...]  # name, type of the values, type of a list's length or ""
+    fields: list[tuple[str, str, str]]  # name, type of the values, type of a list's length or ""
 
 
 def read_ply(path: Path | str) -> dict[str, dict[str, Column]]:
@@ -67,13 +67,13 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
             case ["format", kind, _]:
                 order = _ORDERS.get(kind)
             case ["element", name, count] if count.isdecimal() and len(count) <= _MOST_DIGITS:
-                elements.append(_Element(name, int(count), ()))
+                elements.append(_Element(name, int(count), []))
             case ["property", kind, name] if kind in _TYPES and elements:
-                elements[-1] = _with(elements[-1], (name, _TYPES[kind], ""))
+                elements[-1].fields.append((name, _TYPES[kind], ""))
             case ["property", "list", length, kind, name] if {length, kind} <= set(_TYPES) and elements:
                 if _TYPES[length][0] == "f":
                     raise BadFile(f'{path}: the lists "{name}" count in {length}; lengths are whole numbers.')
-                elements[-1] = _with(elements[-1], (name, _TYPES[kind], _TYPES[length]))
+                elements[-1].fields.append((name, _TYPES[kind], _TYPES[length]))
             case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
                 pass
             case _:
@@ -92,10 +92,6 @@ def _require_names_apart(path: Path, elements: list[_Element]) -> None:
         names = [name for name, _, _ in element.fields]
         if twice := [name for name in names if names.count(name) > 1]:
             raise BadFile(f'{path}: element "{element.name}" has {names.count(twice[0])} properties "{twice[0]}".')
-
-
-def _with(element: _Element, field: tuple[str, str, str]) -> _Element:
-    return _Element(element.name, element.count, (*element.fields, field))
 
 
 def _binary(path: Path, element: _Element, data: bytes, order: str) -> tuple[Any, int]:

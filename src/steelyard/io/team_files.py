@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -17,8 +17,7 @@ from steelyard.io.recordings.arm_joints import arm_of, pose_channels, posed, wit
 from steelyard.io.recordings.description import default_gravity
 from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
 from steelyard.io.streams.entries import StreamSpec
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table, find_file
+from steelyard.io.tables.files import Columns, Table, find_file
 from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, parse_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
@@ -111,16 +110,13 @@ def _meetings(said: TeamDescription, where: str) -> list[_Meeting]:
             members.append((robot, own))
     _require_equal_counts(said, where)
     return [
-        _Meeting(key if isinstance(key, str) else _numbered(key, found), tuple(members))
+        # Without a name it is the kind, with its number where there are several.
+        _Meeting(
+            key if isinstance(key, str) else f"{key[0]} {key[1]}" if (key[0], 2) in found else key[0], tuple(members)
+        )
         for key, members in found.items()
         if not all(own.away for _, own in members)
     ]
-
-
-def _numbered(key: tuple[Kind, int], all_keys: Container[object]) -> str:
-    """Return the name of a recording that has none: its kind, with its number where there are several."""
-    kind, number = key
-    return f"{kind} {number}" if (kind, 2) in all_keys else kind
 
 
 def _require_equal_counts(said: TeamDescription, where: str) -> None:

@@ -24,8 +24,7 @@ from steelyard.io.streams.usual_names import (
     Names,
     compared,
 )
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table
+from steelyard.io.tables.files import Columns, Table
 from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_unit, unit_by_size
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 

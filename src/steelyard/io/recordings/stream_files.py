@@ -13,14 +13,46 @@ import numpy as np
 
 from steelyard import check
 from steelyard.check import Array, Mask
-from steelyard.errors import BadDescription, BadValue
+from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.entries import listed
 from steelyard.io.streams.channels import channel_with_gaps, require_one_length
 from steelyard.io.streams.clocks import Clock, common_origin, one_column, require_likely_step, steady
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
+from steelyard.io.tables.files import TEXT, Columns, Table, choose_columns, find_file
 from steelyard.logs.recording import Stream
+
+_KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag"
+
+
+def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | None = None) -> Table:
+    """Look at the head of a data file and return its table; raises BadFile.
+
+    topic   that of a bag
+    frames  of a topic of transforms: the pose of the second in the first
+    """
+    from steelyard.io import bags
+    from steelyard.io.tables import array_table, bag_table, parquet_table, text_table, transform_table
+
+    suffix = (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
+    if bags.is_bag(path):
+        if topic is not None and frames is not None:
+            return transform_table.TransformTable.open(path, topic, frames)
+        return bag_table.BagTable.open(path, topic)
+    if path.is_dir() and (inside := bags.bag_in(path)):
+        raise BadFile(f"{path}: the folder of a bag, without its metadata.yaml. Name the file in it: {inside.name}")
+    if topic is not None:
+        raise BadDescription(f'{path}: "topic" belongs to a bag ({", ".join(bags.SUFFIXES)}, or the folder of one).')
+    if path.is_dir():
+        raise BadFile(f"{path}: this is a folder, not a file of data. Name the file in it.")
+    if suffix not in (*TEXT, ".npz", ".parquet"):
+        raise BadFile(f'{path}: unknown kind of data file "{suffix or path.name}". Readable are {_KINDS}.')
+    if path.stat().st_size == 0:
+        raise BadFile(f"{path}: the file is empty (0 bytes). Record again, or correct the path.")
+    if suffix == ".npz":
+        return array_table.ArrayTable.open(path)
+    if suffix == ".parquet":
+        return parquet_table.ParquetTable.open(path)
+    return text_table.TextTable.open(path)
 
 
 def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> list[Table]:

@@ -11,7 +11,7 @@ import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
 from steelyard.io.contents import require_bounded
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.tables.files import Columns, Header
 
 
 def _pyarrow() -> tuple[Any, Any]:

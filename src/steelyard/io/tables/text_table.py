@@ -18,7 +18,7 @@ import numpy as np
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.contents import require_bounded
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.tables.files import Columns, Header
 from steelyard.io.tables.text_blocks import blocks, decoded, head_lines
 from steelyard.io.tables.text_cells import (
     STAMP_TYPE,

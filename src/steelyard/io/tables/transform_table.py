@@ -24,8 +24,8 @@ from steelyard.io.contents import require_bounded
 from steelyard.io.entries import listed
 from steelyard.io.rotations import NORM, rotation_of
 from steelyard.io.streams.channels import MOST_MISSING
-from steelyard.io.table_header import Columns, Header
 from steelyard.io.tables.bag_table import STAMP, stamps_of
+from steelyard.io.tables.files import Columns, Header
 from steelyard.spatial import Pose, Rotation
 
 _NAMES = (STAMP, *(f"position.{axis}" for axis in "xyz"), *(f"rotation.{part}" for part in "xyzw"))
