@@ -41,10 +41,9 @@ def _read(path: Path, data: Path | None) -> Recording:
     if path.suffix.lower() != ".toml":
         table = open_table(path)
         description, cells = guess.describe(table)
-        joined = [table] * len(description.streams)
-        own = [cells] if len(joined) == 1 else read_cells(description.streams, joined)
-        rows = own_rows(description.streams, joined, own)
-        read = recording_of(description, joined, rows, path.name)
+        tables = [table] * len(description.streams)
+        own = [cells] if len(tables) == 1 else read_cells(description.streams, tables)
+        read = recording_of(description, tables, own_rows(description.streams, tables, own), path.name)
         return replace(read, name=path.stem, described=False, sign_said=False)
     description = parse_description(load_toml(path), path.name)
     tables = open_tables(description.streams, path.parent, data)

@@ -94,7 +94,8 @@ def read_object(folder: Path | str, *, motion: bool = True) -> KnownObject:
     cloud = _cloud(folder / "points.npz", mesh)
     truth, X_SO = truth_in_sensor(folder / "truth.json", facts)
     unseen = unseen_finding(parts, cloud)
-    rows = _rows(facts, parts)
+    said = {row.get("label"): row for row in facts.get("parts", [])}
+    rows = [said.get(label, {}) for label in parts.label.tolist()]
     names, gradings = (tuple(str(row.get(key, "")) for row in rows) for key in ("name", "grading"))
     return KnownObject(
         name=str(facts.get("slug", folder.resolve().name)),
@@ -151,12 +152,6 @@ def truth_in_sensor(path: Path, facts: dict[str, Any]) -> tuple[InertialParamete
         return whole.require_consistent().in_frame(X_SO), X_SO
 
     return in_file(path, made)
-
-
-def _rows(facts: dict[str, Any], parts: Parts) -> list[dict[str, Any]]:
-    """Return what truth.json says of each part, an empty entry where it says nothing."""
-    said = {row.get("label"): row for row in facts.get("parts", [])}
-    return [said.get(label, {}) for label in parts.label.tolist()]
 
 
 def _masses(path: Path, rows: list[dict[str, Any]]) -> Array | None:

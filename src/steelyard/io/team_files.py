@@ -145,10 +145,11 @@ def _recording(
     down = [robot.gravity for robot, own in meeting.members for _ in own.streams]
     gravity = [default_gravity() if known is None else known for known in down]
     made = streams_of(specs, tables, cells, gravity, gaps=False)
-    streams = {spec.where: _without_zeros(spec, stream) for spec, stream in zip(specs, made, strict=True)}
-    for spec, owner in zip(specs, owners, strict=True):
-        if owner in arms:
-            streams[spec.where] = posed(spec, streams[spec.where], arms[owner])
+    streams = {}
+    for spec, stream, owner in zip(specs, made, owners, strict=True):
+        if spec.zero_torque:  # it was only said to be zero
+            stream = replace(stream, channels={n: v for n, v in stream.channels.items() if n != "torque"})
+        streams[spec.where] = posed(spec, stream, arms[owner]) if owner in arms else stream
     tracks = {
         robot.name: _track(robot, own, [streams[spec.where] for spec in own.streams])
         for robot, own in meeting.members
@@ -157,12 +158,6 @@ def _recording(
     away = frozenset(robot.name for robot, own in meeting.members if own.away)
     with _at(where):
         return TeamRecording(meeting.members[0][1].kind, tracks, meeting.name, away)
-
-
-def _without_zeros(spec: StreamSpec, stream: Stream) -> Stream:
-    """Return the stream without a torque that was only said to be zero."""
-    channels = {n: values for n, values in stream.channels.items() if not (n == "torque" and spec.zero_torque)}
-    return replace(stream, channels=channels)
 
 
 def _track(robot: RobotSpec, own: RecordingSpec, streams: Sequence[Stream]) -> Track:

@@ -52,7 +52,9 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
     for k, name in enumerate(names):
         depth[k] = _sized(folder / "depth" / f"{name}.png", read_depth, size)
         if rgb is not None:
-            rgb[k] = _sized(_colour(folder / "color", name), read_colour, size)
+            colours = [folder / "color" / f"{name}.{ending}" for ending in _COLOUR]
+            found = next((path for path in colours if path.exists()), colours[0])
+            rgb[k] = _sized(found, read_colour, size)
         if progress:
             progress(k + 1, len(names))
     table = _table(folder / "table.json") if (folder / "table.json").exists() else None
@@ -154,12 +156,6 @@ def _name(path: Path, line: int, name: str) -> str:
             f'{path}: line {line}: "{name}" is no name of a view. Use letters, digits, - and _ without folders.'
         )
     return name
-
-
-def _colour(folder: Path, name: str) -> Path:
-    """Return where the colour of a view lies, as cameras write it; the first of these names where it is missing."""
-    paths = [folder / f"{name}.{ending}" for ending in _COLOUR]
-    return next((path for path in paths if path.exists()), paths[0])
 
 
 def _sized(path: Path, read: Callable[[Path], Any], size: tuple[int, int]) -> Any:

@@ -10,8 +10,7 @@ from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.clocks import examine_clock, examine_offset
 from steelyard.sanity.readings.conventions import examine_conventions, examine_turns
 from steelyard.sanity.readings.silent import without_silent
-from steelyard.sanity.readings.turning import examine_turning
-from steelyard.sanity.readings.units import examine_units
+from steelyard.sanity.readings.units import examine_turning, examine_units
 from steelyard.sanity.rows.judged import dead_channels, examine_rows
 from steelyard.sanity.rows.still_rows import examine_memory, examine_sparse
 

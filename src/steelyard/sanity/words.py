@@ -30,9 +30,10 @@ def _listed(vector: Array, places: int) -> str:
     return ", ".join(f"{v:.{places}f}" for v in np.round(vector, places) + 0.0)
 
 
-def mount_of(stream: Stream, turn: Rotation) -> Rotation:
-    """Return how the frame of a stream lies in S, whose wrench is turned by `turn` against what S would feel."""
-    return turn.inverse() if stream.turn is None else turn.inverse() @ stream.turn
+def _mount(stream: Stream, turn: Rotation) -> str:
+    """Return the rotation vector of a stream's frame in S; its wrench is turned by `turn` against what S would feel."""
+    mount = turn.inverse() if stream.turn is None else turn.inverse() @ stream.turn
+    return ", ".join(f"{v:.4f}" for v in mount.log() + 0.0)
 
 
 def mount_remedy(stream: Stream, turn: Rotation) -> str:
@@ -40,10 +41,10 @@ def mount_remedy(stream: Stream, turn: Rotation) -> str:
     beside = ""
     if stream.arm is not None:
         beside = f", position = [{', '.join(f'{v:.6g}' for v in stream.arm)}], unit = 'm'"
-    rotation = f"rotation = [{vector(mount_of(stream, turn))}], form = 'rotation-vector'"
+    rotation = f"rotation = [{_mount(stream, turn)}], form = 'rotation-vector'"
     return f"Set mount = {{ {rotation}{beside} }} for '{stream.name}', or correct the poses."
 
 
-def vector(rotation: Rotation) -> str:
-    """Return the rotation vector [rad] in words."""
-    return ", ".join(f"{v:.4f}" for v in rotation.log() + 0.0)
+def mounted(stream: Stream, turn: Rotation) -> str:
+    """Say how the frame of a stream seems to lie in S, by its rotation vector."""
+    return f"'{stream.name}' looks mounted by the rotation vector ({_mount(stream, turn)}) rad in S"

@@ -83,17 +83,13 @@ def _log(recording: Recording) -> str:
             "a description has no words for channels of the wrench that do not measure: "
             "write the recording as it was read, before its dead channels were found."
         )
-    lines = ["[log]", *_gravity(recording), *_sign(recording)]
+    lines = ["[log]", *_gravity(recording)]
+    # Where nothing said the sign that a description without it has, too, it is left out.
+    if recording.sign_said or recording.wrench_sign != Description.wrench_sign:
+        lines.append(f'wrench  = "{next(word for word, sign in SIGNS.items() if sign == recording.wrench_sign)}"')
     if recording.tool is not None:
         lines.append(f"tool    = {toml_string(str(Path(recording.tool).absolute()))}")
     return "\n".join(lines) + "\n"
-
-
-def _sign(recording: Recording) -> list[str]:
-    """Return the line of the wrench's sign, none where nothing said the one that a description without it has, too."""
-    if not recording.sign_said and recording.wrench_sign == Description.wrench_sign:
-        return []
-    return [f'wrench  = "{next(word for word, sign in SIGNS.items() if sign == recording.wrench_sign)}"']
 
 
 def _gravity(recording: Recording) -> list[str]:

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -110,7 +112,7 @@ def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamS
         raise entry.error('"joint_torque" is of use for an Omnid of a team only. Leave it out: the sensor measures.')
     zero = entry.values.get("torque") == "zero"
     names = [name for name in (*QUANTITIES, *ROBOT) if name in entry and not (zero and name == "torque")]
-    steps = {
+    steps: dict[str, Callable[[Entry], Any]] = {
         "time": _time,
         **{name: partial(_quantity, name=name, arm=arm) for name in names},
         "kind": _kind,
@@ -120,14 +122,17 @@ def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamS
     }
     given = {key: partial(step, entry) for key, step in steps.items() if key in entry}
     found = gathered({"keys": lambda: bare.only(*_KEYS, *(ROBOT if robot else _JOINT)), **given})
-    kind = found.get("kind")
+    kind, time = found.get("kind"), found.get("time")
+    if time is None and "topic" in entry and kind != "poses":
+        # A topic whose stream names no clock has the stamps of its messages [ns].
+        time = TimeSpec(("stamp",), ("ns",), 0.0, f"{entry.where}, time")
     if not names:
         raise entry.error('no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }')
     return StreamSpec(
         path,
         tuple(found[name] for name in names),
         entry.where,
-        found.get("time") or _stamped(entry, kind),
+        time,
         kind == "poses",
         zero,
         found.get("delay"),
@@ -144,13 +149,6 @@ def _kind(stream: Entry) -> str | None:
     if kind == "poses" and "time" in stream:
         raise stream.error('kind = "poses" is a table of still poses without time; leave out "time" or "kind".')
     return kind
-
-
-def _stamped(stream: Entry, kind: str | None) -> TimeSpec | None:
-    """Return the clock of a topic whose stream names none: the stamps of its messages [ns]."""
-    if "topic" not in stream or kind == "poses":
-        return None
-    return TimeSpec(("stamp",), ("ns",), 0.0, f"{stream.where}, time")
 
 
 def _frames(stream: Entry) -> tuple[str, str]:

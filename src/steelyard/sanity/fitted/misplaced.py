@@ -172,7 +172,10 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
     once = rows.solve()
     phi, place = once.phi, np.zeros(3)
     lever = lever_matrix(rows.log.angular_velocity, rows.log.angular_acceleration)
-    axes, blind = _axes(lever)
+    # The axes of S along which turns show a point, and the one along which they do not.
+    values, axes = np.linalg.eigh(np.einsum("nki,nkj->ij", lever, lever))
+    seen = values > BLIND * values[2]
+    axes, blind = (np.eye(3), None) if seen.all() else (axes[:, seen], axes[:, 0])
     for _ in range(ROUNDS):
         # What a body misses in its wrench where the point at one metre along each axis is taken for S.
         missed = -np.concatenate([cross_matrix(phi[1:4]) @ lever, phi[0] * lever], 1) @ axes
@@ -212,10 +215,3 @@ def examine_place(
     ratio, std = found.larger
     # A point at the centre of mass itself has no ratio that tells.
     return None, (opposed(ratio, std) or compared(ratio, std)) if std < TOLD * abs(ratio) else ()
-
-
-def _axes(lever: Array) -> tuple[Array, Array | None]:
-    """Return the axes of S (3, k) along which turns (N, 3, 3) show a point, and the one along which they do not."""
-    values, axes = np.linalg.eigh(np.einsum("nki,nkj->ij", lever, lever))
-    seen = values > BLIND * values[2]
-    return (np.eye(3), None) if seen.all() else (axes[:, seen], axes[:, 0])

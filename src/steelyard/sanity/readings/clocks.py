@@ -57,7 +57,10 @@ def examine_clock(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]
         return recording, ()
     said = {UNITS.index(s.said) for s in recording.streams}
     for steps, seconds in enumerate(SMALLER[: len(UNITS) - 1 - max(said)], 1):
-        quicker = _with_stamps(recording, seconds)
+        # A delay was declared in a unit of its own.
+        quicker = replace(
+            recording, streams=tuple(replace(s, time=np.asarray(s.time) * seconds) for s in recording.streams)
+        )
         if _one_mass(quicker):
             return quicker, (_finding(said, steps),)
     return _doubted(recording), ()
@@ -92,12 +95,6 @@ def _finding(said: set[int], steps: int) -> Finding:
         which, remedy = f"in units {1000**steps:.3g} times smaller than said", f"Set in time of every stream {pairs}."
     text = f"The stamps are {which}: so read, the load is accelerated as it is weighed. The answer assumes this."
     return Finding("time-unit", text, remedy)
-
-
-def _with_stamps(recording: Recording, seconds: float) -> Recording:
-    """Return the recording with stamps of so many seconds each; a delay was declared in a unit of its own."""
-    streams = (replace(s, time=None if s.time is None else s.time * seconds) for s in recording.streams)
-    return replace(recording, streams=tuple(streams))
 
 
 def _one_mass(recording: Recording) -> bool:

@@ -12,7 +12,7 @@ from steelyard.sanity.readings.glance import Glance
 from steelyard.sanity.readings.rivals import LEVEL, MUCH_BETTER, STEEP, Reading, sign_of
 from steelyard.sanity.readings.static_fit import StaticFit
 from steelyard.sanity.readings.tilt import GlanceTilt, Mirror, Turn, mirrored, tilt_of, turned_sensor
-from steelyard.sanity.words import axis_words, direction_words, mount_of, mount_remedy, unexplained, vector
+from steelyard.sanity.words import axis_words, direction_words, mount_remedy, mounted, unexplained
 
 # With fewer poses or stretches than this, a direction of gravity fits by chance.
 FEWEST_BLOCKS = 6
@@ -54,8 +54,7 @@ def _mixed_finding(mirror: Mirror, given: StaticFit) -> Finding:
 def _turned_finding(turned: Turn, given: StaticFit, stream: Stream) -> Finding:
     message = (
         f"The wrench is turned by {np.degrees(turned.rotation.angle()):.0f} degrees against the frame whose "
-        f"rotation is given: '{stream.name}' looks mounted by the rotation vector "
-        f"({vector(mount_of(stream, turned.rotation))}) rad in S. So read, "
+        f"rotation is given: {mounted(stream, turned.rotation)}. So read, "
         f"{unexplained(turned.force_share, given.force_share, 'the force')}; the answer does not assume this."
     )
     return Finding("sensor-turned", message, mount_remedy(stream, turned.rotation), left_in=True)

@@ -76,7 +76,8 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
     found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
     angle = angle_between(found, gravity)
     best = better_fit(view, found, rotation)
-    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _axis_unseen(shown))
+    unseen = None if np.trace(shown) > 2.5 else np.asarray(np.linalg.eigh(shown)[1][:, 0])
+    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, unseen)
 
 
 def free_direction(
@@ -157,13 +158,6 @@ def blind_axis(view: Glance, rotation: Array) -> Array | None:
     values, axes = np.linalg.eigh(np.einsum("nik,nil->kl", centred, centred))
     bar = _BLIND * float(values[2])
     return np.asarray(axes[:, 0]) if values[0] < bar < values[1] else None
-
-
-def _axis_unseen(seen: Array) -> Array | None:
-    if np.trace(seen) > 2.5:
-        return None
-    _, axes = np.linalg.eigh(seen)
-    return np.asarray(axes[:, 0])
 
 
 def blind_tilt(view: Glance, gravity: Array, blind: Array) -> tuple[Finding, ...]:

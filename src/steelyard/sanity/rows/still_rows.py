@@ -107,7 +107,9 @@ def examine_memory(recording: Recording) -> Recording:
     """Return a table of still poses with rows that remember each other averaged; a note says so."""
     if not all(s.time is None and s.poses for s in recording.streams):
         return recording
-    down = next((d for s in recording.streams if (d := _down(s)) is not None), None)
+    # Rotations, or else gravity as one of the channels tells it.
+    telling = ("rotation", "gravity", "specific_force")
+    down = next((s.channels[q] for s in recording.streams for q in telling if q in s.channels), None)
     felt = [s.channels[q] for s in recording.streams for q in ("force", "torque") if q in s.channels]
     if down is None or any(len(values) != len(down) for values in felt):
         return recording
@@ -128,11 +130,6 @@ def examine_memory(recording: Recording) -> Recording:
     if apart >= WORTH_LESS:
         note = f"poses scatter {apart:.2g} times as much as their rows tell: one mean for each pose was read"
     return replace(recording, streams=streams, notes=(*recording.notes, f"{note}, {rows} in all"))
-
-
-def _down(stream: Stream) -> Array | None:
-    """Return rotations (N, 3, 3) of a stream, or else gravity (N, 3) as one of its channels tells it."""
-    return next((stream.channels[q] for q in ("rotation", "gravity", "specific_force") if q in stream.channels), None)
 
 
 def _apart(down: Array, other: Array) -> Array:
