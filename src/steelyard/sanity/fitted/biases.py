@@ -24,8 +24,8 @@ DRIFT_WEIGHT, DRIFT_ARM, DRIFT_SHARE = 0.02, 0.1, 0.8
 DRIFT_SURE, DRIFT_LEAST = 5.0, 1e-4
 _FEWEST_ROWS = 8
 
-# It is seen beyond so many standard deviations, by leaving out stretches, and where it leaves so much less of what
-# lasts for a second: sound made logs keep 0.96, a real sensor's errors with the pose 0.57.
+# A bias in the room is seen beyond so many standard deviations, by leaving out stretches, and where it leaves so much
+# less of what lasts for a second: sound made logs keep 0.96, a real sensor's errors with the pose 0.57.
 SURE, SLOWLY = 8.0, 0.5
 # ... and so much less of that than another direction of gravity, which has fewer numbers.
 BETTER = 0.8

@@ -25,7 +25,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.fitted.full_fit import Rows, moves
 
-# It is said beyond so many standard deviations, by leaving out stretches, and where it leaves so much less of what
+# A sag is said beyond so many standard deviations, by leaving out stretches, and where it leaves so much less of what
 # lasts for a second: sound made logs keep 0.97, a real sensor's errors with the pose 0.62.
 SAG_SURE, SAG_SLOWLY = 8.0, 0.5
 # Combinations of compliances that a body and a bias mimic to this share of their squares are not told.
@@ -35,14 +35,14 @@ _FEWEST_ROWS = 100
 _XX, _XY, _XZ, _YY, _YZ, _ZZ = forms.inertia_matrix(np.eye(10)[4:])
 _UNEVEN = np.stack([_XX - _YY, _YY - _ZZ, _XY, _XZ, _YZ])
 
-# It is said beyond so many standard deviations, by leaving out stretches, and where it leaves less of the residual.
+# Bending is said beyond so many standard deviations by leaving out stretches, and where it leaves less of the residual.
 BEND_SURE, BEND_LEFT = 6.0, 0.995
 # [Hz] the second derivative is taken below this; poses tell it no better.
 SLOW = 8.0
 # [s^2] Where none is seen, an arm may still have its first mode near 16 Hz, which moves an inertia by a bar of its own.
 USUAL = 1e-4
 
-# It is said where it is so large beside the bars that are.
+# What a filter takes is said where it is so large beside the bars that are.
 WORTH_SAYING = 1.0
 
 

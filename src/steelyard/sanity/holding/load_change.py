@@ -31,7 +31,7 @@ BEYOND_BIAS, LONGEST_LEVER = 40.0, 1.0
 SLIP = 0.003
 SLIPPED = "Grip the object tighter, or cut the log where it slipped."
 
-# Either side must hold this many rows.
+# Either side of a small slip must hold this many rows.
 SLIP_ROWS = 12
 # Of the squared residual of one body with a drift, a slip leaves no more than this share, and takes so many times as
 # much away as a bias that jumps at that time, and as a gravity that is tilted.
