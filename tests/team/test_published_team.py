@@ -15,7 +15,7 @@ from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation, Twist
 from steelyard.team import grasp_kinematics, inertia_matrix, loop_closure, mass_and_com
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.grasps import Grasps
+from steelyard.team.grasp_kinematics import Grasps
 from steelyard.team.published import PublishedTeam
 
 RNG = np.random.default_rng(11)

@@ -13,14 +13,13 @@ from steelyard.errors import BadValue
 from steelyard.logs.curve import Curve
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
-from steelyard.team.adjoint import adjoint_inverse, exp
+from steelyard.team.adjoint import adjoint_inverse, exp, moved, turned_by, turns_between, twists_between
 from steelyard.team.changes.slips import alone, find_slip
 from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.poses import statistic as pose_statistic
 from steelyard.team.poses.noise import _scores
 from steelyard.team.poses.rows import held
 from steelyard.team.poses.solver import SHOWN, Solver, unit
-from steelyard.team.turns import moved, turned_by, turns_between, twists_between
 
 
 @pytest.mark.parametrize("rows", [4, 5, 300])

@@ -61,7 +61,7 @@ def _published_grasps(log: TeamLog) -> Pose:
 def _joint_grasps(log: TeamLog) -> Pose:
     if needs_twists(log):
         return TwistTeam.of(log, clocks=True).fit.grasps
-    return PoseTeam.of(log, clocks=True).fit.team.grasps
+    return PoseTeam.of(log, clocks=True).fit.grasps
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(

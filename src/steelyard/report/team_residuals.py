@@ -13,8 +13,8 @@ from steelyard.report.contents import Residuals
 from steelyard.spatial import classical_acceleration, cross
 from steelyard.team.clocks.errors import ClockError, punctual
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.grasps import Grasps
-from steelyard.team.misread.taken import as_taken
+from steelyard.team.grasp_kinematics import Grasps
+from steelyard.team.misread.readings import as_taken
 
 CUTOFF_HZ = 3.0
 _PAUSE_S = 0.1

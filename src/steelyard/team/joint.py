@@ -14,7 +14,7 @@ from steelyard import check
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.changes.whose_slip import whose_slip
+from steelyard.team.changes.found import whose_slip
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.jumps import cut_at_jumps
 from steelyard.team.clocks.search import searched
@@ -23,11 +23,10 @@ from steelyard.team.estimate import TeamEstimate
 from steelyard.team.hinge.bodies import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
-from steelyard.team.level import Tilted
 from steelyard.team.misread.exchanged import require_own_files
 from steelyard.team.misread.poses import require_well_read
 from steelyard.team.misread.twists import require_twists_well_read
-from steelyard.team.motion_fit import F, MotionFit, against
+from steelyard.team.motion_fit import F, MotionFit, Tilted, against
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.poses.yielding import Yields, stiffened
@@ -106,7 +105,7 @@ class JointTeam:
     def _from_poses(self, log: TeamLog) -> Seen | TeamEstimate:
         """Return what poses show, or the answer itself where the payload is two bodies with a hinge."""
         log, standing, begun, yields = self._standing(log)
-        grasps, noise = standing.fit.team.grasps, standing.fit.noise
+        grasps, noise = standing.fit.grasps, standing.fit.noise
         spread = yields.widened(grasp_covariance(standing.fit), grasps, log.names.index(log.reference))
         spread = replace(spread, level=standing.level(log))
         late = against(standing.late, log.reference)

@@ -20,8 +20,7 @@ from steelyard.check import Array, Mask
 from steelyard.spatial import Pose, Rotation
 from steelyard.spatial.screws import exp_pose
 from steelyard.team.adjoint import BRACKETS, adjoint
-from steelyard.team.grasp_kinematics import Pair
-from steelyard.team.grasps import Grasps
+from steelyard.team.grasp_kinematics import Grasps, Pair
 
 _POLISH = 60  # secant steps at most; three robots take some ten until rounding stops them
 _SERIES = 8  # terms of the right Jacobian: corrections are a few degrees at most

@@ -24,8 +24,7 @@ from steelyard.logs.team_rows import TeamRows
 from steelyard.spatial import Pose
 from steelyard.team import grasp_kinematics
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
-from steelyard.team.grasp_kinematics import Pair
-from steelyard.team.grasps import Grasps
+from steelyard.team.grasp_kinematics import Grasps, Pair
 from steelyard.team.inertia_matrix import InertiaFit, Negative, inertia, made_positive, moment_about
 from steelyard.team.loop_closure import refine
 from steelyard.team.mass_and_com import MassAndCom, mass_and_com

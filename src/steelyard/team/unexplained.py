@@ -15,7 +15,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.misread.forces import likely_factor
-from steelyard.team.misread.torques import torque_factor
+from steelyard.team.misread.signs import torque_factor
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import Group, weight
 

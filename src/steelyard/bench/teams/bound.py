@@ -55,7 +55,7 @@ def bound(noise: TeamNoise, exact: TeamTrial) -> dict[str, Array]:
 
 
 def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:
-    grasps = standing.fit.team.grasps
+    grasps = standing.fit.grasps
     frame = balance_frame(grasps)
     D = summing(frame.inverse() @ grasps)
     forces = D[:, of_force(D.shape[1])]

@@ -16,8 +16,9 @@ from steelyard.check import FAILURES, Array
 from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.presence import LIGHT, SHARE, as_long, idle, let_go, presence_findings, strayers
-from steelyard.team.changes.slips import SlipAt
+from steelyard.team.changes.slips import Slip
 from steelyard.team.clocks.errors import NOTHING
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.motion_fit import F
 from steelyard.team.stacked import Stretch
 
@@ -93,14 +94,14 @@ def _without_slips(
 
     Clocks are judged before: one that is set anew passes for slips.
     """
-    team, slips = given, list[SlipAt]()
+    team, slips = given, list[Slip]()
     left = given.clock_errors(log) if clocks else NOTHING
     for _ in range(MOST_SLIPS):
         found = team.slip(log)
         if found is None:
             break
         if any(other[len(slips) : len(slips) + 1]):
-            found = replace(found, slip=replace(found.slip, robot=1 - found.slip.robot))
+            found = replace(found, robot=1 - found.robot)
         # Once more without what follows the slip, which has bent the first fit.
         before, again = team, edited(edit, [*slips, found])
         try:
@@ -113,7 +114,7 @@ def _without_slips(
             break
         measured = team.measured(log, found.beside(slips))
         # What bends the first fit looks larger in it.
-        if not measured.slip.large:
+        if not measured.large:
             break
         slips.append(measured)
     if not slips:
@@ -122,7 +123,7 @@ def _without_slips(
     return replace(team, findings=tuple(slip.finding(log) for slip in slips), clocks_left=left)
 
 
-def edited(edit: Edit, slips: Sequence[SlipAt]) -> Edit:
+def edited(edit: Edit, slips: Sequence[Slip]) -> Edit:
     """Return an edit of recordings after which slips are taken out too."""
 
     def both(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
@@ -140,3 +141,53 @@ def _unchanged(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
 
 def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, ...]:
     return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
+
+
+# Residuals of forces times those of torques, beside the other explanation's, from which on the wrenches tell.
+TOLD = 1.25
+DOUBT = "It may have been the other robot's: of two, only wrenches tell, and not here."
+Other = tuple[bool, ...]
+
+
+def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEstimate:
+    """Return the answer of a team with every slip taken for that of the robot with which the wrenches fit best.
+
+    answer  makes it with some slips, of those that motion shows, the clearest first, taken for the other robot's
+    """
+    found = answer(())
+    if len(log.names) != 2:
+        return found
+    chosen: Other = ()
+    doubtful = []
+    for number in range(_slips(found)):
+        try:
+            turned = answer((*chosen, True))
+        except FAILURES:
+            chosen = (*chosen, False)
+            continue
+        better = _misfit(found) / max(_misfit(turned), np.finfo(float).tiny)
+        chosen = (*chosen, better > 1)
+        found = turned if better > 1 else found
+        if 1 / TOLD < better < TOLD:
+            doubtful.append(number)
+    return _doubted(found, doubtful)
+
+
+def _slips(found: TeamEstimate) -> int:
+    return sum(finding.code == "grasp-slipped" for finding in found.findings)
+
+
+def _misfit(found: TeamEstimate) -> float:
+    return found.evidence.residual_force_N * found.evidence.residual_torque_Nm
+
+
+def _doubted(found: TeamEstimate, doubtful: Sequence[int]) -> TeamEstimate:
+    """Return the answer with a word at some of its slips, by number, that they may be the other robot's."""
+    findings, number = [], 0
+    for finding in found.findings:
+        if finding.code == "grasp-slipped":
+            if number in doubtful:
+                finding = replace(finding, message=f"{finding.message} {DOUBT}")
+            number += 1
+        findings.append(finding)
+    return replace(found, findings=tuple(findings))

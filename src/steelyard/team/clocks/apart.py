@@ -13,9 +13,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
+from steelyard.team.adjoint import turning_speed
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.clocks.search import FARTHEST_S, SHARE, STEP_S, correlation
-from steelyard.team.turns import turning_speed
 
 # Robots must turn alike at the shift (correlation), and leave less than this share of what they leave at shifts that a
 # fit or the search beside it finds.

@@ -21,9 +21,8 @@ from steelyard.errors import BadValue
 from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors
-from steelyard.team.clocks.steps import Step
-from steelyard.team.turns import turning_speed
+from steelyard.team.adjoint import turning_speed
+from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors, Step
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps, and jumps by so much about the
 # one that fits best throughout; speeds are those over OVER_S.

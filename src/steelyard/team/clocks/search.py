@@ -12,9 +12,9 @@ import numpy as np
 
 from steelyard.check import FAILURES, Array
 from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.team.adjoint import turning_speed
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
 from steelyard.team.motion_fit import F
-from steelyard.team.turns import turning_speed
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps of STEP_S.
 FARTHEST_S, SHARE, STEP_S = 2.0, 0.25, 0.05

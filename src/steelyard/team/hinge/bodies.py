@@ -13,7 +13,7 @@ from steelyard.spatial import Pose
 from steelyard.team.adjoint import exp
 from steelyard.team.estimate import BodyEstimate, TeamEstimate
 from steelyard.team.hinge.rows import COUNT, EXCHANGED, SECOND, SEVEN, WHOLE
-from steelyard.team.payload.shown import SHOWN
+from steelyard.team.payload.model import SHOWN
 from steelyard.team.split import hinge_words
 
 # Seven parameters of the whole in its ten: first moments across the hinge, second moments of mass, products.

@@ -14,9 +14,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.team.hinge.rows import BIAS, COUNT, Bands, Sums, noisy
 from steelyard.team.payload.bias_models import Recordings, ladder_of
+from steelyard.team.payload.fit import Round, settled
 from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.model import LEAST_MASS, Normal, least_noise, units_of_body
-from steelyard.team.payload.settling import Round, settled
 
 # The first of twelve is that of `_start`.
 FEWEST, ROUNDS = 2, 11

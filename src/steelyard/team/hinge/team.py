@@ -18,22 +18,19 @@ from steelyard.logs.log import Integers, Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.assembled import known
-from steelyard.team.consistent import consistent
+from steelyard.team.assembled import consistent, known
 from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
 from steelyard.team.hinge.bodies import FROM_TEN, both_bodies, second_body, seen_from, seven_rows
 from steelyard.team.hinge.payload import HingedPayload, Kind, fit_hinged_payload
 from steelyard.team.hinge.poses import GUESS, Hinged, HingedFit, finished, fit_hinged, followed, rates
-from steelyard.team.hinge.rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame
-from steelyard.team.hinge.signs import robot_of_other_sign
+from steelyard.team.hinge.rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame, robot_of_other_sign
 from steelyard.team.hinge.start import first_hinged
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.motion_fit import CLOCK_ROUNDS, PUNCTUAL, against, later
 from steelyard.team.payload.body_rows import BodyRows, reach, require_runs
 from steelyard.team.payload.doubt import turned_by_step
 from steelyard.team.payload.gain_sight import of_force
-from steelyard.team.payload.motion_noise import shares_of, tilt_noise
-from steelyard.team.payload.spectra import band_edges
+from steelyard.team.payload.spectra import band_edges, shares_of, tilt_noise
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.statistic import OWN
 from steelyard.team.poses.team import FEW_ROWS, mean_gravity

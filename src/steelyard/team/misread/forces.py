@@ -19,8 +19,7 @@ from steelyard.inertia.regressor import basis
 from steelyard.logs.log import Integers, Mask
 from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
 from steelyard.team.misread.signs import sign_finding
-from steelyard.team.payload.leftover import centred, pseudoinverse, scatter, unexplained
-from steelyard.team.payload.model import Group
+from steelyard.team.payload.model import Group, centred, pseudoinverse, scatter, unexplained
 
 # Both variances that are left must together, on average, fall by this factor each.
 FALLS = 4.0

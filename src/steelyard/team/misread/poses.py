@@ -17,6 +17,7 @@ from steelyard.errors import BadValue
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import extent
 from steelyard.team.changes.presence import SHARE as IDLE
 from steelyard.team.changes.presence import idle
 from steelyard.team.clocks.search import far_lags
@@ -24,7 +25,6 @@ from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
 from steelyard.team.poses.measured import TeamMotion, in_words
 from steelyard.team.poses.start import first_team
 from steelyard.team.stacked import Stretch, stretches
-from steelyard.team.turns import extent
 
 # Rows of a recording that are enough to tell; readings that are fitted at most.
 ROWS, MOST = 50, 4

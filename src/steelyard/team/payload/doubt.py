@@ -12,8 +12,7 @@ from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.gain_sight import gain_columns
-from steelyard.team.payload.leftover import scatter
-from steelyard.team.payload.model import Group
+from steelyard.team.payload.model import Group, scatter
 from steelyard.team.payload.spectra import Spectra
 
 # The features of the motion and the one of a bias among all that `Spectra` scatters.

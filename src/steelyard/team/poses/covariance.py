@@ -16,8 +16,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.spatial import cross, cross_matrix
 from steelyard.team.adjoint import adjoint
-from steelyard.team.poses.calibration import recurring
 from steelyard.team.poses.fit import PoseFit
+from steelyard.team.poses.recurring import recurring
 from steelyard.team.poses.statistic import OWN
 
 # Which of rotation and position of grasp and home, and delay, each parameter of a robot is.
@@ -114,7 +114,7 @@ def grasp_covariance(fit: PoseFit) -> Spread:
     blind[place] = fit.solved.lost[asked[grasp]]
     if len(delay):
         late = np.sqrt(np.maximum(_against(covariance[np.ix_(delay, delay)], fit.reference), 0))
-    turn = adjoint(fit.team.grasps)
+    turn = adjoint(fit.grasps)
     turn[:, 3:, :3] = 0.0
     return Spread(full, blind, late, turn, recurring=None if again is None else again.size)
 

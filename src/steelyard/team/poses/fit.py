@@ -182,14 +182,9 @@ class PoseFit:
         return self.rows.team
 
     @property
-    def J(self) -> Array:
-        """Residuals per motion of the payload (N, 6, 6)."""
-        return adjoint_inverse(self.team.grasps)
-
-    @property
-    def W(self) -> Array:
-        """Weights of residuals (N, 6)."""
-        return np.repeat(self.noise**-2.0, 3, axis=1)
+    def grasps(self) -> Pose:
+        """Where robots hold (N,), in the reference grasp."""
+        return self.team.grasps
 
 
 def fit_poses(

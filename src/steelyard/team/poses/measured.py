@@ -14,9 +14,9 @@ from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Integers, Mask
 from steelyard.logs.runs import distinct_rows
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import moved
 from steelyard.team.poses.statistic import scatter
 from steelyard.team.stacked import Stretch
-from steelyard.team.turns import moved
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,8 +17,8 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.log import Integers
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import turns_between
 from steelyard.team.poses.measured import Team, TeamMotion
-from steelyard.team.turns import turns_between
 
 # Turns about the one axis of rotation that are tried where it is the only one.
 TURNS = 24

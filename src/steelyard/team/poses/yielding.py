@@ -154,7 +154,7 @@ class _Pushed:
     def explained(self, columns: Array, robot: Integers) -> tuple[Array, Array]:
         """Return how far residuals go with columns (T, C, 6) of robots (C,), and standard deviations (C,)."""
         fit = self.team.fit
-        scores = Scores.of(fit.rows.residual[self.rows], columns, robot, fit.J, fit.W, STRETCHES)
+        scores = Scores.of(fit.rows.residual[self.rows], columns, robot, self.team.J, self.team.W, STRETCHES)
         size, covariances = scores.solved()
         std = np.sqrt(np.maximum(*(np.diag(V) for V in covariances)))
         return size, np.where(std > 0, std, np.inf)
@@ -186,7 +186,7 @@ def _yields(team: PoseTeam, known: Yields) -> Yields:
 
 def _grasps_and_homes(team: PoseTeam, rows: Integers) -> tuple[Array, Integers]:
     """Return how residuals move with grasps and homes (T, C, 6) of all but the reference, and whose they are (C,)."""
-    poses, others = team.fit.rows.data.poses[rows], [i for i in range(len(team.fit.J)) if i != team.fit.reference]
+    poses, others = team.fit.rows.data.poses[rows], [i for i in range(len(team.fit.noise)) if i != team.fit.reference]
     ones = np.broadcast_to(np.eye(6), (len(rows), 6, 6))
     columns = [np.concatenate([ones, adjoint_inverse(poses[:, i]).swapaxes(1, 2)], axis=1) for i in others]
     return np.concatenate(columns, axis=1), np.repeat(others, 12)

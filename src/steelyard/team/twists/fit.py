@@ -51,16 +51,6 @@ class TwistFit:
     delay_covariance: Array
     left: float
 
-    @property
-    def J(self) -> Array:
-        """Twists of the grasps per twist of the payload (N, 6, 6)."""
-        return adjoint_inverse(self.grasps)
-
-    @property
-    def W(self) -> Array:
-        """Weights of residuals (N, 6)."""
-        return np.repeat(self.noise**-2.0, 3, axis=1)
-
     def punctual(self, least: float, stds: float) -> bool:
         """Return whether all clocks are within `least` [s] or `stds` standard deviations of their mean.
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
@@ -15,16 +16,16 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.changes.found import Edit, without_changes
-from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
+from steelyard.team.changes.slips import Slip
+from steelyard.team.changes.slips_between import slip_between_twists
 from steelyard.team.clocks.errors import ClockErrors
-from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.level import Tilted, tilted
-from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, later
-from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.clocks.unsteady import clock_errors
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, Tilted, later, tilted
+from steelyard.team.payload.body_rows import PayloadRows, balance_frame, from_twists
 from steelyard.team.split import Split, smoothed, split_of
+from steelyard.team.stacked import Stretch
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twists.rows import TwistStretch, twist_stretches
-from steelyard.team.twists.slips_between import slip_between
 from steelyard.team.twists.statistic import TwistScatter, rates_of_change
 
 # Clocks that were moved are moved until the last step is below this share of what is moved for.
@@ -36,6 +37,8 @@ LOUD = 0.1
 @dataclass(frozen=True, eq=False)
 class TwistTeam(MotionFit):
     """The joint fit of twists; `reference` is the number of the robot in whose grasp the answer is given."""
+
+    DRIFTS: ClassVar[bool] = True
 
     parts: tuple[TwistStretch, ...]
     fit: TwistFit
@@ -66,41 +69,27 @@ class TwistTeam(MotionFit):
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        left = []
-        for part in self.parts:
-            slope = -rates_of_change(part)
-            apart = self._left(part)[0] - slope * self.fit.delays[:, None]
-            left.append(Left(part.rows.time, part.seen, apart, slope))
-        return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
+        slopes = [-rates_of_change(part) for part in self.parts]
+        late = [slope * self.fit.delays[:, None] for slope in slopes]
+        left = [(part, apart - more) for (part, apart), more in zip(self.left(), late, strict=True)]
+        return clock_errors(log, left, slopes, self.J, self.W)
 
-    def off(self, log: TeamLog) -> list[Array]:
-        """Return by how many times its noise each twist is off (T, N) what the others say, for every recording."""
-        noise = np.sqrt(np.einsum("nii->ni", noise_alone(self.fit.J, self.fit.W)))
-        raw = twist_stretches(log, self.late)
-        return [
-            np.sqrt(((self._left(was, now)[0] / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
-        ]
+    def left(self) -> list[tuple[Stretch, Array]]:
+        """Return the rows of every recording that were used beside residuals (T, N, 6) of their twists."""
+        return [(part.used, self._left(part)[0]) for part in self.parts]
 
-    def slip(self, log: TeamLog) -> SlipAt | None:
+    def left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
+        """Return all rows, used or not, beside residuals (T, N, 6) against the motion that those used show."""
+        every = zip(twist_stretches(log, self.late), self.parts, strict=True)
+        return [(raw.used, self._left(raw, now)[0]) for raw, now in every]
+
+    def slip(self, log: TeamLog) -> Slip | None:
         """Return the clearest slip, within a recording or else between two; none where a hinge is the cause."""
-        if self.split is not None and self.split.sure:
-            return None
-        J, W = self.fit.J, self.fit.W
-        every = (np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate for part in self.parts)
-        each, noise = enumerate(zip(self.parts, every, strict=True)), noise_alone(J, W)
-        within = clearest(slip_within(k, p.rows, apart, p.seen, noise, drifts=True) for k, (p, apart) in each)
-        if within is not None:
-            return within
-        return slip_between(self.parts, self.reference, lambda parts: _joint_fit(parts, log))
+        return None if self.split is not None and self.split.sure else super().slip(log)
 
-    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
-        """Return the slip with its time and step renewed against the others' motion."""
-        if found.between:
-            return found
-        raw, robot = twist_stretches(log, self.late)[found.recording], found.slip.robot
-        noise = noise_alone(self.fit.J, self.fit.W)[robot]
-        apart = np.cumsum(self._left(raw, self.parts[found.recording])[0][:, robot], axis=0) / raw.rows.rate
-        return found.renewed(apart, raw.seen[:, robot], raw.rows, noise, drifts=True)
+    def slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
+        """Return the clearest slip between two recordings, by fits to those before and to those after it."""
+        return slip_between_twists(self.parts, self.reference, lambda some: _joint_fit(some, log))
 
     @cached_property
     def split(self) -> Split | None:
@@ -164,11 +153,11 @@ class TwistTeam(MotionFit):
         """
         now = part if now is None else now
         fused, covariance = fused_twist(now.twist, now.seen, self.fit.grasps, self.fit.noise)
-        moved = np.einsum("nij,tj->tni", self.fit.J, fused)
+        moved = np.einsum("nij,tj->tni", self.J, fused)
         told = part.seen & now.seen.any(1, keepdims=True)
         return (part.twist - moved) * told[..., None], fused, covariance
 
-    def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
+    def rows(self, highest_hz: float) -> tuple[PayloadRows, Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
 
         The covariance (6, 6) is that of the fused twist, in the balance frame's axes.

@@ -9,6 +9,7 @@ Source: own; a random-effects model whose variances are found by moments.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -16,6 +17,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.team.poses.fit import PoseFit, Rows
 from steelyard.team.poses.statistic import OWN
+from steelyard.team.stacked import Stretch, row_slices
 
 # Rows that are enough for what is slow, and the least there must be.
 ROWS, FEWEST = 400, 40
@@ -107,3 +109,29 @@ def _scores(fit: PoseFit, rows: Rows, sized: Array) -> Array:
                 apart[:, robot, axis] = error
                 out.append(weight * replace(rows, apart=apart).pull(fit.noise))
     return np.array(out).reshape(-1, OWN * rows.data.count)
+
+
+# Rows that a rest must have, and rests and windows of motion that must be there to be compared.
+REST_ROWS, RESTS, WINDOWS = 10, 2, 4
+# Rests that would count more than this are left as they are: chance.
+LESS = 0.5
+
+
+def shares_at_rest(parts: Sequence[Stretch], fit: PoseFit) -> Array | None:
+    """Return how much each row (T,) counts, below one at rest; None where all count alike."""
+    rest = [part.kind == "still" for part in parts]
+    sizes = [len(part) for part in parts]
+    rows = round(np.median([n for n, still in zip(sizes, rest, strict=True) if still] or [0]))
+    if rows < REST_ROWS or all(rest):
+        return None
+    resting, moving = list[float](), list[float]()
+    for part, own, still in zip(parts, row_slices(parts), rest, strict=True):
+        left = (fit.rows.residual[own] / np.repeat(fit.noise, 3, axis=1))[part.seen.all(1)]
+        if len(left) >= rows / 2:
+            pieces = 1 if still else max(1, len(left) // rows)
+            means = [(piece.mean(0) ** 2).mean() for piece in np.array_split(left, pieces)]
+            (resting if still else moving).extend(means)
+    if len(resting) < RESTS or len(moving) < WINDOWS:
+        return None
+    share = max(float(np.mean(moving)) / max(float(np.mean(resting)), 1e-300), 1 / rows)
+    return np.repeat(np.where(rest, share, 1.0), sizes) if share < LESS else None
