@@ -26,8 +26,8 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
 from steelyard.pipelines.telling import MISREAD
-from steelyard.team.clocks.apart import together
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.lags import together
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.lost_wrenches import stuck_forces, without_clipped, without_frozen

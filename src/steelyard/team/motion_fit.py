@@ -43,10 +43,10 @@ class MotionFit(ABC):
 
     findings     what was found on the way
     clocks_left  what clocks seem to be off by in single recordings, told before slips are looked for
-    DRIFTS       whether residuals are of how fast grasps move: added up, they wander
+    ORDER        how often what is fitted is differentiated to accelerations: poses twice, twists once
     """
 
-    DRIFTS: ClassVar[bool] = False
+    ORDER: ClassVar[int] = 2
 
     parts: tuple[Any, ...]
     fit: Any
@@ -76,6 +76,16 @@ class MotionFit(ABC):
         """Return the clearest slip between two recordings, from where grasps are (T, N, 6) against the others."""
 
     @property
+    def apart(self) -> Array | None:
+        """By how much robots disagree (2,) [rad, m], where that may hide what the payload turned."""
+        return None
+
+    @property
+    def drifts(self) -> bool:
+        """Whether residuals are of how fast grasps move: added up, they wander."""
+        return self.ORDER == 1
+
+    @property
     def J(self) -> Array:
         """What grasps do per motion of the payload (N, 6, 6), each in its own axes."""
         return adjoint_inverse(self.fit.grasps)
@@ -97,7 +107,7 @@ class MotionFit(ABC):
         parts = [part for part, _ in every]
         apart = [self._places(alone(left, J, W), part) for part, left in every]
         noise, each = noise_alone(J, W), enumerate(zip(parts, apart, strict=True))
-        within = clearest(find_slip(k, part, moved, noise, self.DRIFTS) for k, (part, moved) in each)
+        within = clearest(find_slip(k, part, moved, noise, self.drifts) for k, (part, moved) in each)
         return self.slip_between(log, parts, apart) if within is None else within
 
     def measured(self, log: TeamLog, found: Slip) -> Slip:
@@ -109,11 +119,11 @@ class MotionFit(ABC):
             return step_between(found, [part for part, _ in every], [left for _, left in every])
         part, left = every[found.recording]
         noise = noise_alone(self.J, self.W)[found.robot]
-        return found.renewed(part, self._places(left[:, found.robot], part), noise, self.DRIFTS)
+        return found.renewed(part, self._places(left[:, found.robot], part), noise, self.drifts)
 
     def _places(self, left: Array, part: Stretch) -> Array:
         """Return how far grasps are off (T, ..., 6) by their residuals."""
-        return np.cumsum(left, axis=0) / part.rate if self.DRIFTS else left
+        return np.cumsum(left, axis=0) / part.rate if self.drifts else left
 
 
 F = TypeVar("F", bound=MotionFit)

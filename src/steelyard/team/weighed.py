@@ -12,7 +12,6 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
-from steelyard.spatial import Pose
 from steelyard.team.assembled import assembled, consistent, team_size
 from steelyard.team.changes.contact import unpropped, untouched, without_odd
 from steelyard.team.clocks.errors import ClockErrors, Errors
@@ -22,6 +21,7 @@ from steelyard.team.misread.files import require_metres
 from steelyard.team.misread.forces import with_one_reading
 from steelyard.team.misread.readings import maps_of
 from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign, with_torque_sign
+from steelyard.team.motion_fit import MotionFit, against
 from steelyard.team.payload.body_rows import PayloadRows, balance_frame, require_balance, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
@@ -61,30 +61,22 @@ TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
 class Seen:
     """What the motion of a team shows, before anything is weighed.
 
-    log           with clocks put right
-    grasps        (N,) in R, known to within `spread`     noise  (N, 2) of each robot
-    late          how late each clock is [s], beside what `begun` says of single recordings
-    left          last step of the fit [standard deviations]
-    rows          of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
-    order         how often the motion that they come from is differentiated: twice for poses, once for twists
-    down          (3,) gravity in R, None where nobody tells it
-    apart         (2,) [rad, m] by how much robots disagree, where that may hide what the payload turned
-    yields        how far grasps yield, by what they push; None where that was not asked
+    log       with clocks put right
+    motion    the joint fit     spread  to within which its grasps are known
+    begun     how late clocks are in single recordings, beside what the fit says
+    rows      of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
+    down      (3,) gravity in R, None where nobody tells it
+    yields    how far grasps yield, by what they push; None where that was not asked
     """
 
     log: TeamLog
-    grasps: Pose
+    motion: MotionFit
     spread: Spread
-    noise: Array
-    late: Mapping[str, float]
     begun: ClockErrors
-    left: float
     findings: tuple[Finding, ...]
     rows: PayloadRows
     path: Array
-    order: int
     down: Array | None
-    apart: Array | None = None
     yields: Yields | None = None
 
 
@@ -93,7 +85,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     wrists, highest_hz, and with_gain for `gains`: as of `JointTeam`
     """
-    log, grasps, spread = seen.log, seen.grasps, seen.spread
+    log, motion, grasps, spread = seen.log, seen.motion, seen.motion.fit.grasps, seen.spread
     require_metres(log.names, grasps)
     placed = balance_frame(grasps).inverse() @ grasps
     require_balance(log, [body for body, _ in seen.rows], placed)
@@ -102,7 +94,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     six_axis = np.array([not log.force_only(name) for name in log.names])
 
     def fitted(rows: PayloadRows) -> Weighing:
-        groups = _groups(rows, seen.path, highest_hz, seen.order)
+        groups = _groups(rows, seen.path, highest_hz, motion.ORDER)
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
@@ -130,11 +122,13 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         borne = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
         each = np.asarray(borne, np.float64)
         spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), each.transpose(2, 0, 1))
-    team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
+    team = _without_wrists(
+        assembled(log, grasps, spread, payload, D, against(motion.late, log.reference)), wrists, size
+    )
     team = clocked(team, seen.begun.first(log))
     # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
     found = (
-        *bad_robots(log.names, seen.noise),
+        *bad_robots(log.names, motion.fit.noise),
         *seen.begun.findings(log),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
@@ -145,11 +139,11 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *odd,
         *(gains(payload.gain, payload.gainless) if known else ()),
         *wrong,
-        *lost_directions(team.grasps, seen.down, seen.apart),
+        *lost_directions(team.grasps, seen.down, motion.apart),
         *open_parameters(team.identified, team.evidence.rank),
     )
-    said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
-    said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
+    said = (*unsettled(motion.fit.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
+    said = said if motion.ORDER == 1 else (*said, *uncalibrated(seen.spread.recurring))
     return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
 
 

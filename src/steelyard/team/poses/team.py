@@ -118,7 +118,7 @@ class PoseTeam(MotionFit):
         """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
         return bool((self.fit.noise > LOUD * self._moved).any())
 
-    @cached_property
+    @property
     def apart(self) -> Array | None:
         """By how much robots disagree (2,) [rad, m], where that is a good part of a turn that is more than it."""
         worst = self.fit.noise.max(0)
@@ -132,6 +132,11 @@ class PoseTeam(MotionFit):
     def gravity(self, log: TeamLog) -> Array:
         """Return gravity (3,) [m/s^2] in the reference home."""
         return mean_gravity(log, self.fit.team.homes)
+
+    def down(self, log: TeamLog) -> Array:
+        """Return the mean direction of gravity (3,) in R."""
+        mean = self.fit.team.motion.rotation.inverse().apply(self.gravity(log)).mean(0)
+        return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
 
     def tilt(self, log: TeamLog, spread: Spread) -> Tilted | None:
         """Return who disagrees on where gravity points, for homes turned as well as grasps are known to be."""

@@ -38,7 +38,7 @@ LOUD = 0.1
 class TwistTeam(MotionFit):
     """The joint fit of twists; `reference` is the number of the robot in whose grasp the answer is given."""
 
-    DRIFTS: ClassVar[bool] = True
+    ORDER: ClassVar[int] = 1
 
     parts: tuple[TwistStretch, ...]
     fit: TwistFit
