@@ -55,7 +55,7 @@ class Method:
 
 
 def _published_grasps(log: TeamLog) -> Pose:
-    return PublishedTeam(cutoff_hz=None, close_loops=False).grasps(log)[0].poses
+    return PublishedTeam(cutoff_hz=None, close_loops=False).grasps(log)[0]
 
 
 def _joint_grasps(log: TeamLog) -> Pose:

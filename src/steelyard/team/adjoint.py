@@ -1,4 +1,7 @@
-"""Small motions of poses: the adjoint, and rotation vector and position as one six-vector, angular first."""
+"""Small motions of poses: the adjoint, steps and differences as six-vectors, angular first, and how fast grasps turn.
+
+Passes over long paths are compiled.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,9 @@
-"""From the fits in the balance frame to one estimate in the reference grasp."""
+"""From the fits in the balance frame to one estimate in the reference grasp.
+
+Where the answer is none of a body, the physically consistent one nearest to it is given, in the metric of its own
+covariance.
+Source: log-Cholesky parameters of Rucker and Wensing 2022: every one of them is a body.
+"""
 
 from __future__ import annotations
 
@@ -6,23 +11,25 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.evidence import Evidence
 from steelyard.inertia import InertialParameters, forms
 from steelyard.inertia.forms import people_jacobian
 from steelyard.inertia.parameters import frame_change
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 from steelyard.team.payload.body_rows import balance_frame, reach
-from steelyard.team.payload.doubt import lost_turns, moved_by_gains, moved_by_grasps
+from steelyard.team.payload.doubt import lost_turns, moved_by, moved_by_gains, turned_by_step
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import SHOWN
 from steelyard.team.poses.covariance import Spread
 
 # [m] What is taken for the size of a team where the motion does not show where its grasps are.
 UNKNOWN_SIZE = 1.0
+STEPS = 60
+# Least eigenvalue of the pseudo-inertia, as a share of its middle one in units of mass and size, that counts as a body.
+MARGIN = 1e-6
 
 
 def team_size(grasps: Pose, spread: Spread) -> float:
@@ -37,7 +44,7 @@ def assembled(
     balance = balance_frame(grasps)
     size, placed = team_size(grasps, spread), balance.inverse() @ grasps
     spread = spread.with_lost(size)
-    moved = moved_by_grasps(payload, placed)
+    moved = moved_by(payload, turned_by_step(placed))
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
     if spread.blind.size:
         inner = inner + lost_turns(payload, placed, spread.unseen(size))
@@ -85,11 +92,6 @@ def known(body: InertialParameters, covariance: Array, units: Array) -> Mask:
     # The centre of mass is the first moment over the mass.
     small[1:] &= small[0]
     return np.asarray(small)
-
-
-STEPS = 60
-# Least eigenvalue of the pseudo-inertia, as a share of its middle one in units of mass and size, that counts as a body.
-MARGIN = 1e-6
 
 
 def consistent(phi: Array, covariance: Array, scale: Array) -> Array:

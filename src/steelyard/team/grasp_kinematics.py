@@ -14,7 +14,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array, Mask
-from steelyard.errors import BadValue, CannotAnswer
+from steelyard.errors import CannotAnswer
 from steelyard.spatial import Pose, Rotation, Twist, cross, cross_matrix
 
 # Second singular value of the angular velocities over the first: below it they are about one axis.
@@ -106,6 +106,22 @@ def star(names: Sequence[str], twists: Array, measured: Mask, reference: str) ->
     return found
 
 
+def from_star(names: Sequence[str], pairs: Mapping[str, Pair]) -> Pose:
+    """Return the poses (N,) of all grasps in that of the reference, which has no pair: its own is the identity."""
+    each = [pairs[name].pose if name in pairs else Pose.identity() for name in names]
+    turns, places = np.array([pose.rotation.matrix for pose in each]), np.array([pose.position for pose in each])
+    return Pose(Rotation(turns), places)
+
+
+def total_wrench(grasps: Pose, wrench: Array) -> Array:
+    """Return the sum (T, 6) [N m, N] over the team of wrenches (N, T, 6) given at the grasps (N,), at R's origin."""
+    turn, place = grasps.rotation.matrix, grasps.position
+    force = np.einsum("nij,ntj->nti", turn, wrench[..., 3:])
+    moment = np.einsum("nij,ntj->nti", turn, wrench[..., :3])
+    levers = cross(np.broadcast_to(place[:, None], force.shape), force)
+    return np.asarray(np.concatenate([moment + levers, force], -1).sum(0))
+
+
 def _covariance(turn: Rotation, place: Array, normal: Array, twist_j: Array, variance: Array) -> Array:
     """Return the formal covariance (6, 6) of a pair: white residuals, equal on the three axes of each kind.
 
@@ -119,34 +135,3 @@ def _covariance(turn: Rotation, place: Array, normal: Array, twist_j: Array, var
     shared = lever @ turned
     moved = shared @ lever.T + float(variance[3:].mean()) * inverse
     return np.block([[turned, shared.T], [shared, moved]])
-
-
-@dataclass(frozen=True, eq=False)
-class Grasps:
-    """Poses X_RG (N,) of every grasp in the reference grasp R, in the order of `names`; R's own is the identity."""
-
-    names: tuple[str, ...]
-    poses: Pose
-    reference: str
-
-    def __post_init__(self) -> None:
-        if self.poses.batch != (len(self.names),):
-            raise BadValue(f"{len(self.names)} robots need as many grasps; got batch shape {self.poses.batch}.")
-
-    @classmethod
-    def of(cls, poses: Mapping[str, Pose], reference: str) -> Grasps:
-        """Return the grasps of single poses by name."""
-        turns = np.array([pose.rotation.matrix for pose in poses.values()])
-        places = np.array([pose.position for pose in poses.values()])
-        return cls(tuple(poses), Pose(Rotation(turns), places), reference)
-
-    def __getitem__(self, name: str) -> Pose:
-        return self.poses[self.names.index(name)]
-
-    def total_wrench(self, wrench: Array) -> Array:
-        """Return the sum (T, 6) [N m, N] over the team of wrenches (N, T, 6) given at the grasps, at R's origin."""
-        turn, place = self.poses.rotation.matrix, self.poses.position
-        force = np.einsum("nij,ntj->nti", turn, wrench[..., 3:])
-        moment = np.einsum("nij,ntj->nti", turn, wrench[..., :3])
-        levers = cross(np.broadcast_to(place[:, None], force.shape), force)
-        return np.asarray(np.concatenate([moment + levers, force], -1).sum(0))

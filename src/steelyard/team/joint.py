@@ -20,7 +20,7 @@ from steelyard.team.clocks.jumps import cut_at_jumps
 from steelyard.team.clocks.lags import searched
 from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.bodies import hinge_findings
+from steelyard.team.hinge.payload import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
 from steelyard.team.misread.poses import require_own_files, require_well_read
@@ -28,7 +28,7 @@ from steelyard.team.misread.twists import require_twists_well_read
 from steelyard.team.motion_fit import F, MotionFit, Tilted
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
-from steelyard.team.poses.yielding import Yields, stiffened
+from steelyard.team.poses.yielding import stiffened
 from steelyard.team.published import require_wrenches
 from steelyard.team.split import UNPLACED, Split, find_split, rigidity_findings
 from steelyard.team.team_findings import gains, late_clocks, open_parameters
@@ -94,8 +94,17 @@ class JointTeam:
         return Seen(log, moving, spread, begun, tuple(found), made, path, moving.down())
 
     def _from_poses(self, log: TeamLog) -> Seen | TeamEstimate:
-        """Return what poses show, or the answer itself where the payload is two bodies with a hinge."""
-        log, standing, begun, yields = self._standing(log)
+        """Return what poses show, or the answer itself where the payload is two bodies with a hinge.
+
+        Raises BadValue where one robot's poses are misread.
+        """
+        of = partial(PoseTeam.of, other=self.slipped or ())
+        try:
+            log, standing, begun = self._fitted(log, of)
+        except check.FAILURES:
+            require_well_read(log)
+            raise
+        log, standing, yields = stiffened(log, standing, lambda stiff: of(stiff, self.clocks))
         reference = log.names.index(log.reference)
         spread = yields.widened(grasp_covariance(standing.fit), standing.fit.grasps, reference)
         spread = replace(spread, level=standing.level(log))
@@ -114,20 +123,6 @@ class JointTeam:
             log = log if tilt.odd is None else log.without_gravity(log.names[tilt.odd])
         made, path = standing.rows(log, self.highest_hz)
         return Seen(log, standing, spread, begun, tuple(found), made, path, standing.down(log), yields)
-
-    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors, Yields]:
-        """Return log, fit of poses and clocks like `_fitted`, and how far grasps yield.
-
-        Raises BadValue where one robot's poses are misread.
-        """
-        of = partial(PoseTeam.of, other=self.slipped or ())
-        try:
-            log, team, begun = self._fitted(log, of)
-        except check.FAILURES:
-            require_well_read(log)
-            raise
-        log, team, yields = stiffened(log, team, lambda stiff: of(stiff, self.clocks))
-        return log, team, begun, yields
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, ClockErrors]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""

@@ -1,8 +1,8 @@
-"""Wrenches of a robot that nobody measured: beyond the end of its sensor's range, or repeated by its driver.
+"""Wrenches of a robot that nobody measured: beyond the end of its sensor's range, repeated by its driver, or stuck.
 
 The sum over all robots is wrong by what it then pushed. Numbers are judged as they came, by exact repeats: of the
 extreme value of an axis over all recordings, or of whole rows one after the other, which those that a sensor measures
-are not, but for coarse ones at rest.
+are not, but for coarse ones at rest. A force that is the same throughout is named; nothing else can be done about it.
 Source: own.
 """
 
@@ -33,6 +33,8 @@ WRENCH = ("force", "torque")
 # A force is frozen that holds still for so many rows and so long [s], where others repeat the row before in no more
 # than this share.
 ROWS, SECONDS, BESIDE = 25, 0.25, 0.05
+FEWEST = 50  # rows in which noise shows
+VALUES = 10  # different numbers that noise has at the least
 
 
 def without_frozen(log: TeamLog) -> tuple[TeamLog, tuple[Finding, ...]]:
@@ -94,18 +96,15 @@ def _clipped(name: str, tracks: Sequence[Track]) -> tuple[list[Finding], dict[in
         values = np.concatenate([t.channels[quantity][mask] for t, mask in zip(tracks, measured, strict=True)])
         # An axis that is mostly cut off carries no noise itself.
         for axis in range(3) if (noise_shares(values) > NOISE_SHARE).any() else ():
-            for extreme in _ends(values[:, axis]):
-                rows = clipped_rows(values[:, axis], extreme, begins[:-1])
-                if rows.any():
+            column = values[:, axis]
+            for extreme in (float(column.min()), float(column.max())):
+                rows = clipped_rows(column, extreme, begins[:-1])
+                # Of a robot that pushes nothing at all nothing is no limit.
+                if extreme and rows.any():
                     said.append((quantity, axis, extreme, int(rows.sum())))
                     gone |= rows
     found = [saturated(name, *each, len(gone), _done(gone)) for each in said]
     return found, {} if gone.mean() > MOST_LEFT_OUT else _by_track(gone, measured, begins)
-
-
-def _ends(column: Array) -> tuple[float, ...]:
-    """Return the extreme values of a channel; that of a robot which pushes nothing at all is no limit."""
-    return tuple(float(end) for end in (column.min(), column.max()) if end != 0)
 
 
 def _by_track(gone: Mask, measured: Sequence[Mask], begins: Integers) -> dict[int, Mask]:
@@ -135,10 +134,6 @@ def _without(log: TeamLog, lost: Sequence[Mapping[str, Mask]]) -> TeamLog:
 def _without_wrench(track: Track, rows: Mask) -> Track:
     valid = {q: mask & ~rows if q in WRENCH else mask for q, mask in track.valid.items()}
     return replace(track, valid=valid)
-
-
-FEWEST = 50  # rows in which noise shows
-VALUES = 10  # different numbers that noise has at the least
 
 
 def stuck_forces(log: TeamLog) -> Iterator[Finding]:

@@ -1,4 +1,9 @@
-"""MotionFit: the joint fit of what moves, of poses where bases stand or of twists where they move."""
+"""MotionFit: the joint fit of what moves, of poses where bases stand or of twists where they move.
+
+Motion tells how homes, or grasps, are turned, so that what every robot calls down can be compared. A base that is
+tilted, a level sensor that sits askew, and twists that are given in other axes than gravity all show so; what the one
+says that is alone is left out.
+"""
 
 from __future__ import annotations
 
@@ -25,6 +30,13 @@ LEVEL = 0.02
 # Clocks are moved where they are off by more than this [s] and so many (white) standard deviations: less may be noise,
 # and a fit has allowed for it to first order. They are moved at most so often.
 PUNCTUAL, DOUBTED, CLOCK_ROUNDS = 2e-4, 4.0, 10
+# Bases that are said to be level, or told where gravity points, are so to within this [rad]; apart by more, and by so
+# many standard deviations of how they are turned, one is not.
+TILTED, TILTED_BEYOND = 0.03, 5.0
+# One is alone where the others agree by this factor better.
+ALONE = 3.0
+LEFT_OUT = "It was left out: gravity is what the others say."
+MEAN = "The mean was taken; mass and centre of mass may be off by more than their bars."
 
 
 def later(late: Mapping[str, float], more: Array) -> dict[str, float]:
@@ -64,15 +76,15 @@ class MotionFit(ABC):
         """Return what clocks seem to be off by in single recordings."""
 
     @abstractmethod
-    def left(self) -> list[tuple[Stretch, Array]]:
+    def _left(self) -> list[tuple[Stretch, Array]]:
         """Return the rows of every recording that were used beside their residuals (T, N, 6) in each grasp's axes."""
 
     @abstractmethod
-    def left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
+    def _left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
         """Return all rows, used or not, beside residuals (T, N, 6) against the motion that those used show."""
 
     @abstractmethod
-    def slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
+    def _slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
         """Return the clearest slip between two recordings, from where grasps are (T, N, 6) against the others."""
 
     @property
@@ -99,22 +111,22 @@ class MotionFit(ABC):
         """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
         # How two robots share their noise is open: one alone may seem to have next to none.
         noise = np.sqrt(np.einsum("nii->ni", noise_alone(self.J, self.W)))
-        return [np.sqrt(((left / noise) ** 2).mean(-1)) for _, left in self.left_of_all(log)]
+        return [np.sqrt(((left / noise) ** 2).mean(-1)) for _, left in self._left_of_all(log)]
 
     def slip(self, log: TeamLog) -> Slip | None:
         """Return the clearest slip, within a recording or else between two."""
-        J, W, every = self.J, self.W, self.left()
+        J, W, every = self.J, self.W, self._left()
         parts = [part for part, _ in every]
         apart = [self._places(alone(left, J, W), part) for part, left in every]
         noise, each = noise_alone(J, W), enumerate(zip(parts, apart, strict=True))
         within = clearest(find_slip(k, part, moved, noise, self.drifts) for k, (part, moved) in each)
-        return self.slip_between(log, parts, apart) if within is None else within
+        return self._slip_between(log, parts, apart) if within is None else within
 
     def measured(self, log: TeamLog, found: Slip) -> Slip:
         """Return a slip with time and step by this fit, which was made without what follows it."""
         if found.between and found.told:
             return found
-        every = self.left_of_all(log)
+        every = self._left_of_all(log)
         if found.between:
             return step_between(found, [part for part, _ in every], [left for _, left in every])
         part, left = every[found.recording]
@@ -127,15 +139,6 @@ class MotionFit(ABC):
 
 
 F = TypeVar("F", bound=MotionFit)
-
-
-# Bases that are said to be level, or told where gravity points, are so to within this [rad]; apart by more, and by so
-# many standard deviations of how they are turned, one is not.
-TILTED, TILTED_BEYOND = 0.03, 5.0
-# One is alone where the others agree by this factor better.
-ALONE = 3.0
-LEFT_OUT = "It was left out: gravity is what the others say."
-MEAN = "The mean was taken; mass and centre of mass may be off by more than their bars."
 
 
 @dataclass(frozen=True)

@@ -9,10 +9,9 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.logs.clock import median_step
 from steelyard.logs.curve import Curve
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import channel_at, common_time, mean_rotation, near_samples, within
 from steelyard.logs.team_track import Track

@@ -6,9 +6,8 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding, with_bar
-from steelyard.logs.log import Mask
 from steelyard.spatial import unit_vectors
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 

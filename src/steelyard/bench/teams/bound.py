@@ -27,8 +27,7 @@ from steelyard.team.payload.body_rows import balance_frame, summing
 from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.poses.fit import information
 from steelyard.team.poses.measured import TeamMotion
-from steelyard.team.poses.solver import Solver
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.solver import OWN, Solver
 from steelyard.team.poses.team import PoseTeam
 
 FIRST_SEED = 9000

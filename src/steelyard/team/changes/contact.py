@@ -19,11 +19,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.ndimage import binary_dilation
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import motion_map
-from steelyard.logs.log import Mask
 from steelyard.spatial import unit_vectors
 from steelyard.team.payload.body_rows import BodyRows, PayloadRows, Run, averaged
 from steelyard.team.payload.fit import Fitted, PayloadFit, Weighing, fit_payload

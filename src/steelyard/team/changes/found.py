@@ -2,6 +2,9 @@
 
 First the rows in which a robot pushes with nothing are left out, then those stay out in which it is not where the
 others say. Then slips, the clearest first, each judged anew by a fit without what follows it.
+Whose grasp slipped, in a team of two, motion does not show: the wrenches tell. If the grasp of one slipped the payload
+stayed where the other held it, and its weight acts from there; the two explanations put the centre of mass apart by the
+slip.
 """
 
 from __future__ import annotations
@@ -12,8 +15,7 @@ from functools import partial
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
-from steelyard.logs.log import Mask
+from steelyard.check import FAILURES, Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.presence import LIGHT, SHARE, as_long, idle, let_go, presence_findings, strayers
 from steelyard.team.changes.slips import Slip
@@ -28,6 +30,9 @@ MOST_SLIPS = 3
 BETTER = 3.0
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
+# Residuals of forces times those of torques, beside the other explanation's, from which on the wrenches tell.
+TOLD = 1.25
+DOUBT = "It may have been the other robot's: of two, only wrenches tell, and not here."
 
 
 def without_changes(
@@ -48,7 +53,12 @@ def without_changes(
         return _without_slips(log, clocks, given, fitted, _unchanged, other)
     resting, team = asked
     off = team.off(log)
-    edit = partial(_gone, bare=bare, light=resting, off=off, strays=strayers(raw, resting, off))
+    strays = strayers(raw, resting, off)
+
+    def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        each = zip(parts, bare, resting, off, strict=True)
+        return tuple(let_go(part, rows, light, apart, strays) for part, rows, light, apart in each)
+
     found = presence_findings(raw, edit(raw), log.names)
     team = _without_slips(log, clocks, fitted(edit), fitted, edit, other)
     return replace(team, findings=(*found, *team.findings))
@@ -78,13 +88,6 @@ def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit],
         if best is None or np.log(team.fit.noise).sum() < np.log(best[1].fit.noise).sum():
             best = own, team
     return best
-
-
-def _gone(
-    parts: tuple[Stretch, ...], bare: Sequence[Mask], light: Sequence[Mask], off: Sequence[Array], strays: Mask
-) -> tuple[Stretch, ...]:
-    """Return recordings with robots let go that push with little and are `off`, as in `let_go`."""
-    return tuple(let_go(p, b, x, o, strays) for p, b, x, o in zip(parts, bare, light, off, strict=True))
 
 
 def _without_slips(
@@ -143,9 +146,6 @@ def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, 
     return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
 
 
-# Residuals of forces times those of torques, beside the other explanation's, from which on the wrenches tell.
-TOLD = 1.25
-DOUBT = "It may have been the other robot's: of two, only wrenches tell, and not here."
 Other = tuple[bool, ...]
 
 
@@ -159,7 +159,7 @@ def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEst
         return found
     chosen: Other = ()
     doubtful = []
-    for number in range(_slips(found)):
+    for number in range(sum(finding.code == "grasp-slipped" for finding in found.findings)):
         try:
             turned = answer((*chosen, True))
         except FAILURES:
@@ -171,10 +171,6 @@ def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEst
         if 1 / TOLD < better < TOLD:
             doubtful.append(number)
     return _doubted(found, doubtful)
-
-
-def _slips(found: TeamEstimate) -> int:
-    return sum(finding.code == "grasp-slipped" for finding in found.findings)
 
 
 def _misfit(found: TeamEstimate) -> float:

@@ -14,9 +14,8 @@ import numba
 import numpy as np
 from scipy.special import gammainccinv
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Rotation
 from steelyard.team.stacked import Stretch

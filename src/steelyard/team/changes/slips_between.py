@@ -3,6 +3,10 @@
 Means over a second are compared, those of recordings before with those after. They scatter about the mean of their side
 by noise and by whatever else differs between attitudes (soft grasps, levers, encoders), so that this scatter judges the
 step; seconds of one recording are counted as one, since much of it may last.
+
+Where bases move, all grasps are fitted before and after. Of the steps d (6 N) from one fit to the other one robot's
+slip explains its own, or, of the reference, in whose frame all are told, those of all others: -Ad(G_i^-1) s. The robot
+that explains most by the covariance of both fits is it.
 Source: own; Hotelling's T^2.
 """
 
@@ -29,6 +33,8 @@ CHANCE, LEAST_M, LEAST_RAD = 1e-4, 2e-3, 4e-3
 MOST_M, MOST_RAD = 0.15, 0.6
 # Windows that are needed to tell their scatter.
 WINDOWS = 16
+# Standard deviations of fits to some seconds are too small by so much, where noise hangs together for a tenth of one.
+WIDER = 1.5
 
 
 def slip_between(parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
@@ -85,10 +91,6 @@ def _step(means: Array, recording: Array, first: int, robot: int, chance: float)
         return None
     slip = Slip(robot, first, -np.inf, step, score)
     return slip if as_large_as_slips(slip) and score > fdtri(6, freedom - 5, 1 - chance) else None
-
-
-# Standard deviations of fits to some seconds are too small by so much, where noise hangs together for a tenth of one.
-WIDER = 1.5
 
 
 def slip_between_twists(

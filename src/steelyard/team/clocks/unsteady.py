@@ -3,6 +3,9 @@
 What is left of a grasp's poses or twists, along how they move, is how late its stamps are beside the offset that all
 recordings share: e_i = s_i (late_i + rate_i (t - middle)), with the payload's motion, which all robots see, taken out.
 Standard deviations come from the scores of stretches of each recording, so that slow noise does not pass for a clock.
+A jump too small to show in how fast robots turn is a step of how late a fit finds the stamps: beside an offset and a
+rate of every clock, one that steps at some time explains what the fit leaves by so many standard deviations. These hold
+for slow noise, since they are those of long stretches. Where it stepped, short ones tell.
 Source: own.
 """
 
@@ -13,8 +16,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
-from steelyard.logs.log import Integers
+from steelyard.check import FAILURES, Array, Integers
 from steelyard.logs.runs import distinct_rows
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Step
@@ -32,6 +34,9 @@ STEP_S = 0.1
 # One that is called so is put right until less than SETTLED standard deviations are left, at most so many times.
 BEYOND, LEAST_S, LEAST_RATE = 8.0, 1e-4, 1e-6
 SETTLED, ROUNDS = 0.5, 6
+# A clock steps by so much [s] at least, and beyond so many standard deviations; this share of what is known of it comes
+# from either side: of rests, noise alone tells, and amiss.
+STEP_LEAST_S, STEP_BEYOND, EITHER = 5e-4, 8.0, 0.08
 
 
 def steadied(
@@ -55,7 +60,8 @@ def steadied(
     for _ in range(ROUNDS):
         called = called.joined(team.clocks_left)
         wrong = called.of(team.clocks_left)
-        if not any(_unsettled(error) for each in wrong.recordings for error in each.values()):
+        every = [error for each in wrong.recordings for error in each.values()]
+        if all(abs(e.late) <= SETTLED * e.late_std and abs(e.rate) <= SETTLED * e.rate_std for e in every):
             break
         try:
             moved = wrong.corrected(log)
@@ -90,10 +96,6 @@ class _Called:
             {n: e if (k, n) in self.fast else replace(e, rate=0.0) for n, e in each.items() if n in self.late}
             for k, each in enumerate(errors.recordings)
         ))  # fmt: skip
-
-
-def _unsettled(error: ClockError) -> bool:
-    return abs(error.late) > SETTLED * error.late_std or abs(error.rate) > SETTLED * error.rate_std
 
 
 def clock_errors(
@@ -190,11 +192,6 @@ class _Told:
         at = np.array([rows.mean() for rows in np.array_split((self.time - self.middle) / self.half, stretches)])
         some = len(self.robots)
         return clearest(scores.pull[:, :some], scores.information[:, :some, :some], at, held)
-
-
-# A clock steps by so much [s] at least, and beyond so many standard deviations; this share of what is known of it comes
-# from either side: of rests, noise alone tells, and amiss.
-STEP_LEAST_S, STEP_BEYOND, EITHER = 5e-4, 8.0, 0.08
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,9 @@ that H' is H turned by the hinge's angle q. About H:
 Mass on the line of the hinge turns with both bodies alike: its mass, first and second moment along the line can be
 moved from one body to the other and no wrench changes. Three of the twenty parameters are so beyond any motion, and the
 seventeen others are: ten of the whole with the hinge at zero, seven of the second body.
+Whether forces have the sign that they should is told as in `misread.signs`: what robots push against one another
+through the hinge cancels in the sum of forces too. Beside the first body's motion, that of the second, turned by the
+hinge's angle, is taken out of every force, and so is a bias that turns.
 Source: Atkeson, An, Hollerbach 1986 for L; Ayusawa, Venture, Nakamura 2014 for what floating trees of bodies show.
 """
 
@@ -37,6 +40,9 @@ for _column, _entries in enumerate(((1,), (2,), (7, 9), (4, 9), (5,), (6,), (8,)
 # What may be moved from one body to the other: mass, first and second moment along the hinge.
 EXCHANGED = np.zeros((10, 3))
 EXCHANGED[0, 0] = EXCHANGED[3, 1] = EXCHANGED[4, 2] = EXCHANGED[7, 2] = 1.0
+# Columns before the robots' forces: motion of the first body, of the second, that turned, means and means turned.
+MOTION = 12
+INNER = 4 * MOTION + 3
 
 
 def hinge_frame(team: Hinged) -> Pose:
@@ -163,11 +169,6 @@ def _rows(run: Run, other: Run, team: Hinged, sums: Sums) -> Array:
     both[:, :6, -1] = run.pushed @ sums.first.T + np.einsum("tij,tj->ti", turn, own)
     both[:, 6, -1] = own[:, 2]
     return np.concatenate([both.reshape(len(angle), -1), run.pushed, other.motion], axis=1)
-
-
-# Columns before the robots' forces: motion of the first body, of the second, that turned, means and means turned.
-MOTION = 12
-INNER = 4 * MOTION + 3
 
 
 def robot_of_other_sign(

@@ -1,4 +1,11 @@
-"""Whether all robots tell angles in one unit: on one payload, in whatever frames, they all turn alike fast."""
+"""What is plainly wrong with the files of a team: units, one file given for two robots, rests that hold moves.
+
+On one payload, in whatever frames, robots turn alike fast, and are not far apart. Rows of a still recording count as at
+rest: where the payload plainly moves, as from attitude to attitude, what the moves push would pass for forces that no
+rigid payload explains, and such a recording is read as one in motion, which knows rest and moves alike. It takes all
+robots on standing bases to move: one alone slips, lets go or errs.
+Source: own.
+"""
 
 from __future__ import annotations
 
@@ -24,6 +31,18 @@ IN_STEP, OVER_S, PLACES, FEWEST = 0.6, 0.05, 200, 50
 JUMP = 4.0
 # Shorter recordings [s] are not judged.
 SHORTEST_S = 2.0
+# Positions this many times as far from home, and as far spread, are millimetres beside metres.
+MANY = 100.0
+# A rest is away from home where it is farther out than so many times its spread.
+NOISE = 3.0
+# Nobody carries a payload by grasps so far apart [m].
+FARTHEST = 50.0
+LONG = 50  # rows in which noise shows
+COMPARED = 64  # rows of a recording that are enough to tell two robots apart
+# More than soft grasps and arms sway at rest, and less than attitudes that are to be told apart.
+TURN, SHIFT_M = np.radians(5.0), 0.03
+# Share of rows that may lie beyond: taps, and rows that are wrong.
+TAPS = 0.02
 
 
 def require_one_angle_unit(log: TeamLog) -> None:
@@ -61,14 +80,6 @@ def _require_one_unit(recording: TeamRecording) -> None:
                 f"'{recording.name}', in step with it: its angles look like {looks}. Set the unit of its "
                 '"joint_position", "rotation" or "angular_velocity", or that of the other robot.'
             )
-
-
-# Positions this many times as far from home, and as far spread, are millimetres beside metres.
-MANY = 100.0
-# A rest is away from home where it is farther out than so many times its spread.
-NOISE = 3.0
-# Nobody carries a payload by grasps so far apart [m].
-FARTHEST = 50.0
 
 
 def require_one_length_unit(log: TeamLog) -> None:
@@ -120,10 +131,6 @@ def _size(track: Track) -> tuple[float, float]:
     return float(np.median(np.linalg.norm(where, axis=1))), float(np.linalg.norm(where.std(0)))
 
 
-LONG = 50  # rows in which noise shows
-COMPARED = 64  # rows of a recording that are enough to tell two robots apart
-
-
 def require_own_numbers(log: TeamLog) -> None:
     """Raise BadValue where two robots have the same numbers in a recording: one file was given twice."""
     for recording in log.recordings:
@@ -142,12 +149,6 @@ def _alike(first: Track, second: Track) -> bool:
         return False
     rows = slice(None, None, max(1, len(first) // COMPARED))
     return all(np.array_equal(first.channels[name][rows], second.channels[name][rows]) for name in first.channels)
-
-
-# More than soft grasps and arms sway at rest, and less than attitudes that are to be told apart.
-TURN, SHIFT_M = np.radians(5.0), 0.03
-# Share of rows that may lie beyond: taps, and rows that are wrong.
-TAPS = 0.02
 
 
 def with_moves_as_motion(log: TeamLog) -> tuple[TeamLog, tuple[str, ...]]:

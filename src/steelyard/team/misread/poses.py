@@ -3,6 +3,8 @@
 No grasps and homes then fit the team. Every common misreading is undone for each robot in turn, in all recordings or in
 one, and for all robots at once where rotations are misread, as where one logger wrote them all: where one of them makes
 poses fit, it is named. A reading is judged by its first grasps in closed form; only the best few are fitted.
+Two robots whose files stand in each other's place in one recording leave no grasps and homes that fit, either.
+Exchanged in every recording they are merely called by each other's name, which no pose can tell.
 """
 
 from __future__ import annotations
@@ -10,6 +12,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import combinations
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -23,8 +26,7 @@ from steelyard.team.changes.presence import SHARE as IDLE
 from steelyard.team.changes.presence import idle
 from steelyard.team.clocks.lags import far_lags
 from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
-from steelyard.team.poses.measured import TeamMotion, in_words
-from steelyard.team.poses.start import first_team
+from steelyard.team.poses.measured import TeamMotion, first_team, in_words
 from steelyard.team.stacked import Stretch, stretches
 
 # Rows of a recording that are enough to tell; readings that are fitted at most.
@@ -40,16 +42,22 @@ MANY = 4
 # A payload that turns by less [rad] does not turn.
 STILL = 0.02
 
-Read = Callable[[Pose], Pose | None]
+X = TypeVar("X")
+SWAP = "Set the form that its quaternions have: quaternion-wxyz or quaternion-xyzw."
+TRANSPOSE = 'Give its "rotation" from its grasp into its home: name the columns of the matrix in transposed order.'
+# Rows of a recording that are enough to tell; exchanges that are tried at most.
+EXCHANGED_ROWS, EXCHANGES = 100, 120
+# The noise of all robots' turns and places must fall by this factor each on average.
+EXCHANGE_CLOSES = 5.0
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A way to read poses: what was wrong, what to do, what turns poses (T,) into those meant; None if impossible."""
+class Reading(Generic[X]):
+    """A way to read what is given: what was wrong, what to do, what turns it into what was meant; None if it cannot."""
 
     words: str
     remedy: str
-    meant: Read
+    meant: Callable[[X], X | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,19 +65,19 @@ class Try:
     """A reading of poses of one robot or all (None), in one recording (its number) or all (None), and rows so read."""
 
     robot: int | None
-    reading: Reading
+    reading: Reading[Pose]
     recording: int | None
     parts: tuple[Stretch, ...]
 
 
-def _scaled(meant: str, read: str, factor: float) -> Reading:
+def _scaled(meant: str, read: str, factor: float) -> Reading[Pose]:
     much = f"{factor:.5g} times too small" if factor > 1 else f"{1 / factor:.5g} times too large"
     words = f"positions are {much}, as when {meant} are read as {read}"
     remedy = 'Set the unit ("m" or "mm") that its "position" has, or convert the numbers to one.'
     return Reading(words, remedy, lambda poses: Pose(poses.rotation, factor * poses.position))
 
 
-def _turned(right: Callable[[Array], Array | None]) -> Read:
+def _turned(right: Callable[[Array], Array | None]) -> Callable[[Pose], Pose | None]:
     def meant(poses: Pose) -> Pose | None:
         turned = right(poses.rotation.matrix)
         return None if turned is None else Pose(Rotation.nearest(turned), poses.position)
@@ -78,8 +86,6 @@ def _turned(right: Callable[[Array], Array | None]) -> Read:
 
 
 METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
-SWAP = "Set the form that its quaternions have: quaternion-wxyz or quaternion-xyzw."
-TRANSPOSE = 'Give its "rotation" from its grasp into its home: name the columns of the matrix in transposed order.'
 SCALES = tuple(_scaled(a, b, METRES[a] / METRES[b]) for a in METRES for b in METRES if a != b)
 # Lengths that all robots tell in another unit fit one another as well as before; turns do not.
 TURNS = (
@@ -156,7 +162,9 @@ def _left_out(parts: tuple[Stretch, ...], robot: int) -> tuple[Stretch, ...]:
     return tuple(replace(part, poses=part.poses[:, others], seen=part.seen[:, others]) for part in parts)
 
 
-def _everywhere(parts: tuple[Stretch, ...], whose: Sequence[int | None], readings: Sequence[Reading]) -> Iterator[Try]:
+def _everywhere(
+    parts: tuple[Stretch, ...], whose: Sequence[int | None], readings: Sequence[Reading[Pose]]
+) -> Iterator[Try]:
     """Yield readings in all recordings, of one robot or, for None, of all at once."""
     for robot in whose:
         robots = range(parts[0].seen.shape[1]) if robot is None else [robot]
@@ -170,7 +178,7 @@ def _everywhere(parts: tuple[Stretch, ...], whose: Sequence[int | None], reading
 
 
 def _in_one(
-    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading], reference: int, given: Judged
+    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading[Pose]], reference: int, given: Judged
 ) -> Iterator[Try]:
     """Yield readings of one robot in one recording, where poses fit better without them, or not at all."""
     for k, part in enumerate(parts if len(parts) > 1 else ()):
@@ -186,7 +194,7 @@ def _in_one(
                     yield Try(i, reading, k, (*parts[:k], made, *parts[k + 1 :]))
 
 
-def _read(part: Stretch, i: int, reading: Reading) -> Stretch | None:
+def _read(part: Stretch, i: int, reading: Reading[Pose]) -> Stretch | None:
     """Return the recording with one robot's poses read in another way."""
     seen = part.seen[:, i]
     if not seen.any():
@@ -262,12 +270,6 @@ def _words(best: list[tuple[Try, Judged]], names: tuple[str, ...], recordings: S
         f"the robots' poses do not fit one payload, and do so if {' or if '.join(said)}: what they say of it then "
         f"differs by {in_words(best[0][1].noise)}, as given by {in_words(given.noise)}. {' '.join(remedies)}"
     )
-
-
-# Rows of a recording that are enough to tell; exchanges that are tried at most.
-EXCHANGED_ROWS, EXCHANGES = 100, 120
-# The noise of all robots' turns and places must fall by this factor each on average.
-EXCHANGE_CLOSES = 5.0
 
 
 def require_own_files(log: TeamLog) -> None:

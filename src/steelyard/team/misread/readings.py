@@ -1,4 +1,8 @@
-"""How one robot's forces may have been read: a unit, times an order and signs of the axes; and what to say of it."""
+"""How one robot's wrench may have been read: a unit, times an order and signs of the axes; and what to say of it.
+
+What wrenches were taken for, where that is not what the log says, is kept with the answer as maps (6, 6): each takes
+moment and force as given, in a robot's grasp, to what they are.
+"""
 
 from __future__ import annotations
 

@@ -2,6 +2,7 @@
 
 What robots push against one another cancels in the sum over the team. Where one of them says what it feels instead of
 what it applies, it adds up. Whether all together hold the payload up is for the fit to say, which leaves biases out.
+Torques of one robot that have another sign, or another size, than its forces show in moments: without, all balance.
 """
 
 from __future__ import annotations
@@ -10,14 +11,15 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import basis
-from steelyard.logs.log import Integers, Mask
 from steelyard.team.payload.model import Group, scatter, unexplained
 
 # What the motion leaves of the sum of forces must have so many times the variance that it has with the other sign.
 FALLS = 4.0
+# What is left of the moments must fall by this factor.
+TORQUES_FALL = 16.0
 
 
 def with_one_sign(
@@ -80,10 +82,6 @@ def _beside_one_another(S: Array, forces: Array) -> Array:
     count = forces.shape[1]
     one = np.einsum("aix,ixq->aiq", forces, left.reshape(count, 6, -1)).reshape(3, count, count, 6)
     return np.asarray(np.einsum("aijy,ajy->ij", one, forces))
-
-
-# What is left of the moments must fall by this factor.
-TORQUES_FALL = 16.0
 
 
 def with_torque_sign(groups: Sequence[Group], D: Array) -> tuple[int | None, Array]:

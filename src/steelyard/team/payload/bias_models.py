@@ -13,8 +13,7 @@ from functools import lru_cache
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers
+from steelyard.check import Array, Integers
 from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.payload.gain_sight import GainSight
 from steelyard.team.payload.model import RANK, SHOWN, Normal, Shown

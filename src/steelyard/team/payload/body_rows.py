@@ -3,6 +3,7 @@
 B is the balance frame at the middle of the grasps: there the noise of the summed force and moment is uncorrelated. The
 motion comes from poses of the whole team, which place the payload far better than one gimbal encoder: rotation then
 comes from positions over a baseline of a metre. PayloadRows are cut into runs without gaps.
+Whether those who carry a payload at rest can hold it at all shows here too.
 """
 
 from __future__ import annotations
@@ -15,10 +16,9 @@ import numpy as np
 from scipy.fft import prev_fast_len
 from scipy.ndimage import uniform_filter1d
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
-from steelyard.logs.log import Mask
 from steelyard.logs.runs import runs
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation, classical_acceleration, cross_matrix, unit_vectors
@@ -32,6 +32,8 @@ PATH_FILTER = 2.0
 LEAST_CYCLES, END_CYCLES = 4.0, 1.0
 # Share of the grasps' own axes in those of the balance frame.
 ALIKE = 1e-3
+# [rad] about the line of two grasps, over which a payload that hangs from them cannot rest.
+HANGS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
@@ -227,10 +229,6 @@ def require_runs(kinds: Sequence[object]) -> None:
             "no recording has rows in which every robot that carries measured a wrench, for long enough. Give "
             "the force of every robot; if all are there, record longer or faster, or correct the unit of time."
         )
-
-
-# [rad] about the line of two grasps, over which a payload that hangs from them cannot rest.
-HANGS = 0.05
 
 
 def require_balance(log: TeamLog, recordings: Sequence[BodyRows], X_BG: Pose) -> None:

@@ -128,7 +128,8 @@ class _Equations:
         return group.weights(phi)
 
     def normals(self, group: Group, W: Array) -> list[Normal]:
-        return [normal(part, self.D, W, group.motion_noise, group.noise_of_gains) for part in group.parts]
+        beside = group.wrench_noise if group.sighted else None
+        return [normal(part, self.D, W, group.motion_noise, beside) for part in group.parts]
 
     def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
         """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""

@@ -5,6 +5,8 @@ motion. The bias b_r is that of every force axis, c ~ N(0, s_c^2) all session lo
 recording, and the error of its gain ~ N(0, s_g^2), lasting or drawn anew, times the mean force on it. It is integrated
 out, so that what it hides is not pretended. Constant biases sum to six numbers, since grasps do not move in the
 payload. Gains are not fitted as factors of the measured force: noise would then explain itself.
+Beside it what a motion and a body leave of sums over the robots' pushes, from sums of products, and which directions of
+the parameters rows show, once biases and gains are integrated out.
 """
 
 from __future__ import annotations
@@ -15,9 +17,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.inertia.regressor import basis, motion_map
-from steelyard.logs.log import Mask
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.payload.gain_sight import GainSight, gain_columns, gain_sight, of_force
 from steelyard.team.payload.spectra import Spectra
@@ -26,6 +27,10 @@ from steelyard.team.payload.spectra import Spectra
 ROUNDING = 1e-6
 # [kg] Units of a payload are those of no less than this.
 LEAST_MASS = 1e-3
+# What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
+SHOWN = 0.3
+# Information below this share of the largest is rounding.
+RANK = 1e-11
 
 
 def weight(phi: Array) -> float:
@@ -51,11 +56,6 @@ class Group:
     motion_noise: Array
     wrench_noise: Array
     sighted: bool = True
-
-    @property
-    def noise_of_gains(self) -> Array | None:
-        """Noise of the wrench (K, 6) beside which gains are asked; None where they are not."""
-        return self.wrench_noise if self.sighted else None
 
     def weights(self, phi: Array) -> Array:
         """Return the inverse (K, 6, 6) of the noise of a row of the wrench equation."""
@@ -172,12 +172,6 @@ def unexplained(K: Array, E: Array, S: Array) -> float:
     G = np.einsum("pix,xy,qiy->pq", E, S[:12, :12], E, optimize=True)
     along = np.tensordot(E, seen, ([1, 2], [0, 1]))
     return float(np.trace(pushed) - along @ pseudoinverse(G) @ along)
-
-
-# What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
-SHOWN = 0.3
-# Information below this share of the largest is rounding.
-RANK = 1e-11
 
 
 class Shown(NamedTuple):

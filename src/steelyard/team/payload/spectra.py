@@ -4,6 +4,8 @@ The wrench is linear in features of the motion at every instant, so it is at eve
 of accelerations grows with the fourth power of the frequency, sensors and structures err slowly. In bands narrow enough
 each is white, so that information is counted once and every frequency weighs what it is worth. Rows are tapered at
 their ends, or the ends would spill high frequencies into low ones.
+Noise of the fused path enters accelerations and the direction of gravity band by band: its size comes from the joint
+fit, its colour from the residuals of the same fit.
 Source: own; Whittle 1953 for the likelihood.
 """
 
@@ -15,8 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.fft import dct
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers
+from steelyard.check import Array, Integers
 from steelyard.spatial import cross_matrix
 from steelyard.team.payload.body_rows import BodyRows, Run, slope
 

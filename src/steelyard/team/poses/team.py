@@ -23,9 +23,8 @@ from steelyard.team.payload.body_rows import PayloadRows, balance_frame, from_po
 from steelyard.team.poses import rows as pose_rows
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
-from steelyard.team.poses.measured import Team, TeamMotion
+from steelyard.team.poses.measured import ENOUGH, Team, TeamMotion, first_team
 from steelyard.team.poses.recurring import shares_at_rest
-from steelyard.team.poses.start import ENOUGH, first_team
 from steelyard.team.stacked import Stretch, row_slices, stretches
 
 # Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
@@ -97,20 +96,17 @@ class PoseTeam(MotionFit):
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
         slope = (self.fit.rows.data.twists[rows] for rows in row_slices(self.parts))
-        return clock_errors(log, self.left(), slope, self.J, self.W)
+        return clock_errors(log, self._left(), slope, self.J, self.W)
 
-    def left(self) -> list[tuple[Stretch, Array]]:
-        """Return the rows of every recording that were used beside their residuals (T, N, 6) in each grasp's axes."""
+    def _left(self) -> list[tuple[Stretch, Array]]:
         every = zip(self.parts, row_slices(self.parts), strict=True)
         return [(part, self.fit.rows.residual[rows]) for part, rows in every]
 
-    def left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
-        """Return all rows, used or not, beside residuals (T, N, 6) against the motion that those used show."""
+    def _left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
         every = zip(stretches(log, self.late), row_slices(self.parts), strict=True)
         return [(raw, self._residuals(raw, rows.start)) for raw, rows in every]
 
-    def slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
-        """Return the clearest slip between two recordings, from where grasps are (T, N, 6) against the others."""
+    def _slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
         return slip_between(parts, apart)
 
     @cached_property
@@ -129,13 +125,9 @@ class PoseTeam(MotionFit):
         """How far the payload turned and moved (2,), rms [rad, m]."""
         return extent(self.fit.team.motion)
 
-    def gravity(self, log: TeamLog) -> Array:
-        """Return gravity (3,) [m/s^2] in the reference home."""
-        return mean_gravity(log, self.fit.team.homes)
-
     def down(self, log: TeamLog) -> Array:
         """Return the mean direction of gravity (3,) in R."""
-        mean = self.fit.team.motion.rotation.inverse().apply(self.gravity(log)).mean(0)
+        mean = self.fit.team.motion.rotation.inverse().apply(mean_gravity(log, self.fit.team.homes)).mean(0)
         return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
 
     def tilt(self, log: TeamLog, spread: Spread) -> Tilted | None:
@@ -166,12 +158,12 @@ class PoseTeam(MotionFit):
 
         The covariance (6, 6) is that of the path, in the balance frame's axes.
         """
-        gravity, fit = self.gravity(log), self.fit
+        gravity, fit = mean_gravity(log, self.fit.team.homes), self.fit
         frame = balance_frame(fit.grasps)
         noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", self.J, self.W, self.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
         out = []
-        for (part, left), rows in zip(self.left(), row_slices(self.parts), strict=True):
+        for (part, left), rows in zip(self._left(), row_slices(self.parts), strict=True):
             path = fit.team.motion[rows] @ frame
             out.append((from_poses(part, path, np.asarray(part.seen.any(1)), gravity, highest_hz), left))
         return out, noise

@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
+from steelyard.check import FAILURES, Array, Integers
 from steelyard.findings import Finding
-from steelyard.logs.log import Integers
-from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation, cross
 from steelyard.team.adjoint import adjoint_inverse
@@ -55,7 +54,12 @@ class Yields:
         Where a wrench is not known, poses are off by the mean one, and left out where other recordings in motion do.
         """
         yielding = [i for i in range(len(log.names)) if self.size[i].any()]
-        enough = any(r.kind != "still" and all(_felt(r, log.names[i]) for i in yielding) for r in log.recordings)
+        felt = (
+            {name for name, track in r.tracks.items() if track.has("force")}
+            for r in log.recordings
+            if r.kind != "still"
+        )
+        enough = any(names >= {log.names[i] for i in yielding} for names in felt)
         by_name = {log.names[i]: (self.size[i], self.mean[i], enough) for i in yielding}
         return log.with_recordings(*(r.changed(_stiff, by_name) for r in log.recordings))
 
@@ -209,10 +213,6 @@ def _positive(size: Array, std: Array) -> tuple[Array, Array]:
                 out[i, axes] = np.maximum((w * told + prior * alike) / (w + prior), 0.0) * (w > 0)
                 doubt[i, axes] = (w + prior) ** -0.5
     return out, doubt
-
-
-def _felt(recording: TeamRecording, name: str) -> bool:
-    return name in recording.tracks and recording.tracks[name].has("force")
 
 
 def _stiff(track: Track, by: tuple[Array, Array, bool]) -> Track:

@@ -7,9 +7,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_rows import channel_at
 from steelyard.logs.team_track import Track

@@ -9,9 +9,8 @@ from typing import ClassVar
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
@@ -58,7 +57,9 @@ class TwistTeam(MotionFit):
         """Return the fit of recordings after an edit."""
         late = dict.fromkeys(log.names, 0.0)
         for left in reversed(range(CLOCK_ROUNDS)):
-            parts = _changed(twist_stretches(log, late), edit)
+            raw = twist_stretches(log, late)
+            edited = edit(tuple(part.used for part in raw))
+            parts = tuple(part.changed(used) for part, used in zip(raw, edited, strict=True))
             fit = _joint_fit(parts, log)
             share = SETTLED if any(late.values()) else 1.0
             # What is told of clocks is what the rows and the fit were made with.
@@ -71,24 +72,21 @@ class TwistTeam(MotionFit):
         """Return what clocks seem to be off by in single recordings."""
         slopes = [-rates_of_change(part) for part in self.parts]
         late = [slope * self.fit.delays[:, None] for slope in slopes]
-        left = [(part, apart - more) for (part, apart), more in zip(self.left(), late, strict=True)]
+        left = [(part, apart - more) for (part, apart), more in zip(self._left(), late, strict=True)]
         return clock_errors(log, left, slopes, self.J, self.W)
 
-    def left(self) -> list[tuple[Stretch, Array]]:
-        """Return the rows of every recording that were used beside residuals (T, N, 6) of their twists."""
-        return [(part.used, self._left(part)[0]) for part in self.parts]
+    def _left(self) -> list[tuple[Stretch, Array]]:
+        return [(part.used, self._apart(part)[0]) for part in self.parts]
 
-    def left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
-        """Return all rows, used or not, beside residuals (T, N, 6) against the motion that those used show."""
+    def _left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
         every = zip(twist_stretches(log, self.late), self.parts, strict=True)
-        return [(raw.used, self._left(raw, now)[0]) for raw, now in every]
+        return [(raw.used, self._apart(raw, now)[0]) for raw, now in every]
 
     def slip(self, log: TeamLog) -> Slip | None:
         """Return the clearest slip, within a recording or else between two; none where a hinge is the cause."""
         return None if self.split is not None and self.split.sure else super().slip(log)
 
-    def slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
-        """Return the clearest slip between two recordings, by fits to those before and to those after it."""
+    def _slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
         return slip_between_twists(self.parts, self.reference, lambda some: _joint_fit(some, log))
 
     @cached_property
@@ -146,7 +144,7 @@ class TwistTeam(MotionFit):
         known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
         return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
 
-    def _left(self, part: TwistStretch, now: TwistStretch | None = None) -> tuple[Array, Array, Array]:
+    def _apart(self, part: TwistStretch, now: TwistStretch | None = None) -> tuple[Array, Array, Array]:
         """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6).
 
         now  what is left of the recording, where it tells the motion from which `part`, as it was, differs
@@ -167,7 +165,7 @@ class TwistTeam(MotionFit):
         into = adjoint_inverse(frame)
         out = []
         for part in self.parts:
-            left, fused, covariance = self._left(part)
+            left, fused, covariance = self._apart(part)
             down, level = _down(part, frame.inverse() @ grasps)
             known = level & (part.seen.any(1) | (part.rows.kind == "still"))
             out.append((from_twists(part.rows, fused @ into.T, -down, known, highest_hz), left))
@@ -183,11 +181,6 @@ def _joint_fit(parts: Sequence[TwistStretch], log: TeamLog) -> TwistFit:
     """Return the joint fit of recordings."""
     reference = log.names.index(log.reference)
     return fit_twists(TwistScatter.of(tuple(parts)), reference, log.names, _level_pairs(parts, reference))
-
-
-def _changed(parts: tuple[TwistStretch, ...], edit: Edit) -> tuple[TwistStretch, ...]:
-    """Return recordings after an edit of their rows."""
-    return tuple(p.changed(used) for p, used in zip(parts, edit(tuple(p.used for p in parts)), strict=True))
 
 
 def _level_pairs(parts: Sequence[TwistStretch], reference: int) -> Array:
