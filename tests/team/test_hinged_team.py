@@ -25,7 +25,7 @@ from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.team import team_table
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.bodies import FROM_TEN, least_mass
+from steelyard.team.hinge.payload import FROM_TEN, least_mass
 from steelyard.team.hinge.rows import COUNT, EXCHANGED, SEVEN, about_z, equations
 from steelyard.team.hinge.team import _places
 from steelyard.team.joint import JointTeam

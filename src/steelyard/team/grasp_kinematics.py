@@ -8,7 +8,7 @@ axis.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -104,6 +104,22 @@ def star(names: Sequence[str], twists: Array, measured: Mask, reference: str) ->
         except CannotAnswer as error:
             raise CannotAnswer(f"Grasp of '{name}' seen from '{reference}': {error}") from None
     return found
+
+
+def from_star(names: Sequence[str], pairs: Mapping[str, Pair]) -> Pose:
+    """Return the poses (N,) of all grasps in that of the reference, which has no pair: its own is the identity."""
+    each = [pairs[name].pose if name in pairs else Pose.identity() for name in names]
+    turns, places = np.array([pose.rotation.matrix for pose in each]), np.array([pose.position for pose in each])
+    return Pose(Rotation(turns), places)
+
+
+def total_wrench(grasps: Pose, wrench: Array) -> Array:
+    """Return the sum (T, 6) [N m, N] over the team of wrenches (N, T, 6) given at the grasps (N,), at R's origin."""
+    turn, place = grasps.rotation.matrix, grasps.position
+    force = np.einsum("nij,ntj->nti", turn, wrench[..., 3:])
+    moment = np.einsum("nij,ntj->nti", turn, wrench[..., :3])
+    levers = cross(np.broadcast_to(place[:, None], force.shape), force)
+    return np.asarray(np.concatenate([moment + levers, force], -1).sum(0))
 
 
 def _covariance(turn: Rotation, place: Array, normal: Array, twist_j: Array, variance: Array) -> Array:
