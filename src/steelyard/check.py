@@ -34,6 +34,7 @@ def frozen(values: Any) -> Array:
 def finite(name: str, values: ArrayLike) -> Array:
     """Return `values` frozen, or say how many entries are NaN or infinite and where the first one is."""
     try:
+        require_real(values)
         array = frozen(values)
     except (TypeError, ValueError) as error:
         raise BadValue(f"{name} must be numbers; got {type(values).__name__} ({error}).") from None
@@ -44,6 +45,12 @@ def finite(name: str, values: ArrayLike) -> Array:
         many = "1 entry is" if len(bad) == 1 else f"{len(bad)} entries are"
         raise BadValue(f"{name} must be finite; {many} not, the first at index {where}.")
     return array
+
+
+def require_real(values: Any) -> None:
+    """Raise TypeError for complex numbers, of which NumPy would drop the imaginary part with a mere warning."""
+    if getattr(values, "dtype", None) is not None and values.dtype.kind == "c":
+        raise TypeError("they are complex")
 
 
 def whole(name: str, values: ArrayLike) -> Integers:
@@ -64,6 +71,16 @@ def vectors(name: str, values: ArrayLike, size: int = 3) -> Array:
     array = finite(name, values)
     if array.ndim < 1 or array.shape[-1] != size:
         raise BadValue(f"{name} must have shape (..., {size}); got {array.shape}.")
+    return array
+
+
+def rows(name: str, values: ArrayLike, size: int = 3, of: tuple[str, Array] | None = None) -> Array:
+    """Return `values` as finite rows (T, size), as many as those `of` another name has, where that is given."""
+    array = finite(name, values)
+    if array.ndim != 2 or array.shape[1] != size:
+        raise BadValue(f"{name} must have shape (T, {size}), one row per sample; got {array.shape}.")
+    if of is not None and len(array) != len(of[1]):
+        raise BadValue(f"{name} has {len(array)} rows, {of[0]} has {len(of[1])}; they must agree.")
     return array
 
 

@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from steelyard.check import Array
+from steelyard.check import Array, require_real
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, listed
 from steelyard.io.log_files import recording_of
@@ -211,8 +211,8 @@ def _time(entry: Entry, poses: bool, cells: list[Given]) -> TimeSpec | None:
     where = f"{entry.where}, time"
     stamps = entry.values["time"]
     stamps = _array(stamps, where) if isinstance(stamps, np.ma.MaskedArray) else np.asarray(stamps)
-    if stamps.dtype.kind == "M":
-        stamps = stamps.astype("M8[ns]")
+    if stamps.dtype.kind in "mM":  # durations are as good as dates
+        stamps = stamps.astype(f"{stamps.dtype.kind}8[ns]").astype("M8[ns]")
     elif stamps.dtype.kind not in "iu":
         stamps = _array(stamps, where)
     if stamps.ndim != 1:
@@ -300,6 +300,7 @@ def _mount(entry: Entry, given: Sequence[str]) -> Mount:
 def _array(given: Any, where: str) -> Array:
     """Return numbers as float64, NaN where they are masked; raises BadValue."""
     try:
+        require_real(given)
         if isinstance(given, np.ma.MaskedArray):
             given = np.ma.filled(given.astype(np.float64), np.nan)
         return np.asarray(given, dtype=np.float64)
