@@ -12,11 +12,12 @@ from steelyard.check import Array
 from steelyard.errors import BadDescription, BadValue
 from steelyard.io.entries import listed
 from steelyard.io.streams.channels import channel_with_gaps, require_one_length
-from steelyard.io.streams.clocks import Clock, common_origin, require_likely_step, steady
+from steelyard.io.streams.clocks import Clock, common_origin, steady
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
 from steelyard.io.streams.split_stamps import one_column
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
+from steelyard.logs.clock import require_likely_step
 from steelyard.logs.recording import Stream
 
 

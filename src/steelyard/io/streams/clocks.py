@@ -14,9 +14,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.streams.channels import require_finite, unfit_text
 from steelyard.io.units import TIME
+from steelyard.logs.clock import require_likely_step
 
-# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
-_CLOSEST, _FURTHEST = 1e-7, 3600.0
 _FEW_STEPS = 10
 # Signals are put on even stamps: a clock that was set in the middle of a log would make them fill the memory.
 _LONGEST_S = 3 * 86400.0  # from the first row to the last
@@ -152,15 +151,6 @@ def common_origin(clocks: Sequence[Clock]) -> int:
     """Return the whole second to subtract from every clock: the earliest, or 0 where the stamps are small."""
     earliest = min((clock.first_second for clock in clocks), default=0)
     return earliest if abs(earliest) > _LARGE else 0
-
-
-def require_likely_step(step: float, where: str) -> None:
-    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
-    if not _CLOSEST <= step <= _FURTHEST:
-        raise BadValue(
-            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
-            "(s, ms, us, ns), the column or the rate."
-        )
 
 
 def steady(rate: float, rows: int, start: float) -> Array:
