@@ -113,8 +113,15 @@ class Segmentation:
     def with_labels(self, labels: Integers) -> Segmentation:
         """Return the solid in the parts of `labels` (T,), any whole numbers; they are numbered by falling volume.
 
-        They are given, not chosen: `cuts` is None then, and a log is offered no others.
+        They are given, not chosen: `cuts` is None then, and a log is offered no others. The cells are those of `mesh`
+        of this segmentation: those of the solid that reached over a border between parts were cut. Raises BadValue.
         """
+        labels = check.whole("labels", labels)
+        if labels.shape != (len(self.mesh),):
+            raise BadValue(
+                f"labels must be one for each of the {len(self.mesh)} cells of the segmentation's own mesh; got shape "
+                f"{labels.shape}. The solid's mesh has others: cells at borders were cut."
+            )
         return replace(self._labelled(labels), cuts=None)
 
     def _labelled(self, labels: Integers) -> Segmentation:
