@@ -18,6 +18,8 @@ BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
 FAILURES = (BadValue, CannotAnswer, *BREAKDOWNS)
 _IDENTITY = np.eye(3)
 _LARGEST_WHOLE = 2.0**53  # beyond it float64 holds no longer every integer
+# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
+_CLOSEST, _FURTHEST = 1e-7, 3600.0
 _ORTHONORMAL = 1e-6  # how far R^T R of a rotation may be from the identity, entry by entry
 
 
@@ -33,8 +35,9 @@ def frozen(values: Any) -> Array:
 
 def finite(name: str, values: ArrayLike) -> Array:
     """Return `values` frozen, or say how many entries are NaN or infinite and where the first one is."""
+    if is_complex(values):
+        raise BadValue(f"{name} must be real numbers; these are complex.")
     try:
-        require_real(values)
         array = frozen(values)
     except (TypeError, ValueError) as error:
         raise BadValue(f"{name} must be numbers; got {type(values).__name__} ({error}).") from None
@@ -47,10 +50,9 @@ def finite(name: str, values: ArrayLike) -> Array:
     return array
 
 
-def require_real(values: Any) -> None:
-    """Raise TypeError for complex numbers, of which NumPy would drop the imaginary part with a mere warning."""
-    if getattr(values, "dtype", None) is not None and values.dtype.kind == "c":
-        raise TypeError("they are complex")
+def is_complex(values: Any) -> bool:
+    """Return whether an array is of complex numbers, of which NumPy drops the imaginary part with a mere warning."""
+    return isinstance(values, np.ndarray) and values.dtype.kind == "c"
 
 
 def whole(name: str, values: ArrayLike) -> Integers:
@@ -90,6 +92,16 @@ def matrices(name: str, values: ArrayLike, rows: int = 3, columns: int = 3) -> A
     if array.ndim < 2 or array.shape[-2:] != (rows, columns):
         raise BadValue(f"{name} must have shape (..., {rows}, {columns}); got {array.shape}.")
     return array
+
+
+def likely_step(step: float, where: str) -> None:
+    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
+    if not _CLOSEST <= step <= _FURTHEST:
+        raise BadValue(
+            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
+            "(s, ms, us, ns; arrays are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the "
+            "column or the rate."
+        )
 
 
 def positive(name: str, value: float) -> float:

@@ -209,7 +209,7 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     ),
     (
         {"force": ARRAYS["force"] + 0j},
-        "recording, force: expected numbers, one row per sample; got ndarray (they are complex).",
+        "recording, force: expected real numbers, one row per sample; these are complex.",
     ),
     ({"rate": 100}, "recording: time and rate are given; a stream has one of time, rate and poses=True."),
     (

@@ -149,6 +149,9 @@ def test_dates_are_seconds_and_rotations_are_matrices() -> None:
         made = Track.of(dated, rotation=rotation)  # type: ignore[arg-type]
         assert np.diff(made.time) == pytest.approx(0.01, abs=1e-6)
         assert made.rotation.matrix == pytest.approx(turn.matrix)
+    dated[2] = np.datetime64("NaT")
+    with pytest.raises(BadValue, match="time must be finite; 1 entry is not"):
+        Track.of(dated, force=np.ones((5, 3)))
 
 
 def test_a_zero_torque_column_is_a_passive_gimbal() -> None:

@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from steelyard.check import Array, require_real
+from steelyard.check import Array, is_complex
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, listed
 from steelyard.io.log_files import recording_of
@@ -299,8 +299,9 @@ def _mount(entry: Entry, given: Sequence[str]) -> Mount:
 
 def _array(given: Any, where: str) -> Array:
     """Return numbers as float64, NaN where they are masked; raises BadValue."""
+    if is_complex(given):
+        raise BadValue(f"{where}: expected real numbers, one row per sample; these are complex.")
     try:
-        require_real(given)
         if isinstance(given, np.ma.MaskedArray):
             given = np.ma.filled(given.astype(np.float64), np.nan)
         return np.asarray(given, dtype=np.float64)

@@ -14,8 +14,6 @@ from steelyard.logs.recording import Stream
 SAME_S, NEAR_S = 0.05, 1.0
 # [s] to either side of a jump that leaves no gap, in which rows are left out.
 UNSURE_S = 0.3
-# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
-CLOSEST_S, FURTHEST_S = 1e-7, 3600.0
 
 
 def stamps_of(stream: Stream) -> Array:
@@ -28,19 +26,10 @@ def stamps_of(stream: Stream) -> Array:
 def seconds(time: ArrayLike) -> Array:
     """Return stamps of any kind as [s]: datetime64 since 1970, timedelta64, or numbers, which are seconds already."""
     stamps = np.asarray(time)
-    if stamps.dtype.kind in "mM":
-        return check.frozen(stamps.astype(f"{stamps.dtype.kind}8[ns]").astype(np.int64) * 1e-9)
-    return check.finite("time", time)
-
-
-def require_likely_step(step: float, where: str) -> None:
-    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
-    if not CLOSEST_S <= step <= FURTHEST_S:
-        raise BadValue(
-            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
-            "(s, ms, us, ns; arrays are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the "
-            "column or the rate."
-        )
+    if stamps.dtype.kind not in "mM":
+        return check.finite("time", time)
+    counts = stamps.astype(f"{stamps.dtype.kind}8[ns]").astype(np.int64)
+    return check.finite("time", np.where(np.isnat(stamps), np.nan, counts * 1e-9))
 
 
 def median_step(time: Array) -> float:

@@ -17,7 +17,6 @@ from steelyard.io.streams.entries import QuantitySpec, StreamSpec
 from steelyard.io.streams.split_stamps import one_column
 from steelyard.io.table_header import Columns
 from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
-from steelyard.logs.clock import require_likely_step
 from steelyard.logs.recording import Stream
 
 
@@ -148,7 +147,7 @@ def _seconds(
     start = min((float(np.nanmin(s)) for s in seconds if s is not None), default=0.0)
     for i, spec in enumerate(specs):
         if spec.time is not None and not spec.time.columns:
-            require_likely_step(1 / spec.time.rate, spec.time.where)
+            check.likely_step(1 / spec.time.rate, spec.time.where)
             seconds[i] = steady(spec.time.rate, rows[i], start)
     return seconds
 

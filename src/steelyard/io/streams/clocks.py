@@ -14,7 +14,6 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.streams.channels import require_finite, unfit_text
 from steelyard.io.units import TIME
-from steelyard.logs.clock import require_likely_step
 
 _FEW_STEPS = 10
 # Signals are put on even stamps: a clock that was set in the middle of a log would make them fill the memory.
@@ -82,7 +81,7 @@ class Clock:
         if len(steps) > _FEW_STEPS:
             self._refuse_days()
             step = _usual_step(steps) / self.per_second
-            require_likely_step(step, self.where)
+            check.likely_step(step, self.where)
             self._refuse_jumps(steps, step)
 
     def _refuse_days(self) -> None:
