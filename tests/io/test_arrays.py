@@ -237,7 +237,16 @@ WRONG: list[tuple[dict[str, Any], str]] = [
         'recording, noise: unknown key "forces". Did you mean "force"? Keys here: force, torque, acceleration, '
         "angular_acceleration.",
     ),
-    ({"mount": np.eye(3)}, "recording: mount must be one sy.Pose, or one sy.Rotation; got ndarray."),
+    (
+        {"mount": np.eye(3)},
+        "recording: mount must be one sy.Pose, or one sy.Rotation; got ndarray. 4 x 4 matrices become one with "
+        "sy.Pose.from_matrix(T).",
+    ),
+    (
+        {"rotation": np.tile(np.eye(4), (N, 1, 1))},
+        "recording, rotation: expected a Rotation, matrices (N, 3, 3) or (N, 9), quaternions (N, 4) or angles (N, 3), "
+        "one per row; found shape (40, 4, 4). Of poses T give rotation=T[:, :3, :3], position=T[:, :3, 3].",
+    ),
     (
         {"torque": None},
         "recording: no torque is given, only force, rotation, position. An answer needs the wrench: force and torque "

@@ -30,6 +30,8 @@ from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, QUANTITIES, Mount, Recording
 from steelyard.spatial import Pose, Rotation
 
+_MATRICES = "4 x 4 matrices become one with sy.Pose.from_matrix(T)."
+
 Given = np.ndarray[Any, np.dtype[Any]]
 
 # The measured gravity has another name than that of the world, which is an argument of the whole recording.
@@ -250,7 +252,7 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
     if not possible:
         raise BadValue(
             f"{where}: expected a Rotation, matrices (N, 3, 3) or (N, 9), quaternions (N, 4) or angles (N, 3), one per "
-            f"row; found shape {np.shape(given)}."
+            f"row; found shape {np.shape(given)}.{_turned_pose(given)}"
         )
     if form not in possible:
         said = f'form="{form}" does not fit' if form else "does not say what the numbers are"
@@ -261,6 +263,12 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
             "Give np.radians(..) of them."
         )
     return values, form
+
+
+def _turned_pose(given: Any) -> str:
+    """Return what to do with 4 x 4 matrices, which are poses."""
+    shape = np.shape(given)
+    return " Of poses T give rotation=T[:, :3, :3], position=T[:, :3, 3]." if shape[-2:] == (4, 4) else ""
 
 
 def _one_of(names: Sequence[str]) -> str:
@@ -293,7 +301,7 @@ def _mount(entry: Entry, given: Sequence[str]) -> Mount:
         raise entry.error("mount is of use beside force, torque or specific_force only; here is none of them.")
     rotation = mount.rotation if isinstance(mount, Pose) else mount
     if not isinstance(rotation, Rotation) or rotation.batch:
-        raise entry.error(f"mount must be one sy.Pose, or one sy.Rotation; got {type(mount).__name__}.")
+        raise entry.error(f"mount must be one sy.Pose, or one sy.Rotation; got {type(mount).__name__}. {_MATRICES}")
     return Mount(rotation, mount.position if isinstance(mount, Pose) else None)
 
 

@@ -49,7 +49,11 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     log = replace(_log_of_rows(found, wrench, gravity, rotation), dead=dead)
     names = ", ".join(f"'{s.name}'" for s in streams)
     given = [q for q in ("linear_acceleration", "angular_acceleration") if q in found]
-    what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"
+    what = (
+        f"{' and '.join(given)} used as given"
+        if given
+        else "every row taken as at rest, so that what moves the load looks like weight"
+    )
     finding = Finding.of("clock-missing", f"{names} has no clock: no delay or derivative can be found; {what}.")
     return log, rotation, (finding,), "linear_acceleration" if "linear_acceleration" in found else "none"
 
