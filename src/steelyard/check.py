@@ -106,21 +106,22 @@ def likely_step(step: float, where: str) -> None:
 
 def positive(name: str, value: float) -> float:
     """Return `value` as a float above zero."""
-    number = _number(name, value)
-    if not 0 < number < float("inf"):
-        raise BadValue(f"{name} must be a finite number above zero; got {number:g}.")
-    return number
+    given = number(name, value)
+    if not 0 < given < float("inf"):
+        raise BadValue(f"{name} must be a finite number above zero; got {given:g}.")
+    return given
 
 
 def not_negative(name: str, value: float) -> float:
     """Return `value` as a float that is zero or above."""
-    number = _number(name, value)
-    if not 0 <= number < float("inf"):
-        raise BadValue(f"{name} must be a finite number, zero or above; got {number:g}.")
-    return number
+    given = number(name, value)
+    if not 0 <= given < float("inf"):
+        raise BadValue(f"{name} must be a finite number, zero or above; got {given:g}.")
+    return given
 
 
-def _number(name: str, value: float) -> float:
+def number(name: str, value: float) -> float:
+    """Return `value` as a float."""
     try:
         return float(value)
     except (TypeError, ValueError):

@@ -55,9 +55,10 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
         "'right' must measure how it turns; none of its recordings has a rotation or an angular velocity.",
     ),
     "nanoseconds": (
-        lambda: Track.of(TIME * 1e9, force=np.ones((5, 3))),
-        "time: rows are 1e+07 s apart, which no force-torque log is. Correct the unit of time (s, ms, us, ns; arrays "
-        "are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the column or the rate.",
+        lambda: team(left=track().stamped(TIME * 1e9), right=track().stamped(TIME * 1e9)),
+        "time of 'left' in 'run': rows are 1e+07 s apart, which no force-torque log is. Correct the unit of "
+        "time (s, ms, us, ns; arrays are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the "
+        "column or the rate.",
     ),
     "quaternions": (
         lambda: track(rotation=np.ones((5, 4))),

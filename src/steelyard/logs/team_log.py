@@ -62,6 +62,9 @@ class TeamRecording:
         object.__setattr__(self, "tracks", MappingProxyType(dict(self.tracks)))
         object.__setattr__(self, "away", frozenset(self.away))
         require_one_clock_unit(self.name, self.tracks)
+        for name, track in self.tracks.items():
+            if len(track) > 1:
+                check.likely_step(median_step(track.time), f"time of '{name}' in '{self.name}'")
         if self.kind != "still" and min(float(np.ptp(t.time)) for t in self.tracks.values()) < self.LONG_S:
             self.require_overlap()
 

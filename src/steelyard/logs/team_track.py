@@ -19,7 +19,7 @@ from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
 from steelyard.findings import counted
-from steelyard.logs.clock import median_step, seconds
+from steelyard.logs.clock import seconds
 from steelyard.spatial import Pose, Rotation
 
 CHANNELS: Mapping[str, str] = MappingProxyType(
@@ -65,8 +65,6 @@ class Track:
             row = int(np.argmax(falling)) + 2  # counted from 1, the later of the two
             many = f"{counted(int(falling.sum()), 'row')} {'does' if falling.sum() == 1 else 'do'} not"
             raise BadValue(f"time must rise from row to row; {many}, the first is row {row}.")
-        if len(time) > 1:
-            check.likely_step(median_step(time), "time")
         object.__setattr__(self, "time", time)
         channels = {name: _accepted(name, values, len(time)) for name, values in self.channels.items()}
         object.__setattr__(self, "channels", MappingProxyType(channels))
