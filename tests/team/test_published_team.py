@@ -129,6 +129,21 @@ def test_formal_covariance_of_a_pair_is_what_errors_are() -> None:
     assert np.abs(np.std(errors, axis=0) / np.sqrt(np.diag(found.covariance)) - 1).max() < 0.15
 
 
+def test_bars_of_the_inertia_count_what_the_low_pass_leaves_free() -> None:
+    """With white noise alone; rows that were low-passed hang together, and as many as there are tell less."""
+    noise = TeamNoise(pose_rad=1e-4, pose_m=1e-4, force_white_N=0.2)
+    scene = replace(EXACT, noise=noise, squeeze_N=0.0, motion_samples=2000)
+    times = []
+    for seed in range(12):
+        trial = simulate_team(scene, seed)
+        steps = PublishedTeam()
+        grasps, _ = steps.grasps(trial.log)
+        fit = steps.inertia(trial.log, grasps, trial.truth.body.com)
+        gap = fit.matrix - trial.truth.body.inertia_com
+        times += list(gap[np.triu_indices(3)] / np.sqrt(np.diag(fit.covariance)))
+    assert 0.5 < np.sqrt(np.mean(np.square(times))) < 1.6
+
+
 def test_loop_closure_turns_grasps_more_truly_than_the_star() -> None:
     angles = []
     for seed in range(8):

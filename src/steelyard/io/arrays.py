@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from steelyard.check import Array
+from steelyard.check import Array, is_complex
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, listed
 from steelyard.io.log_files import recording_of
@@ -29,6 +29,8 @@ from steelyard.io.tables.files import Columns, Header
 from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, QUANTITIES, Mount, Recording
 from steelyard.spatial import Pose, Rotation
+
+_MATRICES = "4 x 4 matrices become one with sy.Pose.from_matrix(T)."
 
 Given = np.ndarray[Any, np.dtype[Any]]
 
@@ -208,8 +210,8 @@ def _time(entry: Entry, poses: bool, cells: list[Given]) -> TimeSpec | None:
     where = f"{entry.where}, time"
     stamps = entry.values["time"]
     stamps = _array(stamps, where) if isinstance(stamps, np.ma.MaskedArray) else np.asarray(stamps)
-    if stamps.dtype.kind == "M":
-        stamps = stamps.astype("M8[ns]")
+    if stamps.dtype.kind in "mM":  # durations are as good as dates
+        stamps = stamps.astype(f"{stamps.dtype.kind}8[ns]").astype("M8[ns]")
     elif stamps.dtype.kind not in "iu":
         stamps = _array(stamps, where)
     if stamps.ndim != 1:
@@ -247,7 +249,7 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
     if not possible:
         raise BadValue(
             f"{where}: expected a Rotation, matrices (N, 3, 3) or (N, 9), quaternions (N, 4) or angles (N, 3), one per "
-            f"row; found shape {np.shape(given)}."
+            f"row; found shape {np.shape(given)}.{_turned_pose(given)}"
         )
     if form not in possible:
         said = f'form="{form}" does not fit' if form else "does not say what the numbers are"
@@ -259,6 +261,12 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
             "Give np.radians(..) of them."
         )
     return values, form
+
+
+def _turned_pose(given: Any) -> str:
+    """Return what to do with 4 x 4 matrices, which are poses."""
+    shape = np.shape(given)
+    return " Of poses T give rotation=T[:, :3, :3], position=T[:, :3, 3]." if shape[-2:] == (4, 4) else ""
 
 
 def _frames(entry: Entry, given: Sequence[str]) -> dict[str, str]:
@@ -282,12 +290,14 @@ def _mount(entry: Entry, given: Sequence[str]) -> Mount:
         raise entry.error("mount is of use beside force, torque or specific_force only; here is none of them.")
     rotation = mount.rotation if isinstance(mount, Pose) else mount
     if not isinstance(rotation, Rotation) or rotation.batch:
-        raise entry.error(f"mount must be one sy.Pose, or one sy.Rotation; got {type(mount).__name__}.")
+        raise entry.error(f"mount must be one sy.Pose, or one sy.Rotation; got {type(mount).__name__}. {_MATRICES}")
     return Mount(rotation, mount.position if isinstance(mount, Pose) else None)
 
 
 def _array(given: Any, where: str) -> Array:
     """Return numbers as float64, NaN where they are masked; raises BadValue."""
+    if is_complex(given):
+        raise BadValue(f"{where}: expected real numbers, one row per sample; these are complex.")
     try:
         if isinstance(given, np.ma.MaskedArray):
             given = np.ma.filled(given.astype(np.float64), np.nan)

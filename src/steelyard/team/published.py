@@ -17,6 +17,7 @@ from steelyard.evidence import Evidence
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import people_jacobian
+from steelyard.logs.clock import median_step
 from steelyard.logs.stillness import MOVING, TURNING
 from steelyard.logs.team_conditioning import all_conditioned
 from steelyard.logs.team_log import TeamLog
@@ -109,9 +110,11 @@ class PublishedTeam:
     def inertia(self, log: TeamLog, grasps: Pose, com: Array) -> InertiaFit:
         """Return the inertia about `com` (3,) [m] in R's axes (eq. 17-32); negative eigenvalues stay.
 
-        Rates and angular accelerations are the reference robot's alone.
+        Rates and angular accelerations are the reference robot's alone. The covariance counts as many rows as the
+        low-pass leaves free.
         """
         omega, alpha, moment = [], [], []
+        alike = 1.0
         for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):
             if self.trim_s:
                 rows = rows.trimmed(self.trim_s)
@@ -120,9 +123,17 @@ class PublishedTeam:
             omega.append(rows.twist[hub, keep, :3])
             alpha.append(rows.twist_rate[hub, keep, :3])
             moment.append(moment_about(total_wrench(grasps, rows.carried_wrench)[keep], com))
+            alike = max(alike, self._alike(rows))
         if not omega:
             raise CannotAnswer("the inertia needs a recording in motion; there is none.")
-        return inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
+        fit = inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
+        return replace(fit, covariance=alike * fit.covariance)
+
+    def _alike(self, rows: TeamRows) -> float:
+        """Return how many rows the low-pass leaves for one that tells something new: two in a period of its cut-off."""
+        if self.cutoff_hz is None or len(rows.time) < 2:
+            return 1.0
+        return max(1.0, 1 / (2 * self.cutoff_hz * median_step(rows.time)))
 
 
 def require_wrenches(log: TeamLog) -> None:

@@ -18,8 +18,6 @@ from steelyard.errors import BadValue
 from steelyard.io.streams.channels import require_finite, unfit_text
 from steelyard.io.units import TIME
 
-# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
-_CLOSEST, _FURTHEST = 1e-7, 3600.0
 _FEW_STEPS = 10
 # Signals are put on even stamps: a clock that was set in the middle of a log would make them fill the memory.
 _LONGEST_S = 3 * 86400.0  # from the first row to the last
@@ -88,7 +86,7 @@ class Clock:
         if len(steps) > _FEW_STEPS:
             self._refuse_days()
             step = _usual_step(steps) / self.per_second
-            require_likely_step(step, self.where)
+            check.likely_step(step, self.where)
             self._refuse_jumps(steps, step)
 
     def _refuse_days(self) -> None:
@@ -157,15 +155,6 @@ def common_origin(clocks: Sequence[Clock]) -> int:
     """Return the whole second to subtract from every clock: the earliest, or 0 where the stamps are small."""
     earliest = min((clock.first_second for clock in clocks), default=0)
     return earliest if abs(earliest) > _LARGE else 0
-
-
-def require_likely_step(step: float, where: str) -> None:
-    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
-    if not _CLOSEST <= step <= _FURTHEST:
-        raise BadValue(
-            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
-            "(s, ms, us, ns), the column or the rate."
-        )
 
 
 def steady(rate: float, rows: int, start: float) -> Array:
