@@ -91,11 +91,28 @@ def test_code_of_the_python_page_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     Path("gripper.json").write_text(json.dumps(gripper))
     team = three_omnids(0)
     write_team(team.log, Path("team.toml"), team.joints)
+    for recording in team.log.recordings:
+        name = "moves" if recording.kind == "motion" else recording.name
+        for robot, track in recording.tracks.items():
+            np.savez(f"{robot}_{name}.npz", time=track.time, **track.channels)
     blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "python.md").read_text(), re.MULTILINE | re.DOTALL)
     names: dict[str, object] = {}
     for block in blocks:
         exec(block.replace("cloud.ply", "points.npz"), names)
     assert {"recording", "again", "team"} <= names.keys()
+
+
+def test_code_of_the_team_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    """All of it but for a payload of two bodies."""
+    monkeypatch.chdir(tmp_path)
+    team = three_omnids(0)
+    write_team(team.log, Path("team.toml"), team.joints)
+    blocks = re.findall(r"^```python\n(.*?)^```", (ROOT / "docs" / "team.md").read_text(), re.MULTILINE | re.DOTALL)
+    names: dict[str, Any] = {}
+    for block in blocks:
+        if "hinge" not in block:
+            exec(block, names)
+    assert names["fit"].matrix.shape == (3, 3)
 
 
 def test_code_of_the_mujoco_page_runs(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:

@@ -16,7 +16,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.least_squares import LeastSquares
 from steelyard.io import read_recording, result_dict
 from steelyard.logs.alignment import align
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 
 MASS = 0.932
 IMU = "accel.csv"

@@ -17,6 +17,7 @@ __version__ = "0.1.0"
 _HOME = {
     "identify": "steelyard.api",
     "identify_team": "steelyard.api",
+    "compare": "steelyard.api",
     "recording": "steelyard.io.arrays",
     "read_recording": "steelyard.io",
     "read_team": "steelyard.io",
@@ -50,6 +51,7 @@ _HOME = {
 __all__ = ["__version__", *sorted(_HOME)]
 
 if TYPE_CHECKING:
+    from steelyard.api import compare as compare
     from steelyard.api import identify as identify
     from steelyard.api import identify_team as identify_team
     from steelyard.errors import BadInput as BadInput

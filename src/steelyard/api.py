@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from steelyard.errors import BadDescription, BadInput, BadValue, CannotAnswer
-from steelyard.identify.estimate import Estimate
+from steelyard.identify.estimate import Estimate, known_body
+from steelyard.inertia import InertialParameters
 from steelyard.io import read_recording, read_result
-from steelyard.io.in_file import in_file
-from steelyard.io.object_pose import ObjectPose, read_object_pose
+from steelyard.io.contents import in_file
 from steelyard.io.ply_files import read_mesh_noting
+from steelyard.io.recordings.description import ObjectPose, read_object_pose
 from steelyard.io.team_files import read_team
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
@@ -26,6 +27,7 @@ from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 
 if TYPE_CHECKING:
+    from steelyard.identify.same import Comparison
     from steelyard.io.shapes.parts_files import SavedParts
     from steelyard.pipelines.shape_in_parts import Shape
     from steelyard.pipelines.shared_payload import Method
@@ -33,16 +35,17 @@ if TYPE_CHECKING:
     from steelyard.shape.views import Views
 
 Log = str | Path | Recording | MotionLog
+Tool = str | Path | Recording | Estimate | InertialParameters
 
 
 def identify(
     log: Log,
     options: Options = DEFAULTS,
     *,
-    tool: str | Path | Recording | Estimate | None = None,
+    tool: Tool | None = None,
     parts: str | Path | Parts | None = None,
     scan: str | Path | Cloud | Views | Shape | None = None,
-    pose_in_sensor: str | Pose | None = None,
+    pose_in_sensor: str | Path | Pose | None = None,
     data: str | Path | None = None,
 ) -> Estimate:
     """Return mass, centre of mass and inertia of what the robot holds, with covariance, evidence and findings.
@@ -51,7 +54,8 @@ def identify(
              by the caller (which is fitted as it is, without alignment and sanity checks; its object's frame is S
              unless pose_in_sensor says)
     options  method, bias and prior size
-    tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared
+    tool     the gripper alone: its result (.json), its log or its Estimate; taken away, one sensor bias shared. Or its
+             InertialParameters in S, taken as exact
     parts    the object's homogeneous parts in its own frame; or a mesh (.ply) whose faces carry part numbers, or parts
              saved by `segment` (.npz)
     scan     what was seen of the object instead: a cloud (.ply, .pcd, .npz), a folder of views, or their values; it is
@@ -94,7 +98,32 @@ def identify_team(
     """
     from steelyard.pipelines import shared_payload
 
+    _require("log", log, "a path or a TeamLog", str, Path, TeamLog)
     return shared_payload.identify_team(log if isinstance(log, TeamLog) else read_team(log, data), method)
+
+
+def compare(one: str | Path | Estimate, other: str | Path | Estimate, any_grasp: bool = False) -> Comparison:
+    """Say whether two results (files, or estimates) can be the same object, held the same way: `same`, `p_value`.
+
+    any_grasp  compare only mass and principal moments: the grasps may differ
+
+    Raises BadInput for places in different frames, CannotAnswer where both identify nothing alike.
+    """
+    from steelyard.identify import same
+
+    a, b = (read_result(given) if isinstance(given, str | Path) else given for given in (one, other))
+    for given in (a, b):
+        _require("a result", given, "a path or an Estimate", Estimate)
+    if a.frame != b.frame and not any_grasp:
+        first, second = (
+            each if isinstance(each, str | Path) else f"the {n} result"
+            for n, each in (("first", one), ("second", other))
+        )
+        raise BadValue(
+            f'{first} is in frame "{a.frame}" and {second} in "{b.frame}": places in them cannot be compared. '
+            "Give --any-grasp (in Python any_grasp=True) to compare mass and principal moments."
+        )
+    return same.compare(a.parameters, a.covariance, b.parameters, b.covariance, a.identified & b.identified, any_grasp)
 
 
 def _require_one_shape(parts: object, scan: object, pose_in_sensor: object, options: Options) -> None:
@@ -107,20 +136,24 @@ def _require_one_shape(parts: object, scan: object, pose_in_sensor: object, opti
         raise BadValue("pose_in_sensor says where a shape sits: give parts or a scan with it, or leave it out.")
 
 
+def _require(name: str, given: object, expected: str, *kinds: type, hint: str = "") -> None:
+    """Raise BadValue where `given` is of none of these kinds."""
+    if not isinstance(given, kinds):
+        raise BadValue(f"{name} must be {expected}; got {type(given).__name__}.{hint}")
+
+
 def _recording(log: str | Path | Recording, data: str | Path | None) -> Recording:
     """Return the recording, read where it is given as a path."""
-    if not isinstance(log, str | Path | Recording):
-        raise BadValue(
-            f"log must be a path, a Recording or a MotionLog; got {type(log).__name__}. Arrays become one with "
-            "sy.recording(time=.., force=.., torque=.., rotation=.., ..)."
-        )
+    arrays = " Arrays become one with sy.recording(time=.., force=.., torque=.., rotation=.., ..)."
+    _require("log", log, "a path, a Recording or a MotionLog", str, Path, Recording, hint=arrays)
     return log if isinstance(log, Recording) else read_recording(log, data)
 
 
 def _parts(parts: str | Path | Parts | None) -> tuple[Parts | None, tuple[str, ...]]:
     """Return the parts, read where they are given as a path, and what must be said of how they were read."""
-    if not isinstance(parts, str | Path):
+    if parts is None or isinstance(parts, Parts):
         return parts, ()
+    _require("parts", parts, "a path (mesh.ply, parts.npz) or Parts", str, Path)
     path = Path(parts)
     if path.suffix.lower() == ".npz":
         from steelyard.io.shapes.parts_files import read_parts
@@ -141,9 +174,15 @@ def shape_of(scan: str | Path | Cloud | Views | Shape, parts: int | None = None,
     """
     from steelyard.io.shapes.foreign_cells import in_cells_of
     from steelyard.pipelines.shape_in_parts import Shape, shape_of
+    from steelyard.shape.cloud import Cloud
+    from steelyard.shape.scan import Scan
+    from steelyard.shape.views import Views
 
     if isinstance(scan, Shape):
         return scan
+    if not isinstance(scan, str | Path):
+        points = " Points become one with Cloud(xyz, rgb) of steelyard.shape.cloud."
+        _require("scan", scan, "a path, a Cloud, Views or a Shape", Cloud, Scan, Views, hint=points)
     refill = None if cells == "delaunay" else partial(in_cells_of, cells)
     if not isinstance(scan, str | Path):
         return shape_of(scan, parts, refill)
@@ -181,15 +220,22 @@ def _seen(path: Path) -> Cloud | Views:
     return read_cloud(path)
 
 
-def _place(given: str | Pose) -> ObjectPose:
+def _place(given: str | Path | Pose) -> ObjectPose:
     """Return where the object sits, read where it is given as TOML."""
-    return ObjectPose(given) if isinstance(given, Pose) else read_object_pose(given)
+    if isinstance(given, Pose):
+        return ObjectPose(given)
+    matrix = " A 4 x 4 matrix becomes one with sy.Pose.from_matrix(T)."
+    _require("pose_in_sensor", given, "a Pose, a TOML file or its inline table", str, Path, hint=matrix)
+    return read_object_pose(str(given))
 
 
-def _tool(tool: str | Path | Recording | Estimate | None, data: str | Path | None) -> Recording | Estimate | None:
+def _tool(tool: Tool | None, data: str | Path | None) -> Recording | Estimate | None:
     """Return the tool, read where it is given as a path."""
-    if not isinstance(tool, str | Path):
+    if tool is None or isinstance(tool, Recording | Estimate):
         return tool
+    if isinstance(tool, InertialParameters):
+        return known_body(tool)
+    _require("tool", tool, "a path, a Recording, an Estimate or InertialParameters", str, Path)
     if Path(tool).suffix == ".json":
         return read_result(tool)
     recording = read_recording(tool, data)

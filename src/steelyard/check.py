@@ -18,6 +18,8 @@ BREAKDOWNS = (np.linalg.LinAlgError, ZeroDivisionError)
 FAILURES = (BadValue, CannotAnswer, *BREAKDOWNS)
 _IDENTITY = np.eye(3)
 _LARGEST_WHOLE = 2.0**53  # beyond it float64 holds no longer every integer
+# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
+_CLOSEST, _FURTHEST = 1e-7, 3600.0
 _ORTHONORMAL = 1e-6  # how far R^T R of a rotation may be from the identity, entry by entry
 
 
@@ -33,6 +35,8 @@ def frozen(values: Any) -> Array:
 
 def finite(name: str, values: ArrayLike) -> Array:
     """Return `values` frozen, or say how many entries are NaN or infinite and where the first one is."""
+    if is_complex(values):
+        raise BadValue(f"{name} must be real numbers; these are complex.")
     try:
         array = frozen(values)
     except (TypeError, ValueError) as error:
@@ -44,6 +48,11 @@ def finite(name: str, values: ArrayLike) -> Array:
         many = "1 entry is" if len(bad) == 1 else f"{len(bad)} entries are"
         raise BadValue(f"{name} must be finite; {many} not, the first at index {where}.")
     return array
+
+
+def is_complex(values: Any) -> bool:
+    """Return whether an array is of complex numbers, of which NumPy drops the imaginary part with a mere warning."""
+    return isinstance(values, np.ndarray) and values.dtype.kind == "c"
 
 
 def whole(name: str, values: ArrayLike) -> Integers:
@@ -67,6 +76,16 @@ def vectors(name: str, values: ArrayLike, size: int = 3) -> Array:
     return array
 
 
+def rows(name: str, values: ArrayLike, size: int = 3, of: tuple[str, Array] | None = None) -> Array:
+    """Return `values` as finite rows (T, size), as many as those `of` another name has, where that is given."""
+    array = finite(name, values)
+    if array.ndim != 2 or array.shape[1] != size:
+        raise BadValue(f"{name} must have shape (T, {size}), one row per sample; got {array.shape}.")
+    if of is not None and len(array) != len(of[1]):
+        raise BadValue(f"{name} has {len(array)} rows, {of[0]} has {len(of[1])}; they must agree.")
+    return array
+
+
 def matrices(name: str, values: ArrayLike, rows: int = 3, columns: int = 3) -> Array:
     """Return `values` as finite matrices of shape (..., rows, columns)."""
     array = finite(name, values)
@@ -75,23 +94,34 @@ def matrices(name: str, values: ArrayLike, rows: int = 3, columns: int = 3) -> A
     return array
 
 
+def likely_step(step: float, where: str) -> None:
+    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
+    if not _CLOSEST <= step <= _FURTHEST:
+        raise BadValue(
+            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
+            "(s, ms, us, ns; arrays are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the "
+            "column or the rate."
+        )
+
+
 def positive(name: str, value: float) -> float:
     """Return `value` as a float above zero."""
-    number = _number(name, value)
-    if not 0 < number < float("inf"):
-        raise BadValue(f"{name} must be a finite number above zero; got {number:g}.")
-    return number
+    given = number(name, value)
+    if not 0 < given < float("inf"):
+        raise BadValue(f"{name} must be a finite number above zero; got {given:g}.")
+    return given
 
 
 def not_negative(name: str, value: float) -> float:
     """Return `value` as a float that is zero or above."""
-    number = _number(name, value)
-    if not 0 <= number < float("inf"):
-        raise BadValue(f"{name} must be a finite number, zero or above; got {number:g}.")
-    return number
+    given = number(name, value)
+    if not 0 <= given < float("inf"):
+        raise BadValue(f"{name} must be a finite number, zero or above; got {given:g}.")
+    return given
 
 
-def _number(name: str, value: float) -> float:
+def number(name: str, value: float) -> float:
+    """Return `value` as a float."""
     try:
         return float(value)
     except (TypeError, ValueError):

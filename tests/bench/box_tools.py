@@ -4,7 +4,7 @@ import numpy as np
 
 from steelyard.datasets.known_object import KnownObject
 from steelyard.datasets.track import Track
-from steelyard.io.shapes.object_writing import write_object
+from steelyard.io.object_folders import write_object
 from steelyard.parts.from_mesh import parts_of_mesh
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh

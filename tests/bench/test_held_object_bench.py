@@ -12,7 +12,7 @@ from steelyard.bench.objects.cases import PART_METHODS, RIVALS
 from steelyard.bench.objects.table import held_object_table
 from steelyard.cli.bench import bench
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.shapes.object_writing import write_object
+from steelyard.io.object_folders import write_object
 from steelyard.simulate.workshop import known_object
 from steelyard.workshop import catalogue
 

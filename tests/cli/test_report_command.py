@@ -18,9 +18,9 @@ from steelyard.cli.main import main
 from steelyard.evidence import Evidence, PartMass
 from steelyard.identify.estimate import Estimate
 from steelyard.io import write_result
+from steelyard.io.object_folders import write_object
 from steelyard.io.ply_files import write_mesh
 from steelyard.io.recordings.recording_files import write_recording
-from steelyard.io.shapes.object_writing import write_object
 from steelyard.io.shapes.parts_files import SavedParts, write_parts
 from steelyard.shape.tets import TetMesh
 from steelyard.simulate import hammer

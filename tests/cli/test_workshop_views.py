@@ -10,7 +10,7 @@ from click.testing import CliRunner
 
 import steelyard as sy
 from steelyard.cli.main import cli
-from steelyard.io.object_pose import read_object_pose
+from steelyard.io.recordings.description import read_object_pose
 from steelyard.io.view_folders import read_views
 from steelyard.simulate import workshop
 from steelyard.simulate.handling import motion_arrays

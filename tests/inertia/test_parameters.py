@@ -28,6 +28,33 @@ def kinetic_energy(body: InertialParameters, twist: Twist) -> np.ndarray:
 
 @pytest.mark.parametrize("batch", BATCHES)
 @given(data=st.data())
+def test_the_wrench_is_that_of_newton_and_euler(batch: tuple[int, ...], data: st.DataObject) -> None:
+    """About the centre of mass both laws are short; the wrench is moved from there. Motions batch like bodies."""
+    body = data.draw(bodies(batch))
+    g, a, omega, alpha = (data.draw(numbers((*batch, 3))) for _ in range(4))
+    found = body.wrench(g, a, omega, alpha)
+    arm, turned = body.com, np.einsum("...ij,...j->...i", body.inertia_com, omega)
+    force = body.mass[..., None] * (a - g + np.cross(alpha, arm) + np.cross(omega, np.cross(omega, arm)))
+    torque = np.einsum("...ij,...j->...i", body.inertia_com, alpha) + np.cross(omega, turned) + np.cross(arm, force)
+    assert_allclose(found.force, force, rtol=1e-9, atol=1e-9)
+    assert_allclose(found.torque, torque, rtol=1e-9, atol=1e-9)
+
+
+def test_one_body_at_rest_in_many_poses() -> None:
+    body = InertialParameters.from_com(2.0, [0.1, 0, 0], 0.01 * np.eye(3))
+    found = body.wrench([[0, 0, -10], [0, 10, 0]])
+    assert_allclose(found.force, [[0, 0, 20], [0, -20, 0]])
+    assert_allclose(found.torque, [[0, -2, 0], [0, 0, -2]])
+    assert repr(body.wrench([0, 0, -10])) == "Wrench(array([ 0., -2.,  0.]), array([ 0.,  0., 20.]))"
+    for wrong in ([0, -10], [0, 0, np.nan]):
+        with pytest.raises(BadValue, match="gravity must"):
+            body.wrench(wrong)
+    with pytest.raises(BadValue, match="batch shapes that broadcast"):
+        body.wrench(np.zeros((4, 3)), np.zeros((5, 3)))
+
+
+@pytest.mark.parametrize("batch", BATCHES)
+@given(data=st.data())
 def test_parallel_axis_out_and_back(batch: tuple[int, ...], data: st.DataObject) -> None:
     body, shift = data.draw(bodies(batch)), data.draw(numbers((*batch, 3)))
     moved = body.in_frame(Pose(Rotation.identity(*batch), shift))

@@ -13,7 +13,7 @@ from refused import message
 import steelyard as sy
 from steelyard.io import read_team, write_team
 from steelyard.io.log_files import read_recording
-from steelyard.io.urdf_files import read_arm
+from steelyard.io.recordings.arm_joints import read_arm
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.spatial import Pose, Rotation

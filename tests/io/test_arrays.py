@@ -205,7 +205,11 @@ WRONG: list[tuple[dict[str, Any], str]] = [
     (
         {"time": ARRAYS["time"] * 1e9},
         "recording, time: rows are 1e+07 s apart, which no force-torque log is. Correct the unit of time (s, ms, us, "
-        "ns), the column or the rate.",
+        "ns; arrays are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the column or the rate.",
+    ),
+    (
+        {"force": ARRAYS["force"] + 0j},
+        "recording, force: expected real numbers, one row per sample; these are complex.",
     ),
     ({"rate": 100}, "recording: time and rate are given; a stream has one of time, rate and poses=True."),
     (
@@ -233,7 +237,16 @@ WRONG: list[tuple[dict[str, Any], str]] = [
         'recording, noise: unknown key "forces". Did you mean "force"? Keys here: force, torque, acceleration, '
         "angular_acceleration.",
     ),
-    ({"mount": np.eye(3)}, "recording: mount must be one sy.Pose, or one sy.Rotation; got ndarray."),
+    (
+        {"mount": np.eye(3)},
+        "recording: mount must be one sy.Pose, or one sy.Rotation; got ndarray. 4 x 4 matrices become one with "
+        "sy.Pose.from_matrix(T).",
+    ),
+    (
+        {"rotation": np.tile(np.eye(4), (N, 1, 1))},
+        "recording, rotation: expected a Rotation, matrices (N, 3, 3) or (N, 9), quaternions (N, 4) or angles (N, 3), "
+        "one per row; found shape (40, 4, 4). Of poses T give rotation=T[:, :3, :3], position=T[:, :3, 3].",
+    ),
     (
         {"torque": None},
         "recording: no torque is given, only force, rotation, position. An answer needs the wrench: force and torque "
@@ -268,6 +281,14 @@ def test_identify_says_how_arrays_come_in() -> None:
         "log must be a path, a Recording or a MotionLog; got dict. Arrays become one with "
         "sy.recording(time=.., force=.., torque=.., rotation=.., ..)."
     )
+
+
+def test_durations_and_dates_are_seconds() -> None:
+    steps = (np.arange(N) * 10_000_000).astype("m8[ns]")
+    for stamps in (steps, steps.astype("m8[ms]"), np.datetime64("2024-05-01T12:00:00") + steps):
+        made = sy.recording(**(ARRAYS | {"time": stamps}), gravity=GRAVITY).streams[0].time
+        assert made is not None
+        assert made - made[0] == pytest.approx(ARRAYS["time"], abs=1e-9)
 
 
 def test_a_mount_without_its_place() -> None:

@@ -16,7 +16,7 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 import steelyard as sy
 from steelyard.errors import BadInput, MissingDependency
 from steelyard.io.log_files import read_recording
-from steelyard.io.tables.files import open_table
+from steelyard.io.recordings.stream_files import open_table
 from steelyard.spatial import Pose, Rotation
 
 ROS1, ROS2 = get_typestore(Stores.ROS1_NOETIC), get_typestore(Stores.ROS2_HUMBLE)

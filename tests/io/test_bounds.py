@@ -14,15 +14,15 @@ import pytest
 
 from steelyard.datasets.track import MOTION
 from steelyard.errors import BadDescription, BadFile
-from steelyard.io import bounds
+from steelyard.io import contents
 from steelyard.io.cloud_files import read_cloud
-from steelyard.io.documents import load_json, parse_toml
+from steelyard.io.contents import load_json, parse_toml
 from steelyard.io.moment_files import read_moments
 from steelyard.io.object_folders import read_track
 from steelyard.io.ply_files import read_mesh
+from steelyard.io.recordings.stream_files import open_table
 from steelyard.io.shapes.parts_files import read_parts
 from steelyard.io.shapes.pcd_files import read_pcd
-from steelyard.io.tables.files import open_table
 
 TOO_MUCH = "F: holds 3 MiB, more than the 1 MiB that are read. Give fewer rows, points or views at once."
 
@@ -54,7 +54,7 @@ def write_npz(path: Path, members: dict[str, bytes], packing: int = zipfile.ZIP_
 
 @pytest.fixture
 def one_mib(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bounds, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(contents, "MOST_BYTES", 2**20)
 
 
 @pytest.mark.usefixtures("one_mib")
@@ -165,5 +165,5 @@ def test_a_parquet_file_is_bounded_by_its_rows_and_texts_are_not_unpacked(
     assert len(open_table(path).read([0])[0]) == 3 * 2**17
     monkeypatch.setattr(parquet, "read_table", None)
     assert said(read_all, path) == 'F: column "name" must hold numbers; it holds string.'
-    monkeypatch.setattr(bounds, "MOST_BYTES", 2**20)
+    monkeypatch.setattr(contents, "MOST_BYTES", 2**20)
     assert said(lambda path: open_table(path).read([0]), path) == TOO_MUCH

@@ -13,7 +13,7 @@ from PIL import Image
 from steelyard.errors import BadInput
 from steelyard.io import read_result
 from steelyard.io.object_folders import read_truth
-from steelyard.io.object_pose import read_object_pose
+from steelyard.io.recordings.description import read_object_pose
 from steelyard.io.view_folders import read_views
 
 POSE = "pose_in_sensor = { position = [0, 0, 1], rotation = [1,0,0, 0,1,0, 0,0,1] }"

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile
-from steelyard.io.results.hinge_results import hinge_of
+from steelyard.io.teams.team_results import hinge_of
 
 HINGE: dict[str, Any] = {
     "axis": [0, 0, 1], "point_m": [0.1, 0, 0], "swing_deg": 20, "std": {"axis_deg": 0.1, "point_m": 0.001},

@@ -12,8 +12,7 @@ import pytest
 
 from steelyard.errors import BadFile, BadValue
 from steelyard.findings import Finding
-from steelyard.io.cloud_files import read_cloud, write_cloud
-from steelyard.io.shapes.kept_scans import CELLS, SCAN
+from steelyard.io.cloud_files import CELLS, SCAN, read_cloud, write_cloud
 from steelyard.pipelines.shape_in_parts import Shape, kept, shape_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import Kept, KeptSpace

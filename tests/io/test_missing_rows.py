@@ -10,7 +10,7 @@ import pytest
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 
 NAMES = ["t", "fx", "fy", "fz", "tx", "ty", "tz", "qw", "qx", "qy", "qz"]
 WRENCH = 'force = { columns = ["fx", "fy", "fz"] }\ntorque = { columns = ["tx", "ty", "tz"] }\n'

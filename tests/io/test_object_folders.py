@@ -20,9 +20,8 @@ from steelyard.datasets.known_object import KnownObject
 from steelyard.datasets.track import Track
 from steelyard.errors import BadFile, BadValue
 from steelyard.inertia import InertialParameters
-from steelyard.io.object_folders import object_folders, read_object, read_track
+from steelyard.io.object_folders import object_folders, read_object, read_track, write_object
 from steelyard.io.ply_files import read_mesh, write_mesh
-from steelyard.io.shapes.object_writing import write_object
 from steelyard.logs.log import MotionLog
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.simulate.workshop import known_object

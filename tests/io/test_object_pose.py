@@ -11,8 +11,8 @@ import pytest
 import steelyard as sy
 from steelyard.api import shape_of
 from steelyard.errors import BadDescription, BadValue
-from steelyard.io.object_pose import read_object_pose
 from steelyard.io.ply_files import write_mesh
+from steelyard.io.recordings.description import read_object_pose
 from steelyard.io.recordings.recording_files import write_recording
 from steelyard.simulate import hammer
 from steelyard.workshop.sampling import surface_cloud

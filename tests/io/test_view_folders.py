@@ -12,9 +12,9 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadFile
-from steelyard.io import bounds, view_folders
-from steelyard.io.object_pose import read_object_pose
-from steelyard.io.shapes.object_writing import write_object_views
+from steelyard.io import contents, view_folders
+from steelyard.io.object_folders import write_object_views
+from steelyard.io.recordings.description import read_object_pose
 from steelyard.io.view_folders import read_views, write_views
 from steelyard.shape.views import Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
@@ -220,7 +220,7 @@ def test_wrong_folders(folder: Path, make: Callable[[Path], object], message: st
 
 
 def test_more_views_than_fit_are_refused_before_one_is_read(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(bounds, "MOST_BYTES", 3 * 24 * 32 * 5 - 1)
+    monkeypatch.setattr(contents, "MOST_BYTES", 3 * 24 * 32 * 5 - 1)
     with pytest.raises(BadFile, match=r"holds 0 MiB, more than the 0 MiB that are read\. Give fewer rows, points or"):
         read_views(folder)
     monkeypatch.setattr(view_folders, "MOST_VIEWS", 2)

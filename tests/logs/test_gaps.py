@@ -14,7 +14,7 @@ from steelyard.logs.holes import unknown_motion
 from steelyard.logs.outliers import bursts
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 
 
 def test_a_gap_is_no_tap() -> None:

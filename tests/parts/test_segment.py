@@ -205,6 +205,13 @@ def test_other_numbers_of_parts_names_and_joining():
     assert joined.parts.volume.sum() == pytest.approx(mesh.volume)
     with pytest.raises(BadValue, match="none twice"):
         found.merged([[0, 1], [1]])
+    for wrong in ([0, 1], "ab", [[0.5, 1]]):
+        with pytest.raises(BadValue, match=r"lists of parts, such as|must be (whole )?numbers"):
+            found.merged(wrong)
+    with pytest.raises(BadValue, match=r"of the segmentation's own mesh; got shape \(5,\)"):
+        found.with_labels(np.zeros(5, np.int64))
+    with pytest.raises(BadValue, match=r"the number of parts must be whole numbers; got 2\.5"):
+        found.cut(2.5)
     with pytest.raises(BadValue, match="need as many names"):
         found.named(["one"])
     with pytest.raises(BadValue, match="can be cut into 1 to"):

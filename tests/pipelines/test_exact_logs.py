@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 
 import steelyard as sy
-from steelyard.io.shapes.object_writing import write_object
+from steelyard.io.object_folders import write_object
 from steelyard.simulate.workshop import known_object
 from steelyard.workshop.catalogue import build
 

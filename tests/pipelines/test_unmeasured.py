@@ -4,11 +4,14 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
 import pytest
 
+import steelyard as sy
 from sanity.held_poses import BODY, swaying
 from steelyard.findings import UNMEASURED
 from steelyard.pipelines.held_object import identify
+from steelyard.simulate.handling import motion_arrays
 
 
 @pytest.mark.parametrize("seed", range(2))
@@ -22,3 +25,25 @@ def test_without_positions_slow_turns_tell_no_inertia(seed: int) -> None:
     (said,) = (f for f in found.findings if f.code == "inertia-not-identified")
     assert said.remedy == UNMEASURED["inertia-not-identified"]
     assert abs(found.mass / BODY.mass - 1) < 0.02
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_without_a_clock_errors_that_last_are_in_the_bars(seed: int) -> None:
+    """Rows in the order of measuring tell what lasts from one to the next; in another order it passes for noise."""
+    rng = np.random.default_rng(seed)
+    made = motion_arrays("slow")
+    lasting = 0.1 * np.sin(np.arange(len(made["time"]))[:, None] / rng.uniform(20, 80, 3) + rng.uniform(0, 6, 3))
+    held = BODY.wrench(made["gravity_sensor"])
+    columns = {
+        "force": held.force + lasting + 0.05 * rng.standard_normal(lasting.shape),
+        "torque": held.torque + 0.002 * rng.standard_normal(lasting.shape),
+        "rotation": made["rotation_world_from_sensor"],
+    }
+    mixed = rng.permutation(len(lasting))
+    ordered, shuffled = (
+        sy.identify(sy.recording(**{name: rows[order] for name, rows in columns.items()}, gravity=[0, 0, -9.81]))
+        for order in (slice(None), mixed)
+    )
+    assert "clock-missing" in ordered.codes()
+    assert ordered.std[0] > 1.5 * shuffled.std[0]
+    assert abs(ordered.mass - BODY.mass) < 3 * ordered.std[0]

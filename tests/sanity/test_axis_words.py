@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.sanity.axis_words import axis_words, direction_words
+from steelyard.sanity.words import axis_words, direction_words
 
 
 def test_what_rounds_to_zero_has_no_sign() -> None:

@@ -11,7 +11,7 @@ from sanity.held_poses import recorded, swaying
 from sanity.traps import edited
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity.readings.clock_offset import examine_offset
+from steelyard.sanity.readings.clocks import examine_offset
 from steelyard.spatial import Rotation
 
 

@@ -12,7 +12,7 @@ from sanity.held_poses import recorded, swaying
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 
 DESCRIPTION = """\
 [log]

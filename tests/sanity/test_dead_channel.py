@@ -12,7 +12,7 @@ from synthetic import Kind, write
 from steelyard.io import read_recording
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import dead_channels
+from steelyard.sanity.rows.judged import dead_channels
 from steelyard.spatial import Rotation
 
 

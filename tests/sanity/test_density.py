@@ -17,7 +17,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.held_object import identify_rows
 from steelyard.pipelines.shape_in_parts import shape_of
-from steelyard.sanity import impossible_density
+from steelyard.sanity.fitted.no_body import impossible_density
 from steelyard.shape.cloud import Cloud
 from steelyard.simulate import hammer
 from steelyard.simulate.handling import exact_log

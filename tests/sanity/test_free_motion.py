@@ -9,7 +9,7 @@ import pytest
 
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.fitted.free_motion import examine_motion
+from steelyard.sanity.fitted.load_motion import examine_motion
 from steelyard.simulate.logs import simulate_log
 
 

@@ -7,7 +7,7 @@ import pytest
 
 import steelyard as sy
 from steelyard.errors import BadDescription
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.simulate import scenarios
 from steelyard.simulate.handling import motion_arrays
 

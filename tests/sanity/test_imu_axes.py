@@ -11,7 +11,7 @@ import pytest
 from sanity.synthetic import Kind, write
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.spatial import Rotation
 
 MOUNTS = [Rotation.identity(), Rotation.exp([0.4, -1.1, 2.0])]

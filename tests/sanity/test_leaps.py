@@ -11,7 +11,7 @@ from held_poses import BODY, recorded, rows
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
-from steelyard.sanity.rows.leaps import examine_leaps, examine_sparse
+from steelyard.sanity.rows.still_rows import examine_leaps, examine_sparse
 from steelyard.simulate.handling import motion_arrays
 from steelyard.spatial import Rotation
 

@@ -12,7 +12,7 @@ from sanity.traps import edited
 from steelyard.errors import CannotAnswer
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 
 LBF, INCH = 4.4482216, 0.0254
 INCHES, FEET = (1 / LBF, 1 / (LBF * INCH)), (1 / LBF, 1 / (12 * LBF * INCH))

@@ -10,7 +10,7 @@ from held_poses import BODY, recorded
 
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
-from steelyard.sanity.rows.memory import examine_memory
+from steelyard.sanity.rows.still_rows import examine_memory
 from steelyard.simulate.noise import Spectrum
 from steelyard.spatial import Rotation
 

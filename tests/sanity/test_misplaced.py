@@ -19,7 +19,7 @@ from steelyard.pipelines import rows
 from steelyard.pipelines.held_object import identify
 from steelyard.pipelines.left_over import left_over, of_another_fit
 from steelyard.pipelines.options import Options
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.sanity.fitted.misplaced import misplaced
 from steelyard.simulate.logs import simulate_log
 from steelyard.spatial import Rotation

@@ -12,7 +12,7 @@ from sanity.held_poses import recorded
 from sanity.traps import edited, reread
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.spatial import Rotation
 
 MISREADINGS: dict[str, Callable[[Rotation], Rotation]] = {

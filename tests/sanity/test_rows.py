@@ -12,9 +12,7 @@ from synthetic import Kind, write
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.coverage import coverage, directions
-from steelyard.sanity.rows.clipped_rows import without_clipped
-from steelyard.sanity.rows.frozen_rows import without_frozen
-from steelyard.sanity.rows.judged import examine_rows
+from steelyard.sanity.rows.judged import examine_rows, without_clipped, without_frozen
 from steelyard.spatial import Rotation
 
 

@@ -12,7 +12,7 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.fitted.sagging import allow_sag, sag
+from steelyard.sanity.fitted.yielding import allow_sag, sag
 from steelyard.simulate import hammer
 from steelyard.simulate.logs import simulate_log
 

@@ -17,7 +17,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.prepared import AlignOptions
 from steelyard.logs.recording import Mount, Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.sanity.fitted.sensor_matrix import SURE, sensor_matrix
 from steelyard.simulate import hammer
 from steelyard.simulate.logs import simulate_log

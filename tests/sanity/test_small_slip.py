@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.holding.small_slip import small_slip
+from steelyard.sanity.holding.load_change import small_slip
 from steelyard.simulate import scenarios
 from steelyard.simulate.logs import simulate_log
 from steelyard.spatial import Pose, Rotation

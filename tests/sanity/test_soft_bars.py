@@ -9,8 +9,8 @@ import pytest
 
 import steelyard as sy
 from steelyard.identify.estimate import Estimate
-from steelyard.sanity.fitted import soft_arm
-from steelyard.sanity.fitted.soft_arm import USUAL, Softness, allow_softness
+from steelyard.sanity.fitted import yielding
+from steelyard.sanity.fitted.yielding import USUAL, Softness, allow_softness
 from steelyard.simulate import hammer
 
 MOVED = np.array([0.0, 0, 0, 0, 2e-4, 0, 0, 1e-4, 0, 2e-4])
@@ -23,7 +23,7 @@ def estimate() -> Estimate:
 
 def widened(estimate: Estimate, found: Softness, monkeypatch: pytest.MonkeyPatch) -> np.ndarray:
     """Return how much variance (10,) is added for such a softness."""
-    monkeypatch.setattr(soft_arm, "softness", lambda log: found)
+    monkeypatch.setattr(yielding, "softness", lambda log: found)
     return np.diag(allow_softness(None, estimate).covariance - estimate.covariance)  # type: ignore[arg-type]
 
 

@@ -13,7 +13,7 @@ from sanity.held_poses import BODY, recorded
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.spatial import Rotation
 
 KINDS = {"hammer": Kind(noise=0.5), "box": Kind("box_tool", 0.2, 2), "drill": Kind("drill", 1.0, 5)}

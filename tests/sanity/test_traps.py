@@ -16,7 +16,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.simulate import scenarios
 from steelyard.spatial import Rotation
 

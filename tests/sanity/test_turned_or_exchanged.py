@@ -7,7 +7,7 @@ import pytest
 
 from steelyard.io.arrays import recording
 from steelyard.logs.recording import Recording
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.simulate import scenarios
 from steelyard.simulate.logs import exact_log
 from steelyard.simulate.motions import Fourier

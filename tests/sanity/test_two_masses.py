@@ -10,8 +10,8 @@ from scipy.ndimage import gaussian_filter1d
 
 from steelyard.findings import Finding
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.fitted import two_masses as two_masses_module
-from steelyard.sanity.fitted.two_masses import TwoMasses, examine_masses, two_masses
+from steelyard.sanity.fitted import load_motion
+from steelyard.sanity.fitted.load_motion import TwoMasses, examine_masses, two_masses
 from steelyard.simulate.logs import simulate_log
 
 MOTIONS = ("stop_go", "dyn_slow", "dyn_fast")
@@ -102,9 +102,9 @@ def test_about_one_axis_noise_of_the_motion_is_allowed_for(monkeypatch: pytest.M
     """A lever passes for a mass there, and noise of either draws both (a sound sweep of one joint came out so)."""
     log = made("dyn_slow")
     found = TwoMasses(1.92, np.array([0.0, 0, 0.1]), np.array([0.42, 0, 0, -0.1]), np.full(4, 0.026), 0.89, 0.146)
-    monkeypatch.setattr(two_masses_module, "two_masses", lambda log, bending=False: found)
+    monkeypatch.setattr(load_motion, "two_masses", lambda log, bending=False: found)
     assert codes(log) == ["weight-compensated"]
     one_axis = replace(log, gravity=log.gravity * [0.001, 1, 1])
     assert codes(one_axis) == []
-    monkeypatch.setattr(two_masses_module, "two_masses", lambda log, bending=False: replace(found, noise=0.01))
+    monkeypatch.setattr(load_motion, "two_masses", lambda log, bending=False: replace(found, noise=0.01))
     assert codes(one_axis) == ["weight-compensated"]

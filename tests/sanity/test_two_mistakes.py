@@ -14,7 +14,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.io import read_recording
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines.held_object import identify
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.spatial import Rotation
 
 TILT = (7.0, -6.0)

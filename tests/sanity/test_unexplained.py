@@ -14,7 +14,8 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording, Stream
 from steelyard.pipelines import held_object
-from steelyard.sanity import examine, examine_body
+from steelyard.sanity.before import examine
+from steelyard.sanity.fitted.no_body import examine_body
 from steelyard.simulate import hammer
 
 MASS = 0.62464

@@ -16,7 +16,7 @@ from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.spatial import Rotation
-from steelyard.team.misread.angle_units import require_one_angle_unit
+from steelyard.team.misread.files import require_one_angle_unit
 
 
 def scaled(track: Track, factor: float) -> Track:

@@ -15,9 +15,8 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
-from steelyard.team.clocks.apart import together
 from steelyard.team.clocks.errors import NOTHING
-from steelyard.team.clocks.search import far_lags, searched
+from steelyard.team.clocks.lags import far_lags, searched, together
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam
 from steelyard.team.team_findings import late_clocks

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.inertia import InertialParameters
-from steelyard.team.consistent import consistent
+from steelyard.team.assembled import consistent
 
 SIZE = 0.8
 

@@ -14,7 +14,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.joint import JointTeam
-from steelyard.team.misread.exchanged import require_own_files
+from steelyard.team.misread.poses import require_own_files
 
 trial = partial(made_teams.trial, kinds=made_teams.ALL_KINDS, motion_samples=1200, grasp_samples=600)
 

@@ -17,8 +17,7 @@ from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue, CannotAnswer
 from steelyard.inertia import InertialParameters, forms
 from steelyard.inertia.regressor import basis
-from steelyard.io.result_files import result_dict, write_result
-from steelyard.io.result_reading import read_result
+from steelyard.io.result_files import read_result, result_dict, write_result
 from steelyard.report import render
 from steelyard.report.team_page import team_page
 from steelyard.simulate.team import TeamTrial, simulate_team
@@ -26,7 +25,7 @@ from steelyard.simulate.team_cases import TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
 from steelyard.tables.team import team_table
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.bodies import FROM_TEN, least_mass
+from steelyard.team.hinge.payload import FROM_TEN, least_mass
 from steelyard.team.hinge.rows import COUNT, EXCHANGED, SEVEN, about_z, equations
 from steelyard.team.hinge.team import _places
 from steelyard.team.joint import JointTeam

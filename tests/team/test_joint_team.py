@@ -20,7 +20,7 @@ from steelyard.simulate.team_cases import CASES, EXACT, Presence, Slip, TeamNois
 from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import log as pose_log
-from steelyard.team.consistent import consistent
+from steelyard.team.assembled import consistent
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 from steelyard.team.poses.team import PoseTeam

@@ -13,7 +13,7 @@ from steelyard.pipelines.shared_payload import METHODS, Method, identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
 from steelyard.spatial import Pose, Rotation
-from steelyard.team.misread.length_units import require_metres, require_one_length_unit
+from steelyard.team.misread.files import require_metres, require_one_length_unit
 
 
 def made(case: str, seed: int) -> TeamLog:

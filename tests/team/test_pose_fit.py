@@ -12,8 +12,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint, adjoint_inverse, exp, log
 from steelyard.team.poses.fit import ROUGHLY, PoseFit, Rows, fit_poses
-from steelyard.team.poses.measured import TeamMotion
-from steelyard.team.poses.start import first_team
+from steelyard.team.poses.measured import TeamMotion, first_team
 
 NAMES = ("a", "b", "c", "d")
 

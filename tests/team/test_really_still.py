@@ -11,7 +11,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.pipelines.shared_payload import identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import TeamNoise, TeamScene
-from steelyard.team.really_still import with_moves_as_motion
+from steelyard.team.misread.files import with_moves_as_motion
 
 NOISE = TeamNoise(pose_rad=3e-4, pose_m=2e-4, rate_rad_s=2e-3, velocity_m_s=5e-4, force_white_N=0.5)
 

@@ -12,7 +12,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, TeamScene
 from steelyard.team.joint import JointTeam
-from steelyard.team.poses.rest import shares_at_rest
+from steelyard.team.poses.recurring import shares_at_rest
 from steelyard.team.poses.team import PoseTeam
 
 

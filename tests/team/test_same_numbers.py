@@ -14,7 +14,7 @@ from steelyard.logs.team_track import Track
 from steelyard.pipelines.shared_payload import identify_team
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import EXACT, case
-from steelyard.team.misread.same_numbers import stuck_forces
+from steelyard.team.lost_wrenches import stuck_forces
 
 
 @pytest.fixture(scope="module")

@@ -8,7 +8,7 @@ from steelyard.check import Array
 from steelyard.simulate.team_sensing import autoregressive
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.changes.slips import Slip, SlipAt, alone, find_slip, noise_alone
+from steelyard.team.changes.slips import Slip, alone, find_slip, noise_alone
 from steelyard.team.stacked import Stretch
 
 ROWS, RATE = 1500, 100.0
@@ -26,6 +26,13 @@ def team(seed: int) -> tuple[Array, Array, Array]:
     return J, W, noise - np.einsum("nia,ta->tni", J, path)
 
 
+def held(name: str) -> Stretch:
+    """Return a recording of three robots whose clock starts at zero."""
+    all_of = np.ones((ROWS, 3), np.bool_)
+    poses = Pose(Rotation.identity(ROWS, 3), np.zeros((ROWS, 3, 3)))
+    return Stretch(name, "motion", np.arange(ROWS) / RATE, poses, all_of, np.zeros((ROWS, 3, 6)), all_of, all_of)
+
+
 def test_noise_alone_is_what_residuals_show() -> None:
     rows = []
     for seed in range(20):
@@ -38,34 +45,25 @@ def test_noise_alone_is_what_residuals_show() -> None:
 
 
 def test_noise_that_directions_share_is_no_slip() -> None:
-    seen = np.ones((ROWS, 3), np.bool_)
     for seed in range(200):
         J, W, left = team(seed)
         # A hundred times the noise: sizes alone would all pass.
-        assert find_slip(100 * alone(left, J, W), seen, RATE, noise_alone(J, W)) is None
+        assert find_slip(0, held("one"), 100 * alone(left, J, W), noise_alone(J, W)) is None
 
 
 def test_a_slip_is_found_where_it_is() -> None:
-    seen = np.ones((ROWS, 3), np.bool_)
     for seed in range(20):
         J, W, left = team(seed)
         apart = alone(left, J, W)
         apart[700:, 1, 3:] += np.array([0.003, 0.0, 0.004])
-        slip = find_slip(apart, seen, RATE, noise_alone(J, W))
+        slip = find_slip(4, held("one"), apart, noise_alone(J, W))
         assert slip is not None
-        assert slip.robot == 1
-        assert abs(slip.row - 700) < 30
-
-
-def held(name: str) -> Stretch:
-    """Return a recording of three robots whose clock starts at zero."""
-    all_of = np.ones((ROWS, 3), np.bool_)
-    poses = Pose(Rotation.identity(ROWS, 3), np.zeros((ROWS, 3, 3)))
-    return Stretch(name, "motion", np.arange(ROWS) / RATE, poses, all_of, np.zeros((ROWS, 3, 6)), all_of, all_of)
+        assert (slip.recording, slip.robot) == (4, 1)
+        assert abs(slip.time - 7.0) < 0.3
 
 
 def test_wrenches_near_the_time_of_a_slip_are_left_out_of_its_own_recording_alone() -> None:
-    slip = SlipAt(1, 7.0, Slip(2, 700, 0.005, 0.0, 1.0), np.array([0.0, 0.0, 0.0, 0.003, 0.0, 0.004]))
+    slip = Slip(2, 1, 7.0, np.array([0.0, 0.0, 0.0, 0.003, 0.0, 0.004]), 1.0, told=True)
     before, during, after = slip.applied((held("one"), held("two"), held("three")))
     assert before.seen.all()
     assert before.felt.all()

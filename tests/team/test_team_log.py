@@ -7,6 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scipy.spatial.transform import Rotation as ScipyRotation
 
 from steelyard.errors import BadInput, BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
@@ -52,6 +53,17 @@ WRONG: dict[str, tuple[Callable[[], object], str]] = {
     "all rotations missing": (
         lambda: team(right=track(rotation=np.full((5, 3, 3), np.nan))),
         "'right' must measure how it turns; none of its recordings has a rotation or an angular velocity.",
+    ),
+    "nanoseconds": (
+        lambda: team(left=track().stamped(TIME * 1e9), right=track().stamped(TIME * 1e9)),
+        "time of 'left' in 'run': rows are 1e+07 s apart, which no force-torque log is. Correct the unit of "
+        "time (s, ms, us, ns; arrays are in s: of nanoseconds give (ns - first) * 1e-9, one `first` for all), the "
+        "column or the rate.",
+    ),
+    "quaternions": (
+        lambda: track(rotation=np.ones((5, 4))),
+        "rotation must have shape (T, 3, 3); got (5, 4). Quaternions become one with "
+        "sy.Rotation.from_quaternion_wxyz or .._xyzw.",
     ),
     "clocks": (
         lambda: team(right=fresh(10.0)),
@@ -129,6 +141,18 @@ def test_a_missing_number_loses_its_channel_only_and_the_whole_wrench() -> None:
     assert made.mask("rotation").all()
     assert not made.mask("specific_force").any()
     assert np.isfinite(made.wrench()).all()
+
+
+def test_dates_are_seconds_and_rotations_are_matrices() -> None:
+    turn = Rotation.exp(np.ones((5, 3)))
+    dated = np.datetime64("2024-05-01T12:00:00") + (TIME * 1e9).astype("m8[ns]")
+    for rotation in (turn, turn.matrix, ScipyRotation.from_matrix(turn.matrix)):
+        made = Track.of(dated, rotation=rotation)  # type: ignore[arg-type]
+        assert np.diff(made.time) == pytest.approx(0.01, abs=1e-6)
+        assert made.rotation.matrix == pytest.approx(turn.matrix)
+    dated[2] = np.datetime64("NaT")
+    with pytest.raises(BadValue, match="time must be finite; 1 entry is not"):
+        Track.of(dated, force=np.ones((5, 3)))
 
 
 def test_a_zero_torque_column_is_a_passive_gimbal() -> None:

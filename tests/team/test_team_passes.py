@@ -13,14 +13,13 @@ from steelyard.errors import BadValue
 from steelyard.logs.curve import Curve
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.spatial.screws import log_pose
-from steelyard.team.adjoint import adjoint_inverse, exp
+from steelyard.team.adjoint import adjoint_inverse, exp, moved, turned_by, turns_between, twists_between
 from steelyard.team.changes.slips import alone, find_slip
 from steelyard.team.definite import definite, inverses, logarithms
-from steelyard.team.poses import statistic as pose_statistic
 from steelyard.team.poses.noise import _scores
 from steelyard.team.poses.rows import held
-from steelyard.team.poses.solver import SHOWN, Solver, unit
-from steelyard.team.turns import moved, turned_by, turns_between, twists_between
+from steelyard.team.poses.solver import SHOWN, Solver, features, pattern_information, scatter, unit
+from steelyard.team.stacked import Stretch
 
 
 @pytest.mark.parametrize("rows", [4, 5, 300])
@@ -134,8 +133,8 @@ def test_information_without_the_rows(timed: bool) -> None:
             own[:, 12] = twist[t, i] if timed else 0.0
             K[6 * i : 6 * i + 6, 13 * i : 13 * i + 13] = own
         expected += K.T @ P @ K
-    S = pose_statistic.scatter(poses.rotation.matrix, poses.position, twist, valid)
-    np.testing.assert_allclose(pose_statistic.information(S, J, W), expected, rtol=1e-11, atol=1e-10)
+    S = scatter(poses.rotation.matrix, poses.position, twist, valid)
+    np.testing.assert_allclose(pattern_information(S, J, W), expected, rtol=1e-11, atol=1e-10)
 
 
 def test_what_a_row_says_of_the_motion() -> None:
@@ -198,19 +197,26 @@ def _stepped(rows: int, at: int) -> tuple[Array, Array]:
     return apart, np.ones((rows, 3), np.bool_)
 
 
+def _held(seen: np.ndarray) -> Stretch:
+    """Return a recording of three robots at 100 Hz."""
+    rows = len(seen)
+    poses = Pose(Rotation.identity(rows, 3), np.zeros((rows, 3, 3)))
+    return Stretch("one", "motion", np.arange(rows) / 100.0, poses, seen, np.zeros((rows, 3, 6)), seen, seen)
+
+
 def test_a_slip_is_found_where_it_is_and_missing_rows_do_not_matter() -> None:
     apart, seen = _stepped(1500, 700)
     noise = np.tile(1e-8 * np.eye(6), (3, 1, 1))
-    slip = find_slip(apart, seen, 100.0, noise)
+    slip = find_slip(0, _held(seen), apart, noise)
     assert slip is not None
     assert slip.robot == 1
-    assert abs(slip.row - 700) <= 2
+    assert abs(slip.time - 7.0) <= 0.021
     assert slip.distance == pytest.approx(0.005, rel=0.02)
     seen[500:520, 1], apart[500:520, 1] = False, 0.0
-    again = find_slip(apart, seen, 100.0, noise)
+    again = find_slip(0, _held(seen), apart, noise)
     assert again is not None
-    assert abs(again.row - 700) <= 2
-    assert find_slip(_stepped(1500, 1500)[0], np.ones((1500, 3), np.bool_), 100.0, noise) is None
+    assert abs(again.time - 7.0) <= 0.021
+    assert find_slip(0, _held(np.ones((1500, 3), np.bool_)), _stepped(1500, 1500)[0], noise) is None
 
 
 def test_residuals_against_the_others_alone() -> None:
@@ -233,6 +239,6 @@ def test_rotation_helpers_agree_with_cross_matrices() -> None:
     """The feature of R^T [p]x is what an adjoint holds."""
     rng = np.random.default_rng(9)
     X = exp(rng.normal(size=(1, 1, 6)))
-    F = pose_statistic.features(X.rotation.matrix, X.position, np.zeros((0, 1, 6)), np.ones((1, 1), np.bool_))[0]
+    F = features(X.rotation.matrix, X.position, np.zeros((0, 1, 6)), np.ones((1, 1), np.bool_))[0]
     turned = X.rotation.matrix[0, 0].T @ cross_matrix(X.position[0, 0])
     np.testing.assert_allclose(F[10:19].reshape(3, 3), turned, atol=1e-15)

@@ -9,7 +9,7 @@ import pytest
 
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, Slip, TeamScene
-from steelyard.team.changes.whose_slip import DOUBT, whose_slip
+from steelyard.team.changes.found import DOUBT, whose_slip
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
 
@@ -35,7 +35,7 @@ def test_the_wrenches_tell_whose_grasp_slipped(robot: int, start: float) -> None
 
 
 def test_wrenches_that_do_not_tell_are_said(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("steelyard.team.changes.whose_slip.TOLD", np.inf)
+    monkeypatch.setattr("steelyard.team.changes.found.TOLD", np.inf)
     found = JointTeam().identify(made(1, 0, 9.0).log)
     (said,) = (f.message for f in found.findings if f.code == "grasp-slipped")
     assert said.endswith(DOUBT)

@@ -55,13 +55,13 @@ class Method:
 
 
 def _published_grasps(log: TeamLog) -> Pose:
-    return PublishedTeam(cutoff_hz=None, close_loops=False).grasps(log)[0].poses
+    return PublishedTeam(cutoff_hz=None, close_loops=False).grasps(log)[0]
 
 
 def _joint_grasps(log: TeamLog) -> Pose:
     if needs_twists(log):
         return TwistTeam.of(log, clocks=True).fit.grasps
-    return PoseTeam.of(log, clocks=True).fit.team.grasps
+    return PoseTeam.of(log, clocks=True).fit.grasps
 
 
 METHODS: Mapping[str, Method] = MappingProxyType(

@@ -9,7 +9,6 @@ import click
 
 from steelyard.cli.console import print_json
 from steelyard.cli.options import HELP, JSON
-from steelyard.errors import BadValue
 
 
 @click.command(context_settings=HELP)
@@ -19,17 +18,10 @@ from steelyard.errors import BadValue
 @JSON
 def compare(first: Path, second: Path, any_grasp: bool, as_json: bool) -> None:
     """Say whether two results can be the same object, held the same way."""
-    from steelyard.identify import same
-    from steelyard.io import read_result
+    from steelyard import api
     from steelyard.tables.numbers import plus_minus
 
-    a, b = read_result(first), read_result(second)
-    if a.frame != b.frame and not any_grasp:
-        raise BadValue(
-            f'{first} is in frame "{a.frame}" and {second} in "{b.frame}": places in them cannot be compared. '
-            "Give --any-grasp to compare mass and principal moments."
-        )
-    found = same.compare(a.parameters, a.covariance, b.parameters, b.covariance, a.identified & b.identified, any_grasp)
+    found = api.compare(first, second, any_grasp)
     if as_json:
         print_json(asdict(found) | {"same": found.same})
         return

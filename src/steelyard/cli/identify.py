@@ -87,7 +87,7 @@ def identify(log: Path | None, data: Path | None, tool: Path | None, parts: Path
     given = {"tool": tool, "parts": parts, "scan": scan, "pose_in_sensor": pose_in_sensor, "data": data}
     options = Options(**chosen, materials=() if materials is None else materials_of(materials))
     try:
-        estimate = api.identify(recording, options, **given)  # type: ignore[arg-type]
+        estimate = api.identify(recording, options, **given)
     except NoDescription as error:
         if as_json or not error.example:
             raise

@@ -134,7 +134,7 @@ def _of_team(
 
 
 def _given_pose(pose_in_sensor: str | None) -> Pose | None:
-    from steelyard.io.object_pose import read_object_pose
+    from steelyard.io.recordings.description import read_object_pose
 
     return None if pose_in_sensor is None else read_object_pose(pose_in_sensor).pose
 

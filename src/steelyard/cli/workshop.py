@@ -70,7 +70,7 @@ def build(
     as_json: bool,
 ) -> None:
     """Write one object folder per tool into DIR: mesh, coloured labelled cloud, motion and truth."""
-    from steelyard.io.images import require_images
+    from steelyard.io.view_folders import require_images
     from steelyard.workshop.catalogue import FAMILIES, build_graded, require
     from steelyard.workshop.catalogue import build as build_even
     from steelyard.workshop.graded import GRADED
@@ -119,7 +119,7 @@ def _tell(rows: list[dict[str, Any]], folder: Path, how: str, views: bool) -> No
 
 def _written(tool: Tool, name: str, folder: Path, seed: int, motion: str, noise: str, views: bool) -> dict[str, Any]:
     """Write the object folder of one tool; return what is told of it."""
-    from steelyard.io.shapes.object_writing import write_object, write_object_views
+    from steelyard.io.object_folders import write_object, write_object_views
     from steelyard.simulate.workshop import known_object, scan_of, sensed
 
     known = replace(known_object(tool, seed, motion), name=name)

@@ -126,3 +126,9 @@ class Estimate:
     def codes(self) -> set[str]:
         """Return the codes of all findings."""
         return codes(self.findings)
+
+
+def known_body(parameters: InertialParameters) -> Estimate:
+    """Return a body that is known, as from a data sheet, as an exact estimate; raises BadValue for no rigid body."""
+    no_data = Evidence(rank=0, condition=0.0, samples=0, still_samples=0, residual_force_N=0.0, residual_torque_Nm=0.0)
+    return Estimate(parameters.require_consistent(), np.zeros((10, 10)), "given", no_data, np.ones(10, np.bool_))

@@ -12,8 +12,9 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.inertia import forms, validity
+from steelyard.inertia.regressor import newton_euler
 from steelyard.inertia.validity import ValidityReport
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, Wrench
 
 
 @dataclass(frozen=True, eq=False)
@@ -133,6 +134,35 @@ class InertialParameters:
         axes = axes * np.where(biggest < 0, -1.0, 1.0)
         axes[..., :, 2] *= np.sign(np.linalg.det(axes))[..., None]
         return moments, Pose(Rotation(axes), self.com)
+
+    def wrench(
+        self, gravity: ArrayLike, acceleration: ArrayLike = (0, 0, 0), angular_velocity: ArrayLike = (0, 0, 0),
+        angular_acceleration: ArrayLike = (0, 0, 0),
+    ) -> Wrench:  # fmt: skip
+        """Return what a robot must apply to the body in a motion, about the frame's origin; at rest with gravity alone.
+
+        All in the frame's axes, batches broadcast:
+        gravity               (..., 3) [m/s^2], pointing down
+        acceleration          (..., 3) [m/s^2] classical, of the frame's origin, gravity not included
+        angular_velocity      (..., 3) [rad/s]
+        angular_acceleration  (..., 3) [rad/s^2]
+
+        A sensor shows its bias, too; one that reports the reaction shows the negative. Raises BadValue.
+        """
+        named = {"acceleration": acceleration, "gravity": gravity, "angular_velocity": angular_velocity}
+        a, g, omega, alpha = (
+            check.vectors(name, given)
+            for name, given in (named | {"angular_acceleration": angular_acceleration}).items()
+        )
+        try:
+            batch = np.broadcast_shapes(self.vector.shape[:-1], *(v.shape[:-1] for v in (a, g, omega, alpha)))
+        except ValueError:
+            raise BadValue(
+                f"bodies and motion must have batch shapes that broadcast; got {self.vector.shape[:-1]} bodies and "
+                f"{[v.shape for v in (g, a, omega, alpha)]}."
+            ) from None
+        felt, omega, alpha = (np.broadcast_to(v, (*batch, 3)) for v in (a - g, omega, alpha))
+        return Wrench.from_array(newton_euler(self.vector, felt, omega, alpha))
 
     def in_frame(self, X_AB: Pose) -> InertialParameters:
         """Return the same body, given in B, seen from frame A: P_A = X P_B X^T."""

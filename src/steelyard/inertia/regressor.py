@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.inertia import forms
-from steelyard.spatial import axial_vector, cross_matrix
+from steelyard.spatial import axial_vector, cross, cross_matrix, lever_acceleration
 
 
 def _motion_map(phi: Array) -> Array:
@@ -29,6 +29,22 @@ def _motion_map(phi: Array) -> Array:
         out[:3, 6 + k] = axial_vector(inertia @ outer)
         out[3:, 6 + k] = (outer - np.trace(outer) * np.eye(3)) @ h
     return out
+
+
+def newton_euler(phi: Array, felt: Array, omega: Array, alpha: Array) -> Array:
+    """Return the wrench (..., 6) [tau, f] that bodies phi (..., 10) need; batches broadcast.
+
+    felt   (..., 3) a - g [m/s^2];  omega (..., 3) [rad/s];  alpha (..., 3) [rad/s^2], in the axes of phi
+    """
+    m, h, inertia = phi[..., :1], phi[..., 1:4], forms.inertia_matrix(phi)
+    force = m * felt + lever_acceleration(omega, alpha, h)
+    torque = cross(h, felt) + _applied(inertia, alpha) + cross(omega, _applied(inertia, omega))
+    return np.concatenate([torque, force], -1)
+
+
+def _applied(matrix: Array, vectors: Array) -> Array:
+    """Return symmetric matrices (..., 3, 3) times vectors (..., 3)."""
+    return vectors @ matrix if matrix.ndim == 2 else np.einsum("...ij,...j->...i", matrix, vectors)
 
 
 @cache

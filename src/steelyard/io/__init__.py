@@ -2,8 +2,7 @@
 
 from steelyard.io.log_files import read_recording
 from steelyard.io.pendant import read_pendant
-from steelyard.io.result_files import result_dict, write_result
-from steelyard.io.result_reading import read_result
+from steelyard.io.result_files import read_result, result_dict, write_result
 from steelyard.io.team_files import read_team
 from steelyard.io.teams.team_writing import write_team
 

@@ -10,7 +10,7 @@ from typing import Any, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike
 
-from steelyard.check import Array
+from steelyard.check import Array, is_complex
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, listed
 from steelyard.io.log_files import recording_of
@@ -25,10 +25,12 @@ from steelyard.io.recordings.description import (
 )
 from steelyard.io.rotations import ANGULAR, FORMS, TURNS
 from steelyard.io.streams.entries import FRAMED, LONGEST_DELAY, MOUNTED, QuantitySpec, StreamSpec, TimeSpec
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.tables.files import Columns, Header
 from steelyard.io.units import UNITS
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, QUANTITIES, Mount, Recording
 from steelyard.spatial import Pose, Rotation
+
+_MATRICES = "4 x 4 matrices become one with sy.Pose.from_matrix(T)."
 
 Given = np.ndarray[Any, np.dtype[Any]]
 
@@ -175,7 +177,8 @@ def _entry(given: Any, where: str) -> Entry:
 def _stream(entry: Entry, name: str) -> tuple[StreamSpec, Columns]:
     """Return one stream as a description would tell it, and its columns; raises BadInput."""
     where, cells = entry.where, list[Given]()
-    zero = _is_zero(entry.values.get("torque"))
+    torque = entry.values.get("torque")
+    zero = isinstance(torque, str) and torque == "zero"
     given = [key for key in _KEYS if key in entry and not (zero and key == "torque")]
     if not given:
         raise entry.error(f"no quantity is given, so there are no data. Example: {_CALL}")
@@ -195,10 +198,6 @@ def _stream(entry: Entry, name: str) -> tuple[StreamSpec, Columns]:
     return StreamSpec(called, tuple(quantities), where, time, poses, zero, delay, mount), dict(enumerate(cells))
 
 
-def _is_zero(torque: Any) -> bool:
-    return isinstance(torque, str) and torque == "zero"
-
-
 def _time(entry: Entry, poses: bool, cells: list[Given]) -> TimeSpec | None:
     """Return the clock, its stamps added to the columns; None where there is none."""
     given = [key for key in ("time", "rate") if key in entry] + ["poses"] * poses
@@ -211,8 +210,8 @@ def _time(entry: Entry, poses: bool, cells: list[Given]) -> TimeSpec | None:
     where = f"{entry.where}, time"
     stamps = entry.values["time"]
     stamps = _array(stamps, where) if isinstance(stamps, np.ma.MaskedArray) else np.asarray(stamps)
-    if stamps.dtype.kind == "M":
-        stamps = stamps.astype("M8[ns]")
+    if stamps.dtype.kind in "mM":  # durations are as good as dates
+        stamps = stamps.astype(f"{stamps.dtype.kind}8[ns]").astype("M8[ns]")
     elif stamps.dtype.kind not in "iu":
         stamps = _array(stamps, where)
     if stamps.ndim != 1:
@@ -250,11 +249,12 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
     if not possible:
         raise BadValue(
             f"{where}: expected a Rotation, matrices (N, 3, 3) or (N, 9), quaternions (N, 4) or angles (N, 3), one per "
-            f"row; found shape {np.shape(given)}."
+            f"row; found shape {np.shape(given)}.{_turned_pose(given)}"
         )
     if form not in possible:
         said = f'form="{form}" does not fit' if form else "does not say what the numbers are"
-        raise BadValue(f"{where}: shape {np.shape(given)} {said}. Say form={_one_of(possible)}; it turns S into W.")
+        forms = " or ".join(f'"{name}"' for name in possible)
+        raise BadValue(f"{where}: shape {np.shape(given)} {said}. Say form={forms}; it turns S into W.")
     if form in ANGULAR and float(np.nanmax(np.abs(values), initial=0.0)) > TURNS:
         raise BadValue(
             f"{where}: angles are in rad, and these reach {np.nanmax(np.abs(values)):.4g}, which looks like degrees. "
@@ -263,8 +263,10 @@ def _rotation(given: Any, form: str | None, where: str) -> tuple[Array, str]:
     return values, form
 
 
-def _one_of(names: Sequence[str]) -> str:
-    return " or ".join(f'"{name}"' for name in names)
+def _turned_pose(given: Any) -> str:
+    """Return what to do with 4 x 4 matrices, which are poses."""
+    shape = np.shape(given)
+    return " Of poses T give rotation=T[:, :3, :3], position=T[:, :3, 3]." if shape[-2:] == (4, 4) else ""
 
 
 def _frames(entry: Entry, given: Sequence[str]) -> dict[str, str]:
@@ -272,18 +274,13 @@ def _frames(entry: Entry, given: Sequence[str]) -> dict[str, str]:
     framed = [key for key in given if key in FRAMED]
     said = entry.values.get("frame", "S")
     frames = dict(said) if isinstance(said, Mapping) else dict.fromkeys(framed, said)
-    for key, frame in frames.items():
-        if key not in framed:
+    for key, frame in frames.items() if isinstance(said, Mapping) else [(None, said)]:
+        if key is not None and key not in framed:
             raise entry.error(f"frame is of {listed(framed) or 'nothing'} here; got {key!r}.")
-        _require_frame(frame, f"{entry.where}, frame")
-    if not isinstance(said, Mapping):
-        _require_frame(said, f"{entry.where}, frame")
+        if frame not in ("S", "W"):
+            wanted = '"S" (axes of the sensor) or "W" (of the world, the base)'
+            raise BadValue(f"{entry.where}, frame: expected {wanted}; got {frame!r}.")
     return frames | ({"position": "W"} if "position" in given else {})
-
-
-def _require_frame(frame: object, where: str) -> None:
-    if frame not in ("S", "W"):
-        raise BadValue(f'{where}: expected "S" (axes of the sensor) or "W" (of the world, the base); got {frame!r}.')
 
 
 def _mount(entry: Entry, given: Sequence[str]) -> Mount:
@@ -293,12 +290,14 @@ def _mount(entry: Entry, given: Sequence[str]) -> Mount:
         raise entry.error("mount is of use beside force, torque or specific_force only; here is none of them.")
     rotation = mount.rotation if isinstance(mount, Pose) else mount
     if not isinstance(rotation, Rotation) or rotation.batch:
-        raise entry.error(f"mount must be one sy.Pose, or one sy.Rotation; got {type(mount).__name__}.")
+        raise entry.error(f"mount must be one sy.Pose, or one sy.Rotation; got {type(mount).__name__}. {_MATRICES}")
     return Mount(rotation, mount.position if isinstance(mount, Pose) else None)
 
 
 def _array(given: Any, where: str) -> Array:
     """Return numbers as float64, NaN where they are masked; raises BadValue."""
+    if is_complex(given):
+        raise BadValue(f"{where}: expected real numbers, one row per sample; these are complex.")
     try:
         if isinstance(given, np.ma.MaskedArray):
             given = np.ma.filled(given.astype(np.float64), np.nan)

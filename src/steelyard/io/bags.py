@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 from steelyard.errors import BadFile, MissingDependency, SteelyardError
-from steelyard.io.bounds import read_whole
+from steelyard.io.contents import read_whole
 from steelyard.io.entries import close_match
 
 SUFFIXES = (".mcap", ".bag", ".db3")

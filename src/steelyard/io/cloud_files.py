@@ -1,26 +1,36 @@
-"""Clouds as files: PLY (ascii, binary), PCD (ascii, binary, compressed) and NPZ in; PLY and NPZ out."""
+"""Clouds as files: PLY (ascii, binary), PCD (ascii, binary, compressed) and NPZ in; PLY and NPZ out.
+
+What a scan said stands beside its points: bytes of JSON, and one byte for every cell. A file may come from a stranger:
+sizes are bounded, findings have codes of ours, and no text steers a terminal.
+"""
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile
-from steelyard.io.in_file import in_file
-from steelyard.io.ply_files import read_ply
-from steelyard.io.shapes.kept_scans import CELLS, SCAN, bytes_of, kept_of
+from steelyard.errors import BadFile, BadValue
+from steelyard.findings import REMEDIES, Finding
+from steelyard.io.contents import in_file
+from steelyard.io.ply_files import ply, read_ply
 from steelyard.io.shapes.pcd_files import read_pcd
 from steelyard.io.tables.array_table import ArrayTable, npz, read_numbers
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.known_space import Kept
+from steelyard.shape.known_space import Kept, KeptSpace
 from steelyard.whole_files import write_bytes
 
 SUFFIXES = (".ply", ".pcd", ".npz")
 _LABELS = ("label", "segmentation", "part")
 _COLOURS = (("red", "green", "blue"), ("r", "g", "b"), ("diffuse_red", "diffuse_green", "diffuse_blue"))
 _NORMALS = (("nx", "ny", "nz"), ("normal_x", "normal_y", "normal_z"))
+
+# Of a PLY elements, of an NPZ arrays.
+SCAN, CELLS = "scan", "cell_emptied"
+_MOST_BYTES, _LONGEST = 100_000, 4000
+_NUMBERS = ("unseen", "unsure_m3", "skin")
 
 
 def read_cloud(path: Path | str) -> Cloud:
@@ -84,15 +94,12 @@ def _of_arrays(path: Path) -> Cloud:
     if "xyz" not in header.groups:
         parts = "; it holds parts, which --parts takes" if "tets" in header.groups else ""
         raise BadFile(f'{path}: array "xyz" (N, 3) in metres is missing{parts}.')
-    wanted = ("xyz", _coloured(header.groups), "label", "normals", "seen")
+    # Other programs call colours by other names.
+    coloured = next((name for name in ("rgb", "colors", "colours") if name in header.groups), "rgb")
+    wanted = ("xyz", coloured, "label", "normals", "seen")
     found = read_numbers(path, [name for name in (*wanted, SCAN, CELLS) if name in header.shapes])
     kept = kept_of(path, found.get(SCAN), found.get(CELLS))
     return _checked(path, tuple(found.get(name) for name in wanted), kept)
-
-
-def _coloured(names: Any) -> str:
-    """Return the name of the array that holds colours, as other programs call it too."""
-    return next((name for name in ("rgb", "colors", "colours") if name in names), "rgb")
 
 
 def _checked(path: Path, points: tuple[Any, ...], kept: Kept | None) -> Cloud:
@@ -145,10 +152,41 @@ def _ply(cloud: Cloud) -> bytes:
     table = np.zeros(len(cloud), [(name, kind) for name, _, kind, _ in fields])
     for name, _, _, values in fields:
         table[name] = values
-    header = ["ply", "format binary_little_endian 1.0", "comment units metres", f"element vertex {len(cloud)}"]
-    header += [f"property {word} {name}" for name, word, _, _ in fields]
-    beside = _beside(cloud)
-    for name, values in beside.items():
-        header += [f"element {name} {len(values)}", "property uchar value"]
-    body = [table.tobytes(), *(values.tobytes() for values in beside.values())]
-    return ("\n".join([*header, "end_header"]) + "\n").encode() + b"".join(body)
+    beside = {name: (["uchar value"], values) for name, values in _beside(cloud).items()}
+    return ply({"vertex": ([f"{word} {name}" for name, word, _, _ in fields], table), **beside})
+
+
+def bytes_of(kept: Kept) -> Any:
+    """Return what a scan said, but for its cells, as bytes of JSON (B,)."""
+    said: dict[str, Any] = {name: getattr(kept.space, name) for name in _NUMBERS}
+    said |= {"place_std": list(kept.place_std), "findings": [finding.plain() for finding in kept.findings]}
+    return np.frombuffer(json.dumps(said).encode(), np.uint8)
+
+
+def kept_of(path: Path, said: Any, fifths: Any) -> Kept | None:
+    """Return what `bytes_of` and the bytes of cells (T,) keep, None where a file has neither; raises BadFile."""
+    if said is None or fifths is None:
+        return None
+    for name, values in ((SCAN, said), (CELLS, fifths)):
+        if values.dtype != np.uint8 or values.ndim != 1:
+            raise BadFile(f'{path}: "{name}" must be bytes (N,), uint8; found {values.dtype}, shape {values.shape}.')
+    if len(said) > _MOST_BYTES:
+        raise BadFile(f'{path}: "{SCAN}" has {len(said)} bytes; what a scan says is shorter.')
+    try:
+        values = json.loads(said.tobytes())
+        numbers = {name: float(values[name]) for name in _NUMBERS}
+        shift, turn = map(float, values["place_std"])
+        findings = tuple(_finding(each) for each in values["findings"])
+    except (ValueError, TypeError, KeyError, OverflowError, RecursionError, BadValue) as error:
+        raise BadFile(
+            f'{path}: "{SCAN}" is not what `steelyard scan` writes ({error!r}). Scan the object again.'
+        ) from None
+    return in_file(path, lambda: Kept(findings, KeptSpace(**numbers, fifths=fifths), (shift, turn)))
+
+
+def _finding(said: Any) -> Finding:
+    code, message, remedy = (said[name] for name in ("code", "message", "remedy"))
+    texts = (message, remedy)
+    if code not in REMEDIES or not all(isinstance(t, str) and t.isprintable() and len(t) < _LONGEST for t in texts):
+        raise BadValue(f'no finding of ours: "{str(code)[:80]}"')
+    return Finding(code, message, remedy)

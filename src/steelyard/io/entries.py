@@ -74,17 +74,17 @@ class Entry:
 
     def table(self, key: str) -> Entry:
         """Return the table under `key`; an empty one where it is left out."""
-        value = self.values.get(key, {})
-        if not isinstance(value, Mapping):
-            raise self.error(f'"{key}" must be a table such as {key} = {{ .. }}; got {value!r}.')
-        return Entry(value, f"{self.where}, {key}")
+        return self._inner(key, key, f"table such as {key} = {{ .. }}")
 
     def section(self, key: str) -> Entry:
         """Return the section that starts with [key]; an empty one where it is left out."""
+        return self._inner(key, f"[{key}]", f"section that starts with [{key}]")
+
+    def _inner(self, key: str, called: str, what: str) -> Entry:
         value = self.values.get(key, {})
         if not isinstance(value, Mapping):
-            raise self.error(f'"{key}" must be a section that starts with [{key}]; got {value!r}.')
-        return Entry(value, f"{self.where}, [{key}]")
+            raise self.error(f'"{key}" must be a {what}; got {value!r}.')
+        return Entry(value, f"{self.where}, {called}")
 
     def sections(self, key: str, written: str, called: str) -> list[Entry]:
         """Return the sections that start with `written`, none where `key` is left out; messages number them."""

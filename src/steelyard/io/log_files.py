@@ -1,4 +1,4 @@
-"""A log description, or a bare data file with usual names, becomes a Recording."""
+"""A log description, or a bare data file with usual names, becomes a Recording that holds what every answer needs."""
 
 from __future__ import annotations
 
@@ -7,18 +7,16 @@ from dataclasses import replace
 from pathlib import Path
 
 from steelyard import check
-from steelyard.errors import BadFile
-from steelyard.io.documents import load_toml
+from steelyard.errors import BadDescription, BadFile, BadValue
+from steelyard.io.contents import load_toml
 from steelyard.io.recordings import guess
 from steelyard.io.recordings.arm_joints import arm_of, posed, with_joints_in_order
 from steelyard.io.recordings.description import Description, parse_description
-from steelyard.io.recordings.joined_tables import own_rows
-from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
-from steelyard.io.streams.missing_rows import without_missing
-from steelyard.io.streams.requirements import require_answerable, require_matched_rows
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table, find_file, open_table
-from steelyard.logs.recording import Recording
+from steelyard.io.recordings.stream_files import open_table, open_tables, own_rows, read_cells, streams_of
+from steelyard.io.streams.channels import without_missing
+from steelyard.io.streams.entries import StreamSpec
+from steelyard.io.tables.files import Columns, Table, find_file
+from steelyard.logs.recording import QUANTITIES, Recording, Stream
 from steelyard.robots.serial import SerialArm
 
 
@@ -43,10 +41,9 @@ def _read(path: Path, data: Path | None) -> Recording:
     if path.suffix.lower() != ".toml":
         table = open_table(path)
         description, cells = guess.describe(table)
-        joined = [table] * len(description.streams)
-        own = [cells] if len(joined) == 1 else read_cells(description.streams, joined)
-        rows = own_rows(description.streams, joined, own)
-        read = recording_of(description, joined, rows, path.name)
+        tables = [table] * len(description.streams)
+        own = [cells] if len(tables) == 1 else read_cells(description.streams, tables)
+        read = recording_of(description, tables, own_rows(description.streams, tables, own), path.name)
         return replace(read, name=path.stem, described=False, sign_said=False)
     description = parse_description(load_toml(path), path.name)
     tables = open_tables(description.streams, path.parent, data)
@@ -72,10 +69,10 @@ def recording_of(
 
     Raises BadDescription or BadValue; `name` stands in messages.
     """
-    require_answerable(description.streams, name)
+    _require_answerable(description.streams, name)
     specs = description.streams
     found = streams_of(specs, tables, cells, [description.gravity] * len(specs), gaps=True)
-    require_matched_rows(found, name)
+    _require_matched_rows(found, name)
     streams, findings = without_missing(specs, found)
     if arm is not None:
         streams = tuple(posed(*each, arm) for each in zip(specs, streams, strict=True))
@@ -92,3 +89,40 @@ def recording_of(
         notes=description.notes,
         gravity_std=description.gravity_std,
     )
+
+
+def _require_answerable(specs: Sequence[StreamSpec], name: str) -> None:
+    """Raise BadDescription where quantities that every answer needs are missing, or one is given twice."""
+    given = [quantity for spec in specs for quantity in spec.names]
+    given += ["rotation"] * given.count("joint_position")
+    for quantity in given:
+        if given.count(quantity) > 1:
+            raise BadDescription(f'{name}: "{quantity}" is given by {given.count(quantity)} streams. Give it in one.')
+    shown = ", ".join(quantity for quantity in QUANTITIES if quantity in given)
+    missing = [quantity for quantity in ("force", "torque") if quantity not in given]
+    if missing:
+        raise BadDescription(
+            f"{name}: no {' and no '.join(missing)} is given, only {shown}. An answer needs the wrench: "
+            'force and torque (torque = "zero" for a passive gimbal).'
+        )
+    if not {"rotation", "gravity", "specific_force"} & set(given):
+        raise BadDescription(
+            f"{name}: nothing says where gravity points in the sensor frame; given are {shown}. "
+            "Add rotation (S to W), joint_position with a URDF, gravity (in S) or specific_force (an accelerometer)."
+        )
+
+
+def _require_matched_rows(streams: Sequence[Stream], name: str) -> None:
+    """Raise where streams without a clock stand beside others that they cannot be matched with by row."""
+    still = [stream for stream in streams if stream.time is None]
+    if not still or len(streams) == 1:
+        return
+    if len(still) < len(streams):
+        timed = next(stream for stream in streams if stream.time is not None)
+        raise BadDescription(
+            f'{name}: stream "{still[0].name}" has no time and "{timed.name}" has one, '
+            "so their rows cannot be matched. Give time to all streams or to none."
+        )
+    if len({len(stream) for stream in streams}) > 1:
+        shown = ", ".join(f'"{stream.name}" {len(stream)}' for stream in streams)
+        raise BadValue(f"{name}: streams without time are matched by row, but their lengths differ: {shown} rows.")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,9 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.ascii_columns import numbers, typed
-from steelyard.io.bounds import read_whole
-from steelyard.io.in_file import in_file
+from steelyard.io.contents import in_file, numbers, read_whole, typed
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.whole_files import write_bytes
 
@@ -33,7 +32,7 @@ _ONE_PART = 'its faces have no "part": all of it was taken as one part of one de
 class _Element:
     name: str
     count: int
-    fields: tuple[tuple[str, str, str], ...]  # name, type of the values, type of a list's length or ""
+    fields: list[tuple[str, str, str]]  # name, type of the values, type of a list's length or ""
 
 
 def read_ply(path: Path | str) -> dict[str, dict[str, Column]]:
@@ -68,13 +67,13 @@ def _header(path: Path, content: bytes) -> tuple[str, list[_Element], int]:
             case ["format", kind, _]:
                 order = _ORDERS.get(kind)
             case ["element", name, count] if count.isdecimal() and len(count) <= _MOST_DIGITS:
-                elements.append(_Element(name, int(count), ()))
+                elements.append(_Element(name, int(count), []))
             case ["property", kind, name] if kind in _TYPES and elements:
-                elements[-1] = _with(elements[-1], (name, _TYPES[kind], ""))
+                elements[-1].fields.append((name, _TYPES[kind], ""))
             case ["property", "list", length, kind, name] if {length, kind} <= set(_TYPES) and elements:
                 if _TYPES[length][0] == "f":
                     raise BadFile(f'{path}: the lists "{name}" count in {length}; lengths are whole numbers.')
-                elements[-1] = _with(elements[-1], (name, _TYPES[kind], _TYPES[length]))
+                elements[-1].fields.append((name, _TYPES[kind], _TYPES[length]))
             case ["ply"] | ["comment", *_] | ["obj_info", *_] | []:
                 pass
             case _:
@@ -93,10 +92,6 @@ def _require_names_apart(path: Path, elements: list[_Element]) -> None:
         names = [name for name, _, _ in element.fields]
         if twice := [name for name in names if names.count(name) > 1]:
             raise BadFile(f'{path}: element "{element.name}" has {names.count(twice[0])} properties "{twice[0]}".')
-
-
-def _with(element: _Element, field: tuple[str, str, str]) -> _Element:
-    return _Element(element.name, element.count, (*element.fields, field))
 
 
 def _binary(path: Path, element: _Element, data: bytes, order: str) -> tuple[Any, int]:
@@ -195,10 +190,15 @@ def write_mesh(mesh: TriangleMesh, path: Path | str) -> None:
         vertex[axis] = mesh.vertices[:, k]
     face = np.zeros(len(mesh), [("n", "u1"), ("v", "<i4", 3), ("rgb", "u1", 3), ("part", "<i4")])
     face["n"], face["v"], face["rgb"], face["part"] = 3, mesh.triangles, rgb, mesh.part
-    header = (
-        f"ply\nformat binary_little_endian 1.0\ncomment units metres\nelement vertex {len(vertex)}\n"
-        "property double x\nproperty double y\nproperty double z\n"
-        f"element face {len(face)}\nproperty list uchar int vertex_indices\n"
-        "property uchar red\nproperty uchar green\nproperty uchar blue\nproperty int part\nend_header\n"
-    )
-    write_bytes(path, header.encode() + vertex.tobytes() + face.tobytes())
+    colours = (f"uchar {name}" for name in ("red", "green", "blue"))
+    places, faces = [f"double {axis}" for axis in "xyz"], ["list uchar int vertex_indices", *colours, "int part"]
+    write_bytes(path, ply({"vertex": (places, vertex), "face": (faces, face)}))
+
+
+def ply(elements: Mapping[str, tuple[Sequence[str], Column]]) -> bytes:
+    """Return a binary PLY file of elements: type and name of their properties, and their records (N,), packed alike."""
+    lines = ["ply", "format binary_little_endian 1.0", "comment units metres"]
+    for name, (properties, records) in elements.items():
+        lines += [f"element {name} {len(records)}", *(f"property {each}" for each in properties)]
+    body = b"".join(records.tobytes() for _, records in elements.values())
+    return "\n".join([*lines, "end_header", ""]).encode() + body

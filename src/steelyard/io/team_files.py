@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Container, Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -12,14 +12,12 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadFile, BadInput, BadValue
-from steelyard.io.documents import load_toml
+from steelyard.io.contents import load_toml
 from steelyard.io.recordings.arm_joints import arm_of, pose_channels, posed, with_joints_in_order
 from steelyard.io.recordings.description import default_gravity
 from steelyard.io.recordings.stream_files import open_tables, read_cells, streams_of
 from steelyard.io.streams.entries import StreamSpec
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table, find_file
-from steelyard.io.teams.joint_angles import require_likely
+from steelyard.io.tables.files import Columns, Table, find_file
 from steelyard.io.teams.team_description import RecordingSpec, RobotSpec, TeamDescription, parse_team_description
 from steelyard.logs.recording import Stream
 from steelyard.logs.team_log import KINDS, Kind, TeamLog, TeamRecording, TeamRobot
@@ -29,6 +27,9 @@ from steelyard.robots.omnid import Omnid
 from steelyard.robots.serial import SerialArm
 
 _FEWEST = 50  # rows in which a torque shows
+
+# Readings may pass a stop by play and by the zero of an encoder; where most do by more than this [rad] they are others.
+_BEYOND = np.deg2rad(25.0)
 
 
 def read_team(path: Path | str, data: Path | str | None = None) -> TeamLog:
@@ -109,16 +110,13 @@ def _meetings(said: TeamDescription, where: str) -> list[_Meeting]:
             members.append((robot, own))
     _require_equal_counts(said, where)
     return [
-        _Meeting(key if isinstance(key, str) else _numbered(key, found), tuple(members))
+        # Without a name it is the kind, with its number where there are several.
+        _Meeting(
+            key if isinstance(key, str) else f"{key[0]} {key[1]}" if (key[0], 2) in found else key[0], tuple(members)
+        )
         for key, members in found.items()
         if not all(own.away for _, own in members)
     ]
-
-
-def _numbered(key: tuple[Kind, int], all_keys: Container[object]) -> str:
-    """Return the name of a recording that has none: its kind, with its number where there are several."""
-    kind, number = key
-    return f"{kind} {number}" if (kind, 2) in all_keys else kind
 
 
 def _require_equal_counts(said: TeamDescription, where: str) -> None:
@@ -147,10 +145,11 @@ def _recording(
     down = [robot.gravity for robot, own in meeting.members for _ in own.streams]
     gravity = [default_gravity() if known is None else known for known in down]
     made = streams_of(specs, tables, cells, gravity, gaps=False)
-    streams = {spec.where: _without_zeros(spec, stream) for spec, stream in zip(specs, made, strict=True)}
-    for spec, owner in zip(specs, owners, strict=True):
-        if owner in arms:
-            streams[spec.where] = posed(spec, streams[spec.where], arms[owner])
+    streams = {}
+    for spec, stream, owner in zip(specs, made, owners, strict=True):
+        if spec.zero_torque:  # it was only said to be zero
+            stream = replace(stream, channels={n: v for n, v in stream.channels.items() if n != "torque"})
+        streams[spec.where] = posed(spec, stream, arms[owner]) if owner in arms else stream
     tracks = {
         robot.name: _track(robot, own, [streams[spec.where] for spec in own.streams])
         for robot, own in meeting.members
@@ -159,12 +158,6 @@ def _recording(
     away = frozenset(robot.name for robot, own in meeting.members if own.away)
     with _at(where):
         return TeamRecording(meeting.members[0][1].kind, tracks, meeting.name, away)
-
-
-def _without_zeros(spec: StreamSpec, stream: Stream) -> Stream:
-    """Return the stream without a torque that was only said to be zero."""
-    channels = {n: values for n, values in stream.channels.items() if not (n == "torque" and spec.zero_torque)}
-    return replace(stream, channels=channels)
 
 
 def _track(robot: RobotSpec, own: RecordingSpec, streams: Sequence[Stream]) -> Track:
@@ -205,7 +198,7 @@ def _kinematics(channels: Mapping[str, Array]) -> dict[str, Array]:
     joints = channels["joint_position"]
     good: Mask = np.asarray(np.isfinite(joints).all(1))
     robot = Omnid()
-    require_likely(robot, joints[good])
+    _require_likely(robot, joints[good])
     out |= pose_channels(robot.pose(joints[good]), good)
     if "joint_torque" in channels:
         _require_live(channels["joint_torque"])
@@ -223,3 +216,39 @@ def _require_live(torques: Array) -> None:
             f"torque {int(dead.argmax()) + 1} of 3 is exactly 0 in all {len(torques)} rows and the others are not: its "
             "channel is dead. Repair it, or leave the torques of this recording out."
         )
+
+
+def _require_likely(robot: Omnid, joints: Array) -> None:
+    """Raise BadValue where joint angles (T, 6) [rad] are those of no Omnid, so that columns or units are others.
+
+    Radians read as degrees keep every arm within two degrees of level, where the platform is below what it works at.
+    """
+    if not len(joints):
+        return
+    low, high = robot.arm_limits
+    x, y, z = (stop + _BEYOND for stop in robot.gimbal_stops)
+    wide = replace(robot, arm_limits=(low - _BEYOND, high + _BEYOND), gimbal_stops=(x, y, z))
+    middle = np.median(joints, axis=0)
+    if not _works(wide, middle, joints):
+        for said, looks, factor in (("rad", "degrees", np.pi / 180), ("deg", "radians", 180 / np.pi)):
+            if _works(wide, factor * middle, factor * joints):
+                raise BadValue(
+                    f'joint angles look like {looks} that are read as "{said}": they would be between '
+                    f"{np.rad2deg(joints.min()):.3g} and {np.rad2deg(joints.max()):.3g} deg, where no Omnid works. Set "
+                    f'unit = "{looks[:3]}" for "joint_position".'
+                )
+    try:
+        wide.require_within(middle)
+    except BadValue:
+        wide.require_within(joints)
+
+
+def _works(robot: Omnid, middle: Array, joints: Array) -> bool:
+    """Return whether arms and gimbal are mostly within their stops and the platform no lower than it works."""
+    try:
+        robot.require_within(middle)
+        robot.require_within(np.quantile(joints, (0.05, 0.95), axis=0))
+        height = robot.pose(middle).position[2] + robot.home_height
+    except BadValue:
+        return False
+    return bool(robot.work_box[2] <= height <= robot.work_box[3] + 0.1)

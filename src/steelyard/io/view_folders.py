@@ -1,4 +1,7 @@
-"""Folders of posed RGB-D views: camera.json, poses.csv, depth/NAME.png, color/NAME.png or .jpg, perhaps table.json."""
+"""Folders of posed RGB-D views: camera.json, poses.csv, depth/NAME.png, color/NAME.png or .jpg, perhaps table.json.
+
+Images, colour of 8 bits (PNG, JPEG) and depth of 16 (PNG): the one module that imports pillow (extra `images`).
+"""
 
 from __future__ import annotations
 
@@ -13,15 +16,13 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.errors import BadFile
-from steelyard.io.bounds import require_bounded
-from steelyard.io.documents import load_json, small_text
+from steelyard.errors import BadFile, MissingDependency
+from steelyard.io.contents import in_file, load_json, read_whole, require_bounded, small_text
 from steelyard.io.entries import is_number
-from steelyard.io.images import MOST_PIXELS, read_colour, read_depth, require_images, write_image
-from steelyard.io.in_file import in_file
-from steelyard.shape.views import Intrinsics, TablePlane, Views
+from steelyard.shape.eight_bits import Colours
+from steelyard.shape.views import Depths, Intrinsics, TablePlane, Views
 from steelyard.spatial import Pose, Rotation
-from steelyard.whole_files import whole_folder, write_text
+from steelyard.whole_files import whole_folder, write_bytes, write_text
 
 _COLUMNS = ("name", "x", "y", "z", "qw", "qx", "qy", "qz")
 _HEADER = ",".join(_COLUMNS)
@@ -31,6 +32,8 @@ MOST_VIEWS = 10_000
 _LARGEST_CSV = 16_000_000
 _UNIT = 1e-3  # how far from 1 the length of a quaternion may be
 
+MOST_PIXELS = 64_000_000
+
 
 def read_views(folder: Path | str, progress: Callable[[int, int], None] | None = None) -> Views:
     """Read a folder of views; colour is optional, all or none. Raises BadFile with the file and what is wrong."""
@@ -39,8 +42,9 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
         raise BadFile(f"{folder}: no such folder. Views are a folder with camera.json, poses.csv and depth/.")
     camera = _camera(folder / "camera.json")
     names, X_WC = _poses(folder / "poses.csv")
-    intrinsics = in_file(folder / "camera.json", lambda: _intrinsics(camera))
-    size = (intrinsics.height, intrinsics.width)
+    size = int(camera["height"]), int(camera["width"])
+    lens = [camera[key] for key in ("fx", "fy", "cx", "cy")]
+    intrinsics = in_file(folder / "camera.json", lambda: Intrinsics(size[1], size[0], *lens))
     coloured = (folder / "color").is_dir()
     require_bounded(folder, len(names) * size[0] * size[1] * (5 if coloured else 2))
     depth = np.zeros((len(names), *size), np.uint16)
@@ -48,7 +52,9 @@ def read_views(folder: Path | str, progress: Callable[[int, int], None] | None =
     for k, name in enumerate(names):
         depth[k] = _sized(folder / "depth" / f"{name}.png", read_depth, size)
         if rgb is not None:
-            rgb[k] = _sized(_colour(folder / "color", name), read_colour, size)
+            colours = [folder / "color" / f"{name}.{ending}" for ending in _COLOUR]
+            found = next((path for path in colours if path.exists()), colours[0])
+            rgb[k] = _sized(found, read_colour, size)
         if progress:
             progress(k + 1, len(names))
     table = _table(folder / "table.json") if (folder / "table.json").exists() else None
@@ -90,10 +96,6 @@ def _camera(path: Path) -> dict[str, float]:
             f'{path}: "depth_unit_m" must be metres per step, 0.001 for millimetres; got {camera["depth_unit_m"]:g}.'
         )
     return camera
-
-
-def _intrinsics(camera: dict[str, float]) -> Intrinsics:
-    return Intrinsics(int(camera["width"]), int(camera["height"]), *(camera[key] for key in ("fx", "fy", "cx", "cy")))
 
 
 def _rows(path: Path) -> list[tuple[int, dict[str, Any]]]:
@@ -156,12 +158,6 @@ def _name(path: Path, line: int, name: str) -> str:
     return name
 
 
-def _colour(folder: Path, name: str) -> Path:
-    """Return where the colour of a view lies, as cameras write it; the first of these names where it is missing."""
-    paths = [folder / f"{name}.{ending}" for ending in _COLOUR]
-    return next((path for path in paths if path.exists()), paths[0])
-
-
 def _sized(path: Path, read: Callable[[Path], Any], size: tuple[int, int]) -> Any:
     pixels = read(path)
     if pixels.shape[:2] != size:
@@ -196,9 +192,10 @@ def write_views(views: Views, folder: Path | str, beside: Mapping[str, str] | No
     _require_unread(views, folder, old)
     with whole_folder(folder) as new:
         for k, name in enumerate(names):
-            _write_image(new / "depth" / f"{name}.png", views.depth[k])
-            if views.rgb is not None:
-                _write_image(new / "color" / f"{name}.png", views.rgb[k])
+            for kind, images in (("depth", views.depth), ("color", views.rgb)):
+                if images is not None:
+                    (new / kind).mkdir(exist_ok=True)
+                    write_image(new / kind / f"{name}.png", images[k])
         lens = views.intrinsics
         camera = {key: getattr(lens, key) for key in _CAMERA[:-1]} | {"depth_unit_m": views.depth_unit}
         write_text(new / "camera.json", json.dumps(camera, indent=1))
@@ -215,11 +212,6 @@ def write_views(views: Views, folder: Path | str, beside: Mapping[str, str] | No
         path.unlink(missing_ok=True)
     if views.rgb is None and (folder / "color").is_dir():
         (folder / "color").rmdir()
-
-
-def _write_image(path: Path, pixels: Any) -> None:
-    path.parent.mkdir(exist_ok=True)
-    write_image(path, pixels)
 
 
 def _written_before(folder: Path) -> list[Path]:
@@ -241,3 +233,58 @@ def _require_unread(views: Views, folder: Path, old: list[Path]) -> None:
     for what, lacks, there in (("colour", views.rgb is None, colour), ("table", views.table is None, table)):
         if lacks and (others := [path for path in there if path not in old]):
             raise BadFile(f"{others[0]}: these views have no {what}; move this file away or write into another folder.")
+
+
+def require_images() -> Any:
+    """Return what reads and writes images; raises MissingDependency where nothing does here."""
+    try:
+        import PIL.Image
+    except ImportError:
+        raise MissingDependency.of("pillow", "images", "Reading and writing images") from None
+    return PIL.Image
+
+
+def read_depth(path: Path) -> Depths:
+    """Return a depth image (H, W) uint16; raises BadFile where it has not one channel of 16 bits."""
+    image = _opened(path, ("PNG",))
+    if not image.mode.startswith("I"):
+        raise BadFile(f"{path}: depth must be a PNG with one channel of 16 bits; this one has mode {image.mode}.")
+    return np.asarray(_pixels(path, image), np.uint16)
+
+
+def read_colour(path: Path) -> Colours:
+    """Return a colour image (H, W, 3) uint8; raises BadFile."""
+    image = _opened(path, ("PNG", "JPEG"))
+    if image.mode not in ("RGB", "RGBA", "L", "P", "LA"):
+        raise BadFile(f"{path}: colour must be RGB or grey with 8 bits per channel; this image has mode {image.mode}.")
+    return np.asarray(_pixels(path, image, "RGB"), np.uint8)
+
+
+def _opened(path: Path, formats: tuple[str, ...]) -> Any:
+    pillow = require_images()
+    if not path.exists():
+        raise BadFile(f"{path}: this image is missing.")
+    content = read_whole(path)
+    try:
+        image = pillow.open(io.BytesIO(content), formats=formats)
+    except pillow.DecompressionBombError:
+        raise BadFile(f"{path}: this image has more pixels than any depth camera.") from None
+    except (OSError, ValueError, SyntaxError):
+        raise BadFile(f"{path}: expected a {' or '.join(formats)} image; found something else.") from None
+    if image.width * image.height > MOST_PIXELS:
+        raise BadFile(f"{path}: {image.width} x {image.height} pixels are more than any depth camera has.")
+    return image
+
+
+def _pixels(path: Path, image: Any, mode: str | None = None) -> Any:
+    try:
+        return np.asarray(image if mode is None else image.convert(mode))
+    except (OSError, ValueError, SyntaxError) as error:
+        raise BadFile(f"{path}: this image is damaged ({error}). Save it again.") from None
+
+
+def write_image(path: Path, pixels: Depths | Colours) -> None:
+    """Write (H, W) uint16 or (H, W, 3) uint8 as PNG; raises BadFile."""
+    content = io.BytesIO()
+    require_images().fromarray(np.ascontiguousarray(pixels)).save(content, "PNG", compress_level=1)
+    write_bytes(path, content.getvalue())

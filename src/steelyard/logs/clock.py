@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import numpy as np
+from numpy.typing import ArrayLike
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadValue
 from steelyard.logs.recording import Stream
@@ -19,6 +21,15 @@ def stamps_of(stream: Stream) -> Array:
     if stream.time is None:
         raise BadDescription(f"'{stream.name}' has no time; streams with their own rows need a clock.")
     return stream.time
+
+
+def seconds(time: ArrayLike) -> Array:
+    """Return stamps of any kind as [s]: datetime64 since 1970, timedelta64, or numbers, which are seconds already."""
+    stamps = np.asarray(time)
+    if stamps.dtype.kind not in "mM":
+        return check.finite("time", time)
+    counts = stamps.astype(f"{stamps.dtype.kind}8[ns]").astype(np.int64)
+    return check.finite("time", np.where(np.isnat(stamps), np.nan, counts * 1e-9))
 
 
 def median_step(time: Array) -> float:

@@ -12,8 +12,8 @@ from steelyard.check import Array
 from steelyard.check import Integers as Integers
 from steelyard.check import Mask as Mask
 from steelyard.errors import BadValue
-from steelyard.inertia import forms
-from steelyard.spatial import Pose, cross_matrix, lever_acceleration
+from steelyard.inertia.regressor import newton_euler
+from steelyard.spatial import Pose, lever_acceleration
 
 
 @dataclass(frozen=True, eq=False)
@@ -165,12 +165,4 @@ class MotionLog:
 
     def predicted(self, phi: Array) -> Array:
         """Return the wrench (N, 6) that a body phi (10,) needs for this motion, without bias."""
-        m, h = phi[0], phi[1:4]
-        inertia = forms.inertia_matrix(phi)
-        a = self.acceleration - self.gravity
-        omega, alpha = self.angular_velocity, self.angular_acceleration
-        H = cross_matrix(h)
-        turn = np.cross(omega, np.cross(omega, h))
-        force = m * a - alpha @ H.T + turn
-        torque = a @ H.T + alpha @ inertia + np.cross(omega, omega @ inertia)
-        return np.concatenate([torque, force], 1)
+        return newton_euler(phi, self.acceleration - self.gravity, self.angular_velocity, self.angular_acceleration)

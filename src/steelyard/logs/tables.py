@@ -16,6 +16,9 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.spatial import Rotation
 
+# Rows without a clock mostly stand in the order in which they were measured. Blocks of neighbours are left out in turn,
+# so that errors which last from row to row show in the bars; in another order they say what single rows say.
+BLOCKS = 20
 # Quantity -> the first stream that has it, and its values.
 Found = Mapping[str, tuple[Stream, Array]]
 
@@ -46,7 +49,11 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
     log = replace(_log_of_rows(found, wrench, gravity, rotation), dead=dead)
     names = ", ".join(f"'{s.name}'" for s in streams)
     given = [q for q in ("linear_acceleration", "angular_acceleration") if q in found]
-    what = f"{' and '.join(given)} used as given" if given else "every row taken as at rest"
+    what = (
+        f"{' and '.join(given)} used as given"
+        if given
+        else "every row taken as at rest, so that what moves the load looks like weight"
+    )
     finding = Finding.of("clock-missing", f"{names} has no clock: no delay or derivative can be found; {what}.")
     return log, rotation, (finding,), "linear_acceleration" if "linear_acceleration" in found else "none"
 
@@ -81,7 +88,8 @@ def _log_of_rows(found: Found, wrench: Array, gravity: Array, rotation: Rotation
         if rotation is not None and stream.turn is not None:
             motion["linear_acceleration"] = stream.turn.apply(values) + gravity
     still = np.full(len(wrench), not any(m is not zero for m in motion.values()))
+    blocks = np.arange(len(wrench)) * BLOCKS // len(wrench)
     return MotionLog(
         wrench, gravity, motion["linear_acceleration"], motion["angular_velocity"],
-        motion["angular_acceleration"], still=still
+        motion["angular_acceleration"], still=still, pose=blocks
     )  # fmt: skip

@@ -53,9 +53,18 @@ class TeamRecording:
             raise BadDescription(f"kind of '{self.name}' must be one of {', '.join(KINDS)}; got {self.kind!r}.")
         if not self.tracks:
             raise BadDescription(f"'{self.name}' holds no robot's data; give at least one stream.")
+        for name, track in self.tracks.items():
+            if not isinstance(track, Track):
+                raise BadDescription(
+                    f"'{self.name}' needs a Track of each robot: Track.of(time, rotation=.., ..); that of '{name}' is "
+                    f"{type(track).__name__}."
+                )
         object.__setattr__(self, "tracks", MappingProxyType(dict(self.tracks)))
         object.__setattr__(self, "away", frozenset(self.away))
         require_one_clock_unit(self.name, self.tracks)
+        for name, track in self.tracks.items():
+            if len(track) > 1:
+                check.likely_step(median_step(track.time), f"time of '{name}' in '{self.name}'")
         if self.kind != "still" and min(float(np.ptp(t.time)) for t in self.tracks.values()) < self.LONG_S:
             self.require_overlap()
 

@@ -19,6 +19,7 @@ from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadDescription, BadValue
 from steelyard.findings import counted
+from steelyard.logs.clock import seconds
 from steelyard.spatial import Pose, Rotation
 
 CHANNELS: Mapping[str, str] = MappingProxyType(
@@ -76,11 +77,13 @@ class Track:
     def of(cls, time: ArrayLike, carrying: ArrayLike | None = None, **channels: ArrayLike | None) -> Track:
         """Return the track of raw columns (T, ..), NaN where a number is missing; a channel that is None is left out.
 
+        `time` is in [s], or datetime64; `rotation` a Rotation, SciPy's, or matrices.
         A row with a NaN in one column loses that channel only; a torque is missing where the force is and the reverse,
         since half a wrench adds up to nothing.
         """
         raw = {name: _numbers(name, values) for name, values in channels.items() if values is not None}
-        rows = len(np.atleast_1d(np.asarray(time)))
+        stamps = seconds(time)
+        rows = len(np.atleast_1d(stamps))
         valid: dict[str, Mask] = {}
         filled: dict[str, Array] = {}
         for name, values in raw.items():
@@ -92,7 +95,7 @@ class Track:
         if {"force", "torque"} <= valid.keys() and len(valid["force"]) == len(valid["torque"]):
             valid["force"] = valid["torque"] = valid["force"] & valid["torque"]
         held = None if carrying is None else np.asarray(carrying, dtype=np.bool_)
-        return cls(np.asarray(time, dtype=np.float64), filled, valid, held)
+        return cls(stamps, filled, valid, held)
 
     def __len__(self) -> int:
         return len(self.time)
@@ -167,13 +170,18 @@ class Track:
 
 def _numbers(name: str, values: ArrayLike) -> Array:
     """Return a raw channel as floats of its shape; NaN passes."""
+    if isinstance(values, Rotation):
+        values = values.matrix
+    elif hasattr(values, "as_matrix"):  # SciPy's
+        values = values.as_matrix()
     try:
         array = np.array(values, dtype=np.float64)
     except (TypeError, ValueError) as error:
         raise BadValue(f"{name} must be numbers; got {type(values).__name__} ({error}).") from None
     size = (3, 3) if name == "rotation" else (3,)
     if array.ndim < 2 or array.shape[1:] != size:
-        raise BadValue(f"{name} must have shape (T, {', '.join(map(str, size))}); got {array.shape}.")
+        told = " Quaternions become one with sy.Rotation.from_quaternion_wxyz or .._xyzw." if name == "rotation" else ""
+        raise BadValue(f"{name} must have shape (T, {', '.join(map(str, size))}); got {array.shape}.{told}")
     return array
 
 

@@ -8,6 +8,7 @@ from typing import Any
 import numba
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.parts.hierarchy import Hierarchy
@@ -46,6 +47,7 @@ class Cuts:
 
     def nodes(self, count: int) -> list[int]:
         """Return the nodes, rising, of the best cut into `count` parts."""
+        count = int(check.whole("the number of parts", count))
         if not 1 <= count <= len(self.length):
             raise BadValue(f"this solid can be cut into 1 to {len(self.length)} parts, not {count}.")
         found, open_nodes = [], [(self.hierarchy.root, count)]

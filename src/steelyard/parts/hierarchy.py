@@ -87,6 +87,7 @@ class Hierarchy:
 
     def nodes(self, count: int) -> list[int]:
         """Return the `count` nodes, rising, that are left when the last count - 1 merges are undone."""
+        count = int(check.whole("the number of parts", count))
         if not 1 <= count <= len(self):
             raise BadValue(f"this tree has {len(self)} pieces and can be cut into 1 to {len(self)} parts, not {count}.")
         kept = self.root - (count - 1)

@@ -14,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
@@ -112,8 +113,15 @@ class Segmentation:
     def with_labels(self, labels: Integers) -> Segmentation:
         """Return the solid in the parts of `labels` (T,), any whole numbers; they are numbered by falling volume.
 
-        They are given, not chosen: `cuts` is None then, and a log is offered no others.
+        They are given, not chosen: `cuts` is None then, and a log is offered no others. The cells are those of `mesh`
+        of this segmentation: those of the solid that reached over a border between parts were cut. Raises BadValue.
         """
+        labels = check.whole("labels", labels)
+        if labels.shape != (len(self.mesh),):
+            raise BadValue(
+                f"labels must be one for each of the {len(self.mesh)} cells of the segmentation's own mesh; got shape "
+                f"{labels.shape}. The solid's mesh has others: cells at borders were cut."
+            )
         return replace(self._labelled(labels), cuts=None)
 
     def _labelled(self, labels: Integers) -> Segmentation:
@@ -126,11 +134,10 @@ class Segmentation:
 
     def merged(self, groups: Sequence[Sequence[int]]) -> Segmentation:
         """Return parts joined: each group lists the parts that are one; it takes the name of its first part."""
+        groups = [_group(group) for group in groups]
         named = [k for group in groups for k in group]
         if not all(groups) or len(set(named)) < len(named) or not set(named) <= set(range(len(self))):
-            raise BadValue(
-                f"groups must name parts 0..{len(self) - 1}, none twice, none empty; got {[list(g) for g in groups]}."
-            )
+            raise BadValue(f"groups must name parts 0..{len(self) - 1}, none twice, none empty; got {groups}.")
         goal = np.arange(len(self))
         for group in groups:
             goal[list(group)] = group[0]
@@ -144,6 +151,14 @@ class Segmentation:
         if len(names) != len(self):
             raise BadValue(f"{len(self)} parts need as many names; got {len(names)}.")
         return replace(self, names=tuple(names))
+
+
+def _group(parts: Sequence[int]) -> list[int]:
+    """Return the numbers of parts that are one."""
+    numbers = check.whole("each group", parts)
+    if numbers.ndim != 1:
+        raise BadValue(f"groups must be lists of parts, such as [[0, 1]]; got {parts!r} as one of them.")
+    return [int(k) for k in numbers]
 
 
 @dataclass(frozen=True, eq=False)

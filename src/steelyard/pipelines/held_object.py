@@ -22,7 +22,7 @@ from steelyard.pipelines.looking_back import looked_back, of_sensor_and_body, ro
 from steelyard.pipelines.options import DEFAULTS, DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import rows_as_given
 from steelyard.pipelines.telling import Noticed, beside, noticed_before, remedied, sign_found, told, uncalibrated
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 from steelyard.spatial import Pose
 
 if TYPE_CHECKING:

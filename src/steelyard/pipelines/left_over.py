@@ -11,7 +11,7 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.pipelines.options import DRIFT_ALLOWED, Options
 from steelyard.pipelines.rows import GRAVITY_FOUND, rows_as_given, since_start
-from steelyard.sanity import examine
+from steelyard.sanity.before import examine
 
 # Residuals this many times those of the answer are not what it was made from.
 OTHER = 2.0

@@ -20,7 +20,7 @@ from steelyard.logs.recording import KNOWN_PLACE
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.choice import Placed, estimator_for
 from steelyard.pipelines.options import Options
-from steelyard.sanity import impossible_density, maybe_hollow
+from steelyard.sanity.fitted.no_body import impossible_density, maybe_hollow
 from steelyard.spatial import Pose
 
 if TYPE_CHECKING:

@@ -14,21 +14,12 @@ from steelyard.logs.recording import Recording
 from steelyard.pipelines.load import Load
 from steelyard.pipelines.options import DRIFT_ALLOWED
 from steelyard.pipelines.rows import FitRows
-from steelyard.sanity import (
-    allow_filter,
-    allow_sag,
-    allow_softness,
-    drift_of,
-    examine_body,
-    examine_masses,
-    examine_motion,
-    examine_sensor,
-    examine_wrench_unit,
-    of_answer,
-    of_rows,
-    row_noise,
-)
-from steelyard.sanity.after import rotation_of
+from steelyard.sanity.after import of_answer, of_rows, rotation_of, row_noise
+from steelyard.sanity.fitted.biases import drift_of
+from steelyard.sanity.fitted.load_motion import examine_masses, examine_motion
+from steelyard.sanity.fitted.no_body import examine_body, examine_wrench_unit
+from steelyard.sanity.fitted.sensor_matrix import examine_sensor
+from steelyard.sanity.fitted.yielding import allow_filter, allow_sag, allow_softness
 
 # A sensor that is said to be tared is not where chance gives such a bias less often than this.
 UNTARED = 1e-6

@@ -5,6 +5,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import Literal
 
+from steelyard import check
 from steelyard.errors import BadValue
 from steelyard.parts.material import Material
 
@@ -37,7 +38,7 @@ class Options:
         for name, known in choices.items():
             if getattr(self, name) not in known:
                 raise BadValue(f"{name} must be one of {', '.join(map(str, known))}; got {getattr(self, name)!r}.")
-        if self.object_size is not None and not 0.005 <= self.object_size <= 5:
+        if self.object_size is not None and not 0.005 <= check.number("object_size", self.object_size) <= 5:
             raise BadValue(f"object_size must be 0.005 to 5 m; got {self.object_size}.")
 
 

@@ -24,16 +24,17 @@ from steelyard.logs.recording import Recording
 from steelyard.logs.runs import runs
 from steelyard.pipelines.known_motion import with_known_acceleration
 from steelyard.pipelines.options import Options
-from steelyard.sanity import examine_place, examine_room_bias, fitted_gravity, levelled, one_body
 from steelyard.sanity.after import rotation_of
 from steelyard.sanity.aside import stands_aside
+from steelyard.sanity.fitted.biases import SeenRoomBias, examine_room_bias
 from steelyard.sanity.fitted.full_fit import force_left
-from steelyard.sanity.fitted.misplaced import Misplaced, misplaced, of_sensor
-from steelyard.sanity.fitted.room_bias import SeenRoomBias
+from steelyard.sanity.fitted.gravity import fitted_gravity, levelled
+from steelyard.sanity.fitted.misplaced import Misplaced, examine_place, misplaced, of_sensor
 from steelyard.sanity.fitted.sensor_matrix import turn_of
 from steelyard.sanity.holding.consensus import FINE
 from steelyard.sanity.holding.contact import agreeing
-from steelyard.sanity.holding.small_slip import small_slip
+from steelyard.sanity.holding.load_change import small_slip
+from steelyard.sanity.one_body import one_body
 
 # How the note begins that says which direction of gravity was used.
 GRAVITY_FOUND = "gravity was estimated"

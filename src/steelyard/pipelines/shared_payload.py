@@ -26,16 +26,18 @@ from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import common_time
 from steelyard.logs.team_track import Track
 from steelyard.pipelines.telling import MISREAD
-from steelyard.team.clocks.apart import together
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
+from steelyard.team.clocks.lags import together
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.joint import JointTeam
-from steelyard.team.lost_wrenches import without_clipped, without_frozen
-from steelyard.team.misread.angle_units import require_one_angle_unit
-from steelyard.team.misread.length_units import require_one_length_unit
-from steelyard.team.misread.same_numbers import require_own_numbers, stuck_forces
+from steelyard.team.lost_wrenches import stuck_forces, without_clipped, without_frozen
+from steelyard.team.misread.files import (
+    require_one_angle_unit,
+    require_one_length_unit,
+    require_own_numbers,
+    with_moves_as_motion,
+)
 from steelyard.team.published import PublishedTeam
-from steelyard.team.really_still import with_moves_as_motion
 from steelyard.team.team_findings import late_clocks
 from steelyard.team.weighed import clocked
 

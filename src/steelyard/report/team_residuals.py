@@ -10,11 +10,11 @@ from steelyard.logs.log import MotionLog
 from steelyard.logs.team_conditioning import condition
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.report.contents import Residuals
-from steelyard.spatial import classical_acceleration, cross
+from steelyard.spatial import Pose, classical_acceleration, cross
 from steelyard.team.clocks.errors import ClockError, punctual
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.grasps import Grasps
-from steelyard.team.misread.taken import as_taken
+from steelyard.team.grasp_kinematics import total_wrench
+from steelyard.team.misread.readings import as_taken
 
 CUTOFF_HZ = 3.0
 _PAUSE_S = 0.1
@@ -39,7 +39,7 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     if estimate.hinge is not None:
         return None
     log = as_taken(log, estimate.wrench_maps)
-    grasps = Grasps.of({name: estimate.grasps[name].pose for name in log.names}, log.reference)
+    grasps = estimate.poses_of(log.names)
     late = {name: ClockError(seconds) for name, seconds in estimate.clock_offsets_s.items() if seconds}
     start, parts = 0.0, []
     for recording in log.recordings:
@@ -56,17 +56,17 @@ def team_residuals(log: TeamLog, estimate: TeamEstimate) -> Residuals | None:
     return Residuals(time, left[:, 3:], left[:, :3], still)
 
 
-def _left(log: TeamLog, recording: TeamRecording, grasps: Grasps, estimate: TeamEstimate) -> tuple[Array, Array]:
+def _left(log: TeamLog, recording: TeamRecording, grasps: Pose, estimate: TeamEstimate) -> tuple[Array, Array]:
     """Return times (T,) and what is left (T, 6) [N m, N] at R's origin, in R's axes."""
     rows = condition(log, recording, CUTOFF_HZ)
-    turn = grasps.poses.rotation.matrix
+    turn = grasps.rotation.matrix
     has, speed, rate = rows.has_rate, *(_at_reference(grasps, values) for values in (rows.twist, rows.twist_rate))
     if recording.kind == "still":
         has, speed, rate = rows.has_gravity, np.zeros_like(speed), np.zeros_like(rate)
     keep = rows.complete_wrench() & has.any(0) & rows.has_gravity.any(0)
     twist, change = _mean(speed, has)[keep], _mean(rate, has)[keep]
     down = _mean(np.einsum("nij,ntj->nti", turn, rows.gravity), rows.has_gravity)[keep]
-    wrench = grasps.total_wrench(rows.wrench)[keep]
+    wrench = total_wrench(grasps, rows.wrench)[keep]
     acceleration = classical_acceleration(change, twist)
     moved = MotionLog(wrench, down, acceleration, twist[:, :3], change[:, :3])
     left = wrench - moved.predicted(estimate.parameters.vector) - estimate.wrench_bias
@@ -74,9 +74,9 @@ def _left(log: TeamLog, recording: TeamRecording, grasps: Grasps, estimate: Team
     return rows.time[keep], left
 
 
-def _at_reference(grasps: Grasps, twist: Array) -> Array:
+def _at_reference(grasps: Pose, twist: Array) -> Array:
     """Return twists (N, T, 6) given at the grasps as twists of R, in R's axes; their derivatives likewise."""
-    turn, place = grasps.poses.rotation.matrix, grasps.poses.position
+    turn, place = grasps.rotation.matrix, grasps.position
     omega = np.einsum("nij,ntj->nti", turn, twist[..., :3])
     velocity = np.einsum("nij,ntj->nti", turn, twist[..., 3:])
     return np.concatenate([omega, velocity + cross(np.broadcast_to(place[:, None], omega.shape), omega)], -1)

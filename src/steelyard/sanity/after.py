@@ -14,7 +14,7 @@ from steelyard.logs.conditioning import noise_std
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording
 from steelyard.sanity.coverage import coverage
-from steelyard.sanity.fitted.drift import Drift
+from steelyard.sanity.fitted.biases import Drift
 from steelyard.sanity.fitted.gravity import fitted_gravity
 from steelyard.sanity.fitted.no_body import implausible
 from steelyard.sanity.readings.glance import channel

@@ -7,20 +7,17 @@ from dataclasses import replace
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.recording import Recording
-from steelyard.sanity.no_torque import without_zero_torque
-from steelyard.sanity.readings.clock_offset import examine_offset
-from steelyard.sanity.readings.clock_unit import examine_clock
+from steelyard.sanity.readings.clocks import examine_clock, examine_offset
 from steelyard.sanity.readings.conventions import examine_conventions, examine_turns
 from steelyard.sanity.readings.silent import without_silent
-from steelyard.sanity.readings.turning import examine_turning
-from steelyard.sanity.readings.units import examine_units
-from steelyard.sanity.rows.frozen_rows import dead_channels
-from steelyard.sanity.rows.judged import examine_rows
-from steelyard.sanity.rows.leaps import examine_sparse
-from steelyard.sanity.rows.memory import examine_memory
+from steelyard.sanity.readings.units import examine_turning, examine_units
+from steelyard.sanity.rows.judged import dead_channels, examine_rows
+from steelyard.sanity.rows.still_rows import examine_memory, examine_sparse
 
 # A motion is told from its neighbours in time.
 FEWEST_ROWS = 12
+
+_UNTOLD = 'torque = "zero" tells nothing of the centre of mass'
 
 
 def examine(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -55,3 +52,20 @@ def _require_rows(recording: Recording) -> None:
             f"{FEWEST_ROWS} to tell how the sensor moved. Record longer, or mark a table of still poses with "
             'kind = "poses" and no time.'
         )
+
+
+def without_zero_torque(recording: Recording) -> Recording:
+    """Return the recording with torques of exactly zero as dead channels, and a note.
+
+    Raises CannotAnswer for tables at rest, whose forces tell the mass alone.
+    """
+    torques = [stream.channels["torque"] for stream in recording.streams if "torque" in stream.channels]
+    if not torques or any(values.any() for values in torques):
+        return recording
+    if all(stream.poses for stream in recording.streams):
+        raise CannotAnswer(
+            f"{_UNTOLD}, and forces of still poses tell the mass alone. Give the columns of the torque, or a log of "
+            "quick moves, in which the force shows it."
+        )
+    note = f"{_UNTOLD}: it is told by how the force follows the moves"
+    return replace(recording, dead=(True, True, True, *recording.dead[3:]), notes=(*recording.notes, note))

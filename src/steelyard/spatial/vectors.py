@@ -103,6 +103,9 @@ class _SixVector:
         object.__setattr__(self, "_first", first)
         object.__setattr__(self, "_second", second)
 
+    def __repr__(self) -> str:
+        return f"{type(self).__name__}({self._first!r}, {self._second!r})"
+
     @classmethod
     def from_array(cls, array: ArrayLike) -> Self:
         """Return the value from (..., 6), angular part first."""

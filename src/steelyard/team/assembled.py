@@ -1,4 +1,9 @@
-"""From the fits in the balance frame to one estimate in the reference grasp."""
+"""From the fits in the balance frame to one estimate in the reference grasp.
+
+Where the answer is none of a body, the physically consistent one nearest to it is given, in the metric of its own
+covariance.
+Source: log-Cholesky parameters of Rucker and Wensing 2022: every one of them is a body.
+"""
 
 from __future__ import annotations
 
@@ -6,24 +11,25 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.evidence import Evidence
-from steelyard.inertia import InertialParameters
+from steelyard.inertia import InertialParameters, forms
 from steelyard.inertia.forms import people_jacobian
 from steelyard.inertia.parameters import frame_change
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
-from steelyard.team.consistent import consistent
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 from steelyard.team.payload.body_rows import balance_frame, reach
-from steelyard.team.payload.doubt import lost_turns, moved_by_gains, moved_by_grasps
+from steelyard.team.payload.doubt import lost_turns, moved_by, moved_by_gains, turned_by_step
 from steelyard.team.payload.fit import PayloadFit
-from steelyard.team.payload.shown import SHOWN
+from steelyard.team.payload.model import SHOWN
 from steelyard.team.poses.covariance import Spread
 
 # [m] What is taken for the size of a team where the motion does not show where its grasps are.
 UNKNOWN_SIZE = 1.0
+STEPS = 60
+# Least eigenvalue of the pseudo-inertia, as a share of its middle one in units of mass and size, that counts as a body.
+MARGIN = 1e-6
 
 
 def team_size(grasps: Pose, spread: Spread) -> float:
@@ -38,7 +44,7 @@ def assembled(
     balance = balance_frame(grasps)
     size, placed = team_size(grasps, spread), balance.inverse() @ grasps
     spread = spread.with_lost(size)
-    moved = moved_by_grasps(payload, placed)
+    moved = moved_by(payload, turned_by_step(placed))
     inner = payload.covariance + moved @ spread.full @ moved.T + moved_by_gains(payload, D)
     if spread.blind.size:
         inner = inner + lost_turns(payload, placed, spread.unseen(size))
@@ -86,3 +92,52 @@ def known(body: InertialParameters, covariance: Array, units: Array) -> Mask:
     # The centre of mass is the first moment over the mass.
     small[1:] &= small[0]
     return np.asarray(small)
+
+
+def consistent(phi: Array, covariance: Array, scale: Array) -> Array:
+    """Return phi (10,), or the body of least (phi - phi')^T C^-1 (phi - phi') where phi is none.
+
+    scale  (10,) units of mass, mass times size, mass times size squared
+    """
+    pseudo = forms.pseudo_inertia(phi / scale)
+    if np.linalg.eigvalsh(pseudo)[0] > 0:
+        return phi
+    goal = phi / scale
+    F = np.linalg.inv(covariance / np.outer(scale, scale) + 1e-18 * np.eye(10))
+    F /= np.trace(F)
+    theta = forms.log_cholesky(_nearby(pseudo))
+    damping, found = 1e-3, forms.from_log_cholesky(theta)
+    cost = float((found - goal) @ F @ (found - goal))
+    for _ in range(STEPS):
+        J = forms.log_cholesky_jacobian(theta)
+        H, g = J.T @ F @ J, J.T @ F @ (goal - found)
+        step = np.linalg.solve(H + damping * (np.diag(np.diag(H)) + 1e-12 * np.eye(10)), g)
+        trial = theta + np.clip(step, -1.0, 1.0)
+        body = forms.from_log_cholesky(trial)
+        new = float((body - goal) @ F @ (body - goal))
+        if new < cost and np.linalg.eigvalsh(forms.pseudo_inertia(body))[0] > MARGIN * MARGIN:
+            settled = cost - new < 1e-10 * cost
+            theta, found, cost, damping = trial, body, new, 0.3 * damping
+            if settled:
+                break
+        else:
+            damping *= 10
+            if damping > 1e8:
+                break
+    return np.asarray(found * scale)
+
+
+def _nearby(pseudo: Array) -> Array:
+    """Return the pseudo-inertia (4, 4) of a body to start from: of the same mass and centre of mass, where the mass is
+    above zero. These are mostly known far better than the rest, and a search from elsewhere creeps along what they
+    allow.
+    """
+    mass, first = float(pseudo[3, 3]), pseudo[:3, 3]
+    if mass <= 0:
+        values, vectors = np.linalg.eigh(pseudo)
+        return np.asarray((vectors * np.maximum(values, 1e-3 * max(float(values[-1]), 1.0))) @ vectors.T)
+    out = pseudo.copy()
+    point = np.outer(first, first) / mass
+    values, vectors = np.linalg.eigh(pseudo[:3, :3] - point)
+    out[:3, :3] = point + (vectors * np.maximum(values, 1e-3 * max(float(values[-1]), mass))) @ vectors.T
+    return out

@@ -5,8 +5,7 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Mask
+from steelyard.check import Array, Mask
 
 
 def inverses(stack: Array) -> tuple[Array, Array]:
@@ -32,6 +31,17 @@ def logarithms(stack: Array) -> Array:
     if doubtful.any():
         logdet[doubtful] = np.linalg.slogdet(stack[doubtful])[1]
     return logdet
+
+
+def shown_axes(H: Array, rank: float) -> tuple[Array, Array]:
+    """Return A (P, Q) and v (Q,) with A diag(1 / v) A^T the pseudoinverse of equations (P, P) that may not show all.
+
+    rank  share of the largest eigenvalue, with a diagonal of ones, below which one is rounding
+    """
+    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
+    values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
+    told = values > rank * values[-1]
+    return scale[:, None] * vectors[:, told], values[told]
 
 
 @numba.njit(cache=True, error_model="numpy")

@@ -11,7 +11,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.identify.estimate import Estimate
 from steelyard.spatial import Pose
-from steelyard.team.misread.taken import in_few_words
+from steelyard.team.misread.readings import in_few_words
 
 
 @dataclass(frozen=True, eq=False)

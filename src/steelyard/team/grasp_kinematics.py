@@ -8,11 +8,12 @@ axis.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.spatial import Pose, Rotation, Twist, cross, cross_matrix
@@ -43,6 +44,8 @@ def rotation(omega_i: Array, omega_j: Array) -> tuple[Rotation, Array]:
 
     Raises CannotAnswer where all of them are about one axis.
     """
+    omega_i = check.rows("omega_i", omega_i)
+    omega_j = check.rows("omega_j", omega_j, of=("omega_i", omega_i))
     match = omega_i.T @ omega_j
     s = np.asarray(np.linalg.svd(match, compute_uv=False), np.float64)
     if not s[1] > ONE_AXIS**2 * s[0]:
@@ -58,6 +61,7 @@ def position(twist_i: Array, twist_j: Array, turn: Rotation) -> tuple[Array, Arr
 
     Raises CannotAnswer where all turning is about one axis.
     """
+    twist_i, twist_j = _twists(twist_i, twist_j)
     turned = turn.apply(twist_j[:, :3])
     gap = twist_i[:, 3:] - turn.apply(twist_j[:, 3:])
     normal = (turned * turned).sum() * np.eye(3) - turned.T @ turned
@@ -75,6 +79,7 @@ def pair(twist_i: Array, twist_j: Array) -> Pair:
 
     Raises CannotAnswer for fewer than three rows, or where all turning is about one axis.
     """
+    twist_i, twist_j = _twists(twist_i, twist_j)
     if len(twist_i) < 3:
         raise CannotAnswer(f"two robots must share at least three rows with twists; they share {len(twist_i)}.")
     turn, singular = rotation(twist_i[:, :3], twist_j[:, :3])
@@ -104,6 +109,28 @@ def star(names: Sequence[str], twists: Array, measured: Mask, reference: str) ->
         except CannotAnswer as error:
             raise CannotAnswer(f"Grasp of '{name}' seen from '{reference}': {error}") from None
     return found
+
+
+def from_star(names: Sequence[str], pairs: Mapping[str, Pair]) -> Pose:
+    """Return the poses (N,) of all grasps in that of the reference, which has no pair: its own is the identity."""
+    each = [pairs[name].pose if name in pairs else Pose.identity() for name in names]
+    turns, places = np.array([pose.rotation.matrix for pose in each]), np.array([pose.position for pose in each])
+    return Pose(Rotation(turns), places)
+
+
+def total_wrench(grasps: Pose, wrench: Array) -> Array:
+    """Return the sum (T, 6) [N m, N] over the team of wrenches (N, T, 6) given at the grasps (N,), at R's origin."""
+    turn, place = grasps.rotation.matrix, grasps.position
+    force = np.einsum("nij,ntj->nti", turn, wrench[..., 3:])
+    moment = np.einsum("nij,ntj->nti", turn, wrench[..., :3])
+    levers = cross(np.broadcast_to(place[:, None], force.shape), force)
+    return np.asarray(np.concatenate([moment + levers, force], -1).sum(0))
+
+
+def _twists(twist_i: Array, twist_j: Array) -> tuple[Array, Array]:
+    """Return the body twists of two robots, checked: (T, 6) each; raises BadValue."""
+    twist_i = check.rows("twist_i", twist_i, 6)
+    return twist_i, check.rows("twist_j", twist_j, 6, of=("twist_i", twist_i))
 
 
 def _covariance(turn: Rotation, place: Array, normal: Array, twist_j: Array, variance: Array) -> Array:

@@ -10,6 +10,7 @@ from typing import Literal
 
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.inertia.forms import UPPER
@@ -22,11 +23,14 @@ LEAST_SPREAD = 1e-6
 
 def regressor(omega: Array, alpha: Array) -> Array:
     """Return A (T, 3, 6) so that I alpha + omega x I omega = A (xx, xy, xz, yy, yz, zz), from (T, 3) each (eq. 20)."""
+    omega = check.rows("omega", omega)
+    alpha = check.rows("alpha", alpha, of=("omega", omega))
     return np.asarray(_times(alpha) + cross_matrix(omega) @ _times(omega))
 
 
 def moment_about(wrench: Array, point: Array) -> Array:
     """Return moments (T, 3) about `point` (3,) from wrenches (T, 6) about the origin of the same axes (eq. 18)."""
+    wrench, point = check.rows("wrench", wrench, 6), check.vectors("point", point)
     return np.asarray(wrench[:, :3] - cross(np.broadcast_to(point, wrench[:, 3:].shape), wrench[:, 3:]))
 
 
@@ -51,6 +55,8 @@ def inertia(omega: Array, alpha: Array, moment: Array) -> InertiaFit:
     omega, alpha, moment  (T, 3) in the axes of the answer, the moment about the centre of mass
     Raises CannotAnswer where the motion leaves an entry open.
     """
+    omega = check.rows("omega", omega)
+    moment = check.rows("moment", moment, of=("omega", omega))
     stacked = regressor(omega, alpha).reshape(-1, 6)
     size = np.linalg.norm(stacked, axis=0)
     values = np.linalg.svd(stacked / np.where(size == 0, 1.0, size), compute_uv=False)

@@ -14,31 +14,24 @@ from steelyard import check
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.changes.whose_slip import whose_slip
+from steelyard.team.changes.found import whose_slip
 from steelyard.team.clocks.errors import NOTHING, ClockErrors
 from steelyard.team.clocks.jumps import cut_at_jumps
-from steelyard.team.clocks.search import searched
+from steelyard.team.clocks.lags import searched
 from steelyard.team.clocks.unsteady import steadied
 from steelyard.team.estimate import TeamEstimate
-from steelyard.team.hinge.bodies import hinge_findings
+from steelyard.team.hinge.payload import hinge_findings
 from steelyard.team.hinge.rows import COUNT
 from steelyard.team.hinge.team import identify_two_bodies
-from steelyard.team.level import Tilted
-from steelyard.team.misread.exchanged import require_own_files
-from steelyard.team.misread.poses import require_well_read
+from steelyard.team.misread.poses import require_own_files, require_well_read
 from steelyard.team.misread.twists import require_twists_well_read
-from steelyard.team.motion_fit import F, MotionFit, against
+from steelyard.team.motion_fit import F, MotionFit, Tilted
 from steelyard.team.poses.covariance import grasp_covariance
 from steelyard.team.poses.team import PoseTeam
-from steelyard.team.poses.yielding import Yields, stiffened
+from steelyard.team.poses.yielding import stiffened
 from steelyard.team.published import require_wrenches
 from steelyard.team.split import UNPLACED, Split, find_split, rigidity_findings
-from steelyard.team.team_findings import (
-    gains,
-    late_clocks,
-    open_parameters,
-    vertical,
-)
+from steelyard.team.team_findings import gains, late_clocks, open_parameters
 from steelyard.team.twists.team import TwistTeam
 from steelyard.team.twists.turning_gains import TurningGains
 from steelyard.team.weighed import Seen, clocked, weighed
@@ -91,26 +84,31 @@ class JointTeam:
         apart = rigidity_findings(moving.split, log.names, UNPLACED)
         if moving.split is not None and moving.split.sure:
             raise CannotAnswer(" ".join(finding.message for finding in apart))
-        grasps, noise = moving.fit.grasps, moving.fit.noise
         spread = replace(moving.fit.spread, level=moving.level(log.names.index(log.reference)))
-        spread = turning.widened(spread, grasps)
+        spread = turning.widened(spread, moving.fit.grasps)
         found = [*moving.findings, *apart, *differ]
         if tilt is not None:
             found.append(tilt.finding)
             moving = moving if tilt.odd is None else moving.without_level(tilt.odd)
         made, path = moving.rows(self.highest_hz)
-        return Seen(
-            log, grasps, spread, noise, moving.late, begun, moving.fit.left, tuple(found), made, path, 1, moving.down()
-        )
+        return Seen(log, moving, spread, begun, tuple(found), made, path, moving.down())
 
     def _from_poses(self, log: TeamLog) -> Seen | TeamEstimate:
-        """Return what poses show, or the answer itself where the payload is two bodies with a hinge."""
-        log, standing, begun, yields = self._standing(log)
-        grasps, noise = standing.fit.team.grasps, standing.fit.noise
-        spread = yields.widened(grasp_covariance(standing.fit), grasps, log.names.index(log.reference))
+        """Return what poses show, or the answer itself where the payload is two bodies with a hinge.
+
+        Raises BadValue where one robot's poses are misread.
+        """
+        of = partial(PoseTeam.of, other=self.slipped or ())
+        try:
+            log, standing, begun = self._fitted(log, of)
+        except check.FAILURES:
+            require_well_read(log)
+            raise
+        log, standing, yields = stiffened(log, standing, lambda stiff: of(stiff, self.clocks))
+        reference = log.names.index(log.reference)
+        spread = yields.widened(grasp_covariance(standing.fit), standing.fit.grasps, reference)
         spread = replace(spread, level=standing.level(log))
-        late = against(standing.late, log.reference)
-        split = find_split(standing.parts, log.names.index(log.reference)) if standing.rough else None
+        split = find_split(standing.parts, reference) if standing.rough else None
         jointed = None if split is None else self._jointed(log, split, standing.findings, begun)
         if jointed is not None:
             return jointed
@@ -124,25 +122,7 @@ class JointTeam:
             found.append(tilt.finding)
             log = log if tilt.odd is None else log.without_gravity(log.names[tilt.odd])
         made, path = standing.rows(log, self.highest_hz)
-        down = vertical(standing.gravity(log), standing.fit.team.motion)
-        left = standing.fit.left
-        return Seen(
-            log, grasps, spread, noise, late, begun, left, tuple(found), made, path, 2, down, standing.apart, yields
-        )
-
-    def _standing(self, log: TeamLog) -> tuple[TeamLog, PoseTeam, ClockErrors, Yields]:
-        """Return log, fit of poses and clocks like `_fitted`, and how far grasps yield.
-
-        Raises BadValue where one robot's poses are misread.
-        """
-        of = partial(PoseTeam.of, other=self.slipped or ())
-        try:
-            log, team, begun = self._fitted(log, of)
-        except check.FAILURES:
-            require_well_read(log)
-            raise
-        log, team, yields = stiffened(log, team, lambda stiff: of(stiff, self.clocks))
-        return log, team, begun, yields
+        return Seen(log, standing, spread, begun, tuple(found), made, path, standing.down(log), yields)
 
     def _fitted(self, log: TeamLog, of: Callable[[TeamLog, bool], F]) -> tuple[TeamLog, F, ClockErrors]:
         """Return log, fit, and how late clocks are beside what the fit says: begun anew where robots disagree."""

@@ -10,7 +10,7 @@ counts as seen from both of its grasps, so that the answer does not depend on th
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import permutations
 
@@ -21,7 +21,6 @@ from steelyard.spatial import Pose, Rotation
 from steelyard.spatial.screws import exp_pose
 from steelyard.team.adjoint import BRACKETS, adjoint
 from steelyard.team.grasp_kinematics import Pair
-from steelyard.team.grasps import Grasps
 
 _POLISH = 60  # secant steps at most; three robots take some ten until rounding stops them
 _SERIES = 8  # terms of the right Jacobian: corrections are a few degrees at most
@@ -51,11 +50,11 @@ class _Moments:
         )
 
 
-def refine(grasps: Grasps, pairs: Mapping[str, Pair], twists: Array, measured: Mask) -> Grasps:
-    """Return the grasps that fit the twists of all pairs of robots best, starting from those of the star.
+def refine(names: Sequence[str], grasps: Pose, pairs: Mapping[str, Pair], twists: Array, measured: Mask) -> Pose:
+    """Return the grasps (N,) that fit the twists of all pairs of robots best, starting from those of the star.
 
     pairs     of the reference with every other robot, for the weights and the scale of the unknowns
-    twists    (N, T, 6) at the grasps in the order of `grasps.names`; measured (N, T) which rows are true
+    twists    (N, T, 6) at the grasps in the order of `names`; measured (N, T) which rows are true
     """
     from scipy.optimize import minimize
 
@@ -64,21 +63,23 @@ def refine(grasps: Grasps, pairs: Mapping[str, Pair], twists: Array, measured: M
     spread = np.repeat([left[:3].mean(), left[3:].mean()], 3)
     if not (spread > 0).all():
         return grasps  # nothing is left to refine
-    free = [i for i, name in enumerate(grasps.names) if name != grasps.reference]
+    free = [i for i, name in enumerate(names) if name in pairs]
     # The star's own covariance scales the unknowns, its error in the reference's axes carried to the grasp's.
-    scale = np.array([_in_grasp_axes(pairs[grasps.names[i]]) for i in free])
+    found = [pairs[names[i]] for i in free]
+    back = [np.kron(np.eye(2), each.pose.rotation.inverse().matrix) for each in found]
+    scale = np.array([turn @ each.covariance @ turn.T for turn, each in zip(back, found, strict=True)])
     factor = np.linalg.cholesky(scale)
 
     def cost(s: Array) -> tuple[float, Array]:
         xi = np.einsum("nab,nb->na", factor, s.reshape(-1, 6))
-        value, slope = _pair_cost(_moved(grasps.poses, free, xi), moments, 1 / spread)
+        value, slope = _pair_cost(_moved(grasps, free, xi), moments, 1 / spread)
         inner = np.einsum("nba,nb->na", _right_jacobian(xi), slope[free])
         return value, np.einsum("nab,na->nb", factor, inner).ravel()
 
-    found = minimize(cost, np.zeros(6 * len(free)), jac=True, method="BFGS", options={"gtol": 1e-6})
-    best = _polished(lambda s: cost(s)[1], found.x, found.hess_inv)
-    xi = np.einsum("nab,nb->na", factor, best.reshape(-1, 6))
-    return Grasps(grasps.names, _moved(grasps.poses, free, xi), grasps.reference)
+    best = minimize(cost, np.zeros(6 * len(free)), jac=True, method="BFGS", options={"gtol": 1e-6})
+    at = _polished(lambda s: cost(s)[1], best.x, best.hess_inv)
+    xi = np.einsum("nab,nb->na", factor, at.reshape(-1, 6))
+    return _moved(grasps, free, xi)
 
 
 def _polished(slope: Callable[[Array], Array], s: Array, inverse: Array) -> Array:
@@ -135,10 +136,3 @@ def _right_jacobian(xi: Array) -> Array:
         term = term @ ad / (k + 1)
         total += term
     return total
-
-
-def _in_grasp_axes(found: Pair) -> Array:
-    """Return the pair's covariance (6, 6) as that of a body screw of the second grasp."""
-    back = found.pose.rotation.inverse().matrix
-    turn = np.block([[back, np.zeros((3, 3))], [np.zeros((3, 3)), back]])
-    return np.asarray(turn @ found.covariance @ turn.T)

@@ -1,14 +1,14 @@
-"""Wrenches of a robot that nobody measured: beyond the end of its sensor's range, or repeated by its driver.
+"""Wrenches of a robot that nobody measured: beyond the end of its sensor's range, repeated by its driver, or stuck.
 
 The sum over all robots is wrong by what it then pushed. Numbers are judged as they came, by exact repeats: of the
 extreme value of an axis over all recordings, or of whole rows one after the other, which those that a sensor measures
-are not, but for coarse ones at rest.
+are not, but for coarse ones at rest. A force that is the same throughout is named; nothing else can be done about it.
 Source: own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -33,6 +33,8 @@ WRENCH = ("force", "torque")
 # A force is frozen that holds still for so many rows and so long [s], where others repeat the row before in no more
 # than this share.
 ROWS, SECONDS, BESIDE = 25, 0.25, 0.05
+FEWEST = 50  # rows in which noise shows
+VALUES = 10  # different numbers that noise has at the least
 
 
 def without_frozen(log: TeamLog) -> tuple[TeamLog, tuple[Finding, ...]]:
@@ -94,18 +96,15 @@ def _clipped(name: str, tracks: Sequence[Track]) -> tuple[list[Finding], dict[in
         values = np.concatenate([t.channels[quantity][mask] for t, mask in zip(tracks, measured, strict=True)])
         # An axis that is mostly cut off carries no noise itself.
         for axis in range(3) if (noise_shares(values) > NOISE_SHARE).any() else ():
-            for extreme in _ends(values[:, axis]):
-                rows = clipped_rows(values[:, axis], extreme, begins[:-1])
-                if rows.any():
+            column = values[:, axis]
+            for extreme in (float(column.min()), float(column.max())):
+                rows = clipped_rows(column, extreme, begins[:-1])
+                # Of a robot that pushes nothing at all nothing is no limit.
+                if extreme and rows.any():
                     said.append((quantity, axis, extreme, int(rows.sum())))
                     gone |= rows
     found = [saturated(name, *each, len(gone), _done(gone)) for each in said]
     return found, {} if gone.mean() > MOST_LEFT_OUT else _by_track(gone, measured, begins)
-
-
-def _ends(column: Array) -> tuple[float, ...]:
-    """Return the extreme values of a channel; that of a robot which pushes nothing at all is no limit."""
-    return tuple(float(end) for end in (column.min(), column.max()) if end != 0)
 
 
 def _by_track(gone: Mask, measured: Sequence[Mask], begins: Integers) -> dict[int, Mask]:
@@ -135,3 +134,75 @@ def _without(log: TeamLog, lost: Sequence[Mapping[str, Mask]]) -> TeamLog:
 def _without_wrench(track: Track, rows: Mask) -> Track:
     valid = {q: mask & ~rows if q in WRENCH else mask for q, mask in track.valid.items()}
     return replace(track, valid=valid)
+
+
+def stuck_forces(log: TeamLog) -> Iterator[Finding]:
+    """Yield a finding for every robot whose force is the same in all rows: the sum of forces is wrong by it.
+
+    Each recording in motion is judged by itself, all poses at rest together.
+    """
+    places: dict[str, dict[str, list[tuple[str, int]]]] = {name: {} for name in log.names}
+    for recording in log.recordings:
+        if recording.kind != "still":
+            for name, track in recording.tracks.items():
+                force = _carried([track])
+                _noted(places[name], _same(force), f"'{recording.name}'", len(force))
+    resting = [recording for recording in log.recordings if recording.kind == "still"]
+    where = " and ".join(f"'{r.name}'" for r in resting) if len(resting) < 3 else f"all {len(resting)} poses at rest"
+    forces = {name: _carried([r.tracks[name] for r in resting if name in r.tracks]) for name in log.names}
+    for name, axes in _stuck_at_rest(forces).items():
+        _noted(places[name], axes, where, len(forces[name]))
+    for name, found in places.items():
+        for axis, seen in found.items():
+            yield _stuck(name, axis, seen)
+
+
+def _stuck_at_rest(forces: Mapping[str, Array]) -> dict[str, Mask]:
+    """Return which axes (3,) of each robot's force (T, 3) stand still in all poses at rest.
+
+    Coarse or exact numbers may well do so: the robot's other axes, or the others' where all its own stand still, must
+    show noise. A force of nothing at all does not carry.
+    """
+    out = {name: _same(force) for name, force in forces.items()}
+    for name, still in out.items():
+        if still.any() and forces[name].any():
+            beside = forces.values() if still.all() else [forces[name]]
+            still &= any(len(np.unique(axis)) > VALUES for force in beside for axis in force.T)
+    return out
+
+
+def _same(force: Array) -> Mask:
+    """Return which axes (3,) of a force (T, 3) are the same in all of enough rows; the first rows mostly decide."""
+    if len(force) < FEWEST or (force[:FEWEST] != force[0]).any(0).all():
+        return np.zeros(3, np.bool_)
+    return np.asarray((force == force[0]).all(0))
+
+
+def _carried(tracks: Sequence[Track]) -> Array:
+    """Return the forces (T, 3) of the rows in which a robot may carry."""
+    rows = [np.zeros((0, 3))]
+    for track in tracks:
+        if track.has("force"):
+            valid = track.valid["force"] if track.carrying is None else track.valid["force"] & track.carrying
+            rows.append(track.channels["force"] if valid.all() else track.channels["force"][valid])
+    return rows[1] if len(rows) == 2 else np.concatenate(rows)
+
+
+def _noted(places: dict[str, list[tuple[str, int]]], axes: Mask, where: str, rows: int) -> None:
+    if axes.any():
+        found = ", ".join(axis for axis, still in zip("xyz", axes, strict=True) if still)
+        places.setdefault(found, []).append((where, rows))
+
+
+def _stuck(name: str, axes: str, places: Sequence[tuple[str, int]]) -> Finding:
+    """Return channel-stuck for axes of a robot's force in places, each with its number of rows."""
+    rows = sum(count for _, count in places)
+    text = (
+        f"Force {axes} of '{name}' is the same in all {rows} rows of {' and '.join(where for where, _ in places)}. "
+        "If the robot did carry, mass, centre of mass and inertia are wrong by what it carried."
+    )
+    remedy = (
+        f"Check the cable and the driver of the force sensor of '{name}', and record again. Say away = true in the "
+        "recordings in which it held nothing."
+    )
+    return Finding("channel-stuck", text, remedy)

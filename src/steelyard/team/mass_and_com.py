@@ -9,6 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.spatial import cross_matrix
@@ -43,6 +44,8 @@ def mass(gravity: Array, force: Array) -> tuple[float, float]:
 
     gravity  [m/s^2] and force [N], the sum over the team, both in R's axes
     """
+    gravity = check.rows("gravity", gravity)
+    force = check.rows("force", force, of=("gravity", gravity))
     size = np.linalg.norm(gravity, axis=1)
     lifted = -(gravity * force).sum(1) / size
     found = float((lifted * size).sum() / (size**2).sum())
@@ -66,6 +69,8 @@ def com(gravity: Array, moment: Array, mass_kg: float) -> tuple[Array, Array]:
     moment  about R's origin [N m], the sum over the team; at rest it is -m c x g, that is m [g]x c
     Raises CannotAnswer where gravity has one direction only: the height along it stays open.
     """
+    gravity = check.rows("gravity", gravity)
+    moment = check.rows("moment", moment, of=("gravity", gravity))
     stacked = mass_kg * cross_matrix(gravity)
     normal = np.einsum("kij,kil->jl", stacked, stacked)
     values, axes = np.linalg.eigh(normal)
@@ -90,6 +95,10 @@ def mass_and_com(gravity: Array, wrench: Array) -> MassAndCom:
     wrench   (K, 6) [N m, N] sum over the team, about R's origin in R's axes
     Raises CannotAnswer where the mass comes out negative (a sign is wrong) or gravity has one direction only.
     """
+    gravity = check.rows("gravity", gravity)
+    wrench = check.rows("wrench", wrench, 6, of=("gravity", gravity))
+    if not len(gravity):
+        raise CannotAnswer("mass and centre of mass need rows at rest; there are none. Record still poses.")
     found, mass_std = mass(gravity, wrench[:, 3:])
     require_lift(found, "the still forces")
     place, covariance = com(gravity, wrench[:, :3], found)

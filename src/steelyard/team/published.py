@@ -17,6 +17,7 @@ from steelyard.evidence import Evidence
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.forms import people_jacobian
+from steelyard.logs.clock import median_step
 from steelyard.logs.stillness import MOVING, TURNING
 from steelyard.logs.team_conditioning import all_conditioned
 from steelyard.logs.team_log import TeamLog
@@ -24,8 +25,7 @@ from steelyard.logs.team_rows import TeamRows
 from steelyard.spatial import Pose
 from steelyard.team import grasp_kinematics
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
-from steelyard.team.grasp_kinematics import Pair
-from steelyard.team.grasps import Grasps
+from steelyard.team.grasp_kinematics import Pair, total_wrench
 from steelyard.team.inertia_matrix import InertiaFit, Negative, inertia, made_positive, moment_about
 from steelyard.team.loop_closure import refine
 from steelyard.team.mass_and_com import MassAndCom, mass_and_com
@@ -68,7 +68,7 @@ class PublishedTeam:
         notes = (f"{below} negative principal moment(s) were set to zero.",) if below else ()
         return _assembled(log, grasps, pairs, rest, replace(turning, matrix=matrix), notes)
 
-    def grasps(self, log: TeamLog) -> tuple[Grasps, dict[str, Pair]]:
+    def grasps(self, log: TeamLog) -> tuple[Pose, dict[str, Pair]]:
         """Return the grasps in the reference grasp, and the star of pairs that they started from (eq. 1-8)."""
         moving = all_conditioned(log, log.of_kind("grasp"), self.cutoff_hz)
         if not moving:
@@ -76,12 +76,12 @@ class PublishedTeam:
         twists = np.concatenate([rows.twist for rows in moving], axis=1)
         measured = np.concatenate([rows.has_twist for rows in moving], axis=1)
         pairs = grasp_kinematics.star(log.names, twists, measured, log.reference)
-        found = Grasps.of({n: pairs[n].pose if n in pairs else Pose.identity() for n in log.names}, log.reference)
+        found = grasp_kinematics.from_star(log.names, pairs)
         if self.close_loops and len(log.names) > 2:
-            found = refine(found, pairs, twists, measured)
+            found = refine(log.names, found, pairs, twists, measured)
         return found, pairs
 
-    def mass_and_com(self, log: TeamLog, grasps: Grasps) -> MassAndCom:
+    def mass_and_com(self, log: TeamLog, grasps: Pose) -> MassAndCom:
         """Return mass and centre of mass in the reference grasp from still rows (eq. 9-16)."""
         if len(log.names) == 2 and all(log.force_only(name) for name in log.names):
             raise CannotAnswer(
@@ -92,24 +92,29 @@ class PublishedTeam:
         still = tuple(r for r in log.recordings if r.kind == "still")
         # Still rows are averaged, which no filter improves on: near its ends it would weigh single samples heavily.
         resting = all_conditioned(log, still or log.of_kind("motion"), None if still else self.cutoff_hz)
-        chosen = [_full_rows(log, rows, _at_rest(rows, bool(still))) for rows in resting]
-        gravity = np.concatenate(
-            [_gravity(log, grasps, rows)[keep] for rows, keep in zip(resting, chosen, strict=True)]
-        )
-        wrench = [grasps.total_wrench(rows.carried_wrench)[keep] for rows, keep in zip(resting, chosen, strict=True)]
-        if not len(gravity):
+        level = [_level(log, rows) for rows in resting]
+        chosen = [
+            _at_rest(rows, bool(still)) & rows.complete_wrench() & rows.has_gravity[teller]
+            for rows, teller in zip(resting, level, strict=True)
+        ]
+        told = zip(resting, level, chosen, strict=True)
+        gravity = [grasps[i].rotation.apply(rows.gravity[i])[keep] for rows, i, keep in told]
+        wrench = [total_wrench(grasps, rows.carried_wrench)[keep] for rows, keep in zip(resting, chosen, strict=True)]
+        if not any(map(len, gravity)):
             raise CannotAnswer(
                 "mass and centre of mass need rows at rest in which every carrying robot has a wrench; there are none. "
                 "Record still poses, at least two, tilted against each other."
             )
-        return mass_and_com(gravity, np.concatenate(wrench))
+        return mass_and_com(np.concatenate(gravity), np.concatenate(wrench))
 
-    def inertia(self, log: TeamLog, grasps: Grasps, com: Array) -> InertiaFit:
+    def inertia(self, log: TeamLog, grasps: Pose, com: Array) -> InertiaFit:
         """Return the inertia about `com` (3,) [m] in R's axes (eq. 17-32); negative eigenvalues stay.
 
-        Rates and angular accelerations are the reference robot's alone.
+        Rates and angular accelerations are the reference robot's alone. The covariance counts as many rows as the
+        low-pass leaves free.
         """
         omega, alpha, moment = [], [], []
+        alike = 1.0
         for rows in all_conditioned(log, log.of_kind("motion"), self.cutoff_hz):
             if self.trim_s:
                 rows = rows.trimmed(self.trim_s)
@@ -117,10 +122,18 @@ class PublishedTeam:
             keep = rows.has_rate[hub] & rows.complete_wrench()
             omega.append(rows.twist[hub, keep, :3])
             alpha.append(rows.twist_rate[hub, keep, :3])
-            moment.append(moment_about(grasps.total_wrench(rows.carried_wrench)[keep], com))
+            moment.append(moment_about(total_wrench(grasps, rows.carried_wrench)[keep], com))
+            alike = max(alike, self._alike(rows))
         if not omega:
             raise CannotAnswer("the inertia needs a recording in motion; there is none.")
-        return inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
+        fit = inertia(*(np.concatenate(part) for part in (omega, alpha, moment)))
+        return replace(fit, covariance=alike * fit.covariance)
+
+    def _alike(self, rows: TeamRows) -> float:
+        """Return how many rows the low-pass leaves for one that tells something new: two in a period of its cut-off."""
+        if self.cutoff_hz is None or len(rows.time) < 2:
+            return 1.0
+        return max(1.0, 1 / (2 * self.cutoff_hz * median_step(rows.time)))
 
 
 def require_wrenches(log: TeamLog) -> None:
@@ -146,12 +159,6 @@ def _at_rest(rows: TeamRows, declared: bool) -> Mask:
     return np.asarray(~(quick & rows.has_twist).any(0) & rows.has_twist.any(0))
 
 
-def _full_rows(log: TeamLog, rows: TeamRows, wanted: Mask) -> Mask:
-    """Return the wanted rows with every wrench and with gravity known to the reference, or to somebody."""
-    known = rows.has_gravity[_level(log, rows)]
-    return np.asarray(wanted & rows.complete_wrench() & known)
-
-
 def _level(log: TeamLog, rows: TeamRows) -> int:
     """Return the robot that tells gravity: the reference, or the first other one that can."""
     order: Sequence[str] = (log.reference, *log.others)
@@ -164,15 +171,9 @@ def _level(log: TeamLog, rows: TeamRows) -> int:
     )
 
 
-def _gravity(log: TeamLog, grasps: Grasps, rows: TeamRows) -> Array:
-    """Return gravity (T, 3) [m/s^2] in R's axes."""
-    teller = _level(log, rows)
-    return grasps.poses[teller].rotation.apply(rows.gravity[teller])
-
-
 def _assembled(
     log: TeamLog,
-    grasps: Grasps,
+    grasps: Pose,
     pairs: dict[str, Pair],
     rest: MassAndCom,
     turning: InertiaFit | None = None,
@@ -182,7 +183,7 @@ def _assembled(
     """Return the answer of the steps; without `turning` the inertia stays open."""
     known = turning is not None
     # Nothing of the payload is much farther from its centre of mass than the grasps are from each other.
-    reach = float(np.linalg.norm(grasps.poses.position, axis=1).max())
+    reach = float(np.linalg.norm(grasps.position, axis=1).max())
     people = np.zeros((10, 10))
     people[0, 0] = rest.mass_std**2
     people[1:4, 1:4] = rest.com_covariance
@@ -208,7 +209,7 @@ def _assembled(
         notes=(FORMAL, *notes),
         reference=log.reference,
         grasps={
-            name: GraspEstimate(grasps[name], pairs[name].covariance if name in pairs else np.zeros((6, 6)))
-            for name in log.names
+            name: GraspEstimate(grasps[i], pairs[name].covariance if name in pairs else np.zeros((6, 6)))
+            for i, name in enumerate(log.names)
         },
     )

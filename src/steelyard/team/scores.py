@@ -13,8 +13,7 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers
+from steelyard.check import Array, Integers
 
 # Directions of scaled parameters with less than this share of the information are open: they stay at zero.
 OPEN = 1e-9

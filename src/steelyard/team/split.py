@@ -13,10 +13,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.logs.conditioning import lowpass
-from steelyard.logs.log import Integers, Mask
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint, exp
 from steelyard.team.stacked import Stretch

@@ -9,16 +9,15 @@ from weakref import WeakKeyDictionary
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.logs.clock import median_step
 from steelyard.logs.curve import Curve
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_rows import channel_at, common_time, mean_rotation, near_samples, within
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import turned_by, turns_between
 from steelyard.team.clocks.errors import PUNCTUAL, ClockError, Errors, punctual
-from steelyard.team.turns import turned_by, turns_between
 
 # Rows, and seconds, that a gap may last and still be filled: far below what the payload can do in that time. A curve
 # through 1 Hz is off by 3e-5 of it over as long, through 3 Hz by 0.2 %.

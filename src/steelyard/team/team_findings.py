@@ -6,10 +6,9 @@ from collections.abc import Iterator, Mapping, Sequence
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding, with_bar
-from steelyard.logs.log import Mask
-from steelyard.spatial import Pose, unit_vectors
+from steelyard.spatial import unit_vectors
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
 
 # A clock is called late from so much [s] and so many standard deviations.
@@ -38,7 +37,7 @@ def lost_directions(
 ) -> Iterator[Finding]:
     """Yield grasp-direction-lost for every grasp and direction in words.
 
-    down  (3,) gravity in R, where known     apart  (2,) as in `Seen`
+    down  (3,) gravity in R, where known     apart  (2,) as of `MotionFit`
     """
     for name, grasp in grasps.items():
         if not len(grasp.lost):
@@ -154,14 +153,6 @@ def _weighed(identified: Mask) -> str:
         open_axes = [axis for axis, known in zip(AXES, identified[1:4], strict=True) if not known]
         return f", and the centre of mass is not known along {_listed(open_axes).lower()}"
     return ""
-
-
-def vertical(gravity: Array | None, poses: Pose | None) -> Array | None:
-    """Return the mean direction of gravity in R from its direction in H and the payload's path X_HR (T,)."""
-    if gravity is None or poses is None:
-        return None
-    mean = poses.rotation.inverse().apply(gravity).mean(0)
-    return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
 
 
 def unseen_gains(team: TeamEstimate, share: float) -> tuple[str, ...]:

@@ -15,7 +15,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.misread.forces import likely_factor
-from steelyard.team.misread.torques import torque_factor
+from steelyard.team.misread.signs import torque_factor
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.model import Group, weight
 
@@ -109,17 +109,14 @@ def _moments(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Findin
     if factor is not None:
         who = f"'{names[factor[0]]}'"
         why = f"They fall where the torques of {who} are taken {factor[1]:.2g} times. "
+    share = f"{rms / lever:.0f} times" if rms > 10 * lever else f"{100 * rms / lever:.0f} % of"
     text = (
         f"What the robots push {_when(group)} leaves moments of {rms:.2g} N m rms that no rigid payload explains, "
-        f"{_part(rms / lever)} its weight at {size:.2g} m, and too slow for noise of the sensors. {why}"
+        f"{share} its weight at {size:.2g} m, and too slow for noise of the sensors. {why}"
         "Centre of mass and inertia are not to be trusted."
     )
     remedy = f"Check unit, order and signs of the torque columns of {who}, and where its sensor sits beside its grasp."
     yield Finding("wrench-unexplained", text, remedy)
-
-
-def _part(share: float) -> str:
-    return f"{share:.0f} times" if share > 10 else f"{100 * share:.0f} % of"
 
 
 def _when(group: Group) -> str:

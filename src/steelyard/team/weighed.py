@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -12,29 +12,23 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
-from steelyard.spatial import Pose
-from steelyard.team.assembled import assembled, team_size
-from steelyard.team.changes.odd_recording import without_odd
-from steelyard.team.changes.propped import MISSING, maybe_propped
-from steelyard.team.changes.touched import Touched, together, without_touched
+from steelyard.team.assembled import assembled, consistent, team_size
+from steelyard.team.changes.contact import unpropped, untouched, without_odd
 from steelyard.team.clocks.errors import ClockErrors, Errors
-from steelyard.team.consistent import consistent
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
+from steelyard.team.misread.files import require_metres
 from steelyard.team.misread.forces import with_one_reading
-from steelyard.team.misread.length_units import require_metres
-from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign
-from steelyard.team.misread.taken import maps_of
-from steelyard.team.misread.torques import with_torque_sign
-from steelyard.team.payload.balance import require_balance
-from steelyard.team.payload.body_rows import BodyRows, balance_frame, require_runs, summing
+from steelyard.team.misread.readings import maps_of
+from steelyard.team.misread.signs import sign_finding, torque_sign_finding, with_one_sign, with_torque_sign
+from steelyard.team.motion_fit import MotionFit, against
+from steelyard.team.payload.body_rows import PayloadRows, balance_frame, require_balance, require_runs, summing
 from steelyard.team.payload.doubt import weight_by_gains
 from steelyard.team.payload.fit import PayloadFit, Weighing, fit_payload
 from steelyard.team.payload.home_bias import with_home_bias
 from steelyard.team.payload.late_forces import with_timely_forces
-from steelyard.team.payload.model import Group, unit_bias, units_of_body, weight
-from steelyard.team.payload.motion_noise import motion_noise
-from steelyard.team.payload.spectra import band_edges, gathered
+from steelyard.team.payload.model import Group, unit_bias, units_of_body
+from steelyard.team.payload.spectra import band_edges, gathered, motion_noise
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.yielding import Yields
 from steelyard.team.team_findings import (
@@ -59,8 +53,6 @@ COMPARABLE = 0.1
 UNWEIGHED = 0.5
 # A mass below zero by fewer standard deviations is open; by more, a sign is wrong.
 OPEN_SIGN = 3.0
-# Times that rows in which something touched the payload are looked for, each in what the last fit leaves.
-TOUCHES = 3
 # Findings that say already why forces do not fit.
 TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
 
@@ -69,30 +61,22 @@ TOLD = {"wrench-unexplained", "force-unit", "payload-not-rigid"}
 class Seen:
     """What the motion of a team shows, before anything is weighed.
 
-    log           with clocks put right
-    grasps        (N,) in R, known to within `spread`     noise  (N, 2) of each robot
-    late          how late each clock is [s], beside what `begun` says of single recordings
-    left          last step of the fit [standard deviations]
-    rows          of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
-    order         how often the motion that they come from is differentiated: twice for poses, once for twists
-    down          (3,) gravity in R, None where nobody tells it
-    apart         (2,) [rad, m] by how much robots disagree, where that may hide what the payload turned
-    yields        how far grasps yield, by what they push; None where that was not asked
+    log       with clocks put right
+    motion    the joint fit     spread  to within which its grasps are known
+    begun     how late clocks are in single recordings, beside what the fit says
+    rows      of every recording, beside residuals (T, N, 6)     path  (6, 6) their covariance
+    down      (3,) gravity in R, None where nobody tells it
+    yields    how far grasps yield, by what they push; None where that was not asked
     """
 
     log: TeamLog
-    grasps: Pose
+    motion: MotionFit
     spread: Spread
-    noise: Array
-    late: Mapping[str, float]
     begun: ClockErrors
-    left: float
     findings: tuple[Finding, ...]
-    rows: list[tuple[BodyRows, Array]]
+    rows: PayloadRows
     path: Array
-    order: int
     down: Array | None
-    apart: Array | None = None
     yields: Yields | None = None
 
 
@@ -101,7 +85,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     wrists, highest_hz, and with_gain for `gains`: as of `JointTeam`
     """
-    log, grasps, spread = seen.log, seen.grasps, seen.spread
+    log, motion, grasps, spread = seen.log, seen.motion, seen.motion.fit.grasps, seen.spread
     require_metres(log.names, grasps)
     placed = balance_frame(grasps).inverse() @ grasps
     require_balance(log, [body for body, _ in seen.rows], placed)
@@ -109,17 +93,17 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
     known = spread.turn(size) < COMPARABLE
     six_axis = np.array([not log.force_only(name) for name in log.names])
 
-    def fitted(rows: list[tuple[BodyRows, Array]]) -> Weighing:
-        groups = _groups(rows, seen.path, highest_hz, seen.order)
+    def fitted(rows: PayloadRows) -> Weighing:
+        groups = _groups(rows, seen.path, highest_hz, motion.ORDER)
         groups = tuple(replace(group, sighted=known) for group in groups)
         groups, D, read, taken = _with_forces_read(groups, summing(placed), log.names, known)
         C = unit_bias(D, six_axis, size)
         given = _summing_given(summing(placed), log.names, taken)
         return Weighing(groups, D, given, C, tuple(read), taken, fit_payload(groups, D, C, size, with_gain))
 
-    unpropped, propped = _unpropped(seen.rows, fitted, summing(placed), highest_hz)
-    rows, begun, late = with_timely_forces(unpropped, fitted(unpropped), fitted, highest_hz)
-    first, touched = _untouched(rows, begun, fitted, size, highest_hz)
+    standing, propped = unpropped(seen.rows, fitted, summing(placed), highest_hz)
+    rows, begun, late = with_timely_forces(standing, fitted(standing), fitted, highest_hz)
+    first, touched = untouched(rows, begun, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
@@ -138,83 +122,29 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         borne = np.linalg.solve(summing(placed).reshape(6, -1, 6).swapaxes(0, 1), payload.biases.T)
         each = np.asarray(borne, np.float64)
         spread = seen.yields.biased(spread, grasps, log.names.index(log.reference), each.transpose(2, 0, 1))
-    team = _without_wrists(assembled(log, grasps, spread, payload, D, seen.late), wrists, size)
+    team = _without_wrists(
+        assembled(log, grasps, spread, payload, D, against(motion.late, log.reference)), wrists, size
+    )
     team = clocked(team, seen.begun.first(log))
     # Who errs, when, and what was read wrongly comes before what is seen of grasps, and that before what does not fit.
     found = (
-        *bad_robots(log.names, seen.noise),
+        *bad_robots(log.names, motion.fit.noise),
         *seen.begun.findings(log),
         *late_clocks(team.clock_offsets_s, team.clock_offset_std_s),
         *read,
         *(() if late is None else late.findings(log.names)),
         *seen.findings,
         *propped,
-        *(one.finding() for one in touched),
+        *touched,
         *odd,
         *(gains(payload.gain, payload.gainless) if known else ()),
         *wrong,
-        *lost_directions(team.grasps, seen.down, seen.apart),
+        *lost_directions(team.grasps, seen.down, motion.apart),
         *open_parameters(team.identified, team.evidence.rank),
     )
-    said = (*unsettled(seen.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
-    said = said if seen.order == 1 else (*said, *uncalibrated(seen.spread.recurring))
+    said = (*unsettled(motion.fit.left), *biased_at_home(home_bias), *unseen_gains(team, weight_by_gains(groups, D)))
+    said = said if motion.ORDER == 1 else (*said, *uncalibrated(seen.spread.recurring))
     return replace(team, findings=found, notes=(*team.notes, *said), wrench_maps=first.taken)
-
-
-def _unpropped(
-    rows: list[tuple[BodyRows, Array]],
-    fitted: Callable[[list[tuple[BodyRows, Array]]], Weighing],
-    D: Array,
-    highest_hz: float,
-) -> tuple[list[tuple[BodyRows, Array]], tuple[Finding, ...]]:
-    """Return the rows without those in which something else bears the payload, and what is said of them."""
-    asked = maybe_propped([body for body, _ in rows], D)
-    if not asked:
-        return rows, ()
-    kept = list(rows)
-    for one in asked:
-        kept[one.number] = (rows[one.number][0].without(one.rows, highest_hz), rows[one.number][1])
-    try:
-        fit = fitted(kept)
-    except CannotAnswer:
-        return rows, ()
-    out, found = list(rows), list[Finding]()
-    for one in asked:
-        body = rows[one.number][0]
-        missing = one.missing(body, fit.payload.parameters, fit.D)
-        if missing > MISSING * weight(fit.payload.parameters):
-            out[one.number] = kept[one.number]
-            found.append(one.finding(body, missing))
-    return out, tuple(found)
-
-
-def _untouched(
-    rows: list[tuple[BodyRows, Array]],
-    fit: Weighing,
-    fitted: Callable[[list[tuple[BodyRows, Array]]], Weighing],
-    size: float,
-    highest_hz: float,
-) -> tuple[Weighing, tuple[Touched, ...]]:
-    """Return the fit of rows without those in which something touched the payload, and what was found of that.
-
-    Touches that bend the first fit are seen better by the next. Where forces are misread nothing is asked, and nothing
-    is left out that the parameters hang on.
-    """
-    touched = list[Touched]()
-    for _ in range(TOUCHES):
-        if fit.read:
-            break
-        rows, found = without_touched(rows, fit.payload.parameters, fit.D, size, highest_hz)
-        if not found:
-            break
-        try:
-            fewer = fitted(rows)
-        except CannotAnswer:
-            break
-        if fewer.payload.lost.shape[1] > fit.payload.lost.shape[1]:
-            break
-        fit, touched = fewer, [*touched, *found]
-    return fit, together(touched)
 
 
 def _with_forces_read(
@@ -292,7 +222,7 @@ def clocked(team: TeamEstimate, first: Errors) -> TeamEstimate:
     return replace(team, clock_offsets_s=late, clock_offset_std_s=std)
 
 
-def _groups(made: list[tuple[BodyRows, Array]], noise: Array, highest_hz: float, order: int) -> tuple[Group, ...]:
+def _groups(made: PayloadRows, noise: Array, highest_hz: float, order: int) -> tuple[Group, ...]:
     """Return the recordings with complete wrenches in two groups, at rest and in motion; order 2: poses, 1: twists."""
     out = []
     for still in (True, False):

@@ -27,8 +27,7 @@ from steelyard.team.payload.body_rows import balance_frame, summing
 from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.poses.fit import information
 from steelyard.team.poses.measured import TeamMotion
-from steelyard.team.poses.solver import Solver
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.solver import OWN, Solver
 from steelyard.team.poses.team import PoseTeam
 
 FIRST_SEED = 9000
@@ -55,7 +54,7 @@ def bound(noise: TeamNoise, exact: TeamTrial) -> dict[str, Array]:
 
 
 def _payload(noise: TeamNoise, exact: TeamTrial, standing: PoseTeam) -> Array:
-    grasps = standing.fit.team.grasps
+    grasps = standing.fit.grasps
     frame = balance_frame(grasps)
     D = summing(frame.inverse() @ grasps)
     forces = D[:, of_force(D.shape[1])]

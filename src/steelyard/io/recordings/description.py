@@ -1,20 +1,25 @@
-"""The log description (TOML) as checked values; no data file is opened here."""
+"""The log description (TOML) as checked values; no data file is opened here.
+
+Where the object sits in the sensor, the one entry that shapes need, may also be given on its own.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.errors import BadDescription
+from steelyard.errors import BadDescription, BadInput
+from steelyard.io.contents import load_toml, parse_toml
 from steelyard.io.entries import Entry, each, gathered
 from steelyard.io.example import EXAMPLE
-from steelyard.io.object_pose import ObjectPose, parse_object_pose
-from steelyard.io.streams.entries import StreamSpec, parse_stream
+from steelyard.io.streams.entries import StreamSpec, parse_pose, parse_stream
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, STANDARD_GRAVITY
+from steelyard.spatial import Pose
 
 # [m/s^2] gravity on anything with robots; and noise of no sensor, in SI.
 _WEAKEST, _STRONGEST = 0.1, 100.0
@@ -27,6 +32,10 @@ _SECTIONS = ("log", "noise", "object", "stream", "robot")
 # Gravity that nobody states, and how well it is known.
 ASSUMED = f"{STANDARD_GRAVITY} ± {STANDARD_GRAVITY * ASSUMED_GRAVITY_STD:.3f} m/s²"
 LEVEL_BASE = f"[log] gives no gravity: {ASSUMED} along -z of W, a level base, was assumed"
+
+_EXAMPLE = '{ position = [0, 0, 0.12], unit = "m", rotation = [1,0,0, 0,1,0, 0,0,1], form = "matrix" }'
+
+_STD = ("std_mm", "std_deg")
 
 
 def default_gravity() -> Array:
@@ -113,12 +122,9 @@ def parse_gravity(entry: Entry) -> Array:
     if not gravity.any():
         raise entry.error('"gravity" must not be zero; on a level base it is [0, 0, -9.81].')
     if not _WEAKEST <= np.abs(gravity).max() <= _STRONGEST:
-        raise entry.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got {_short(gravity)}.')
+        shown = ", ".join(f"{v:g}" for v in gravity)
+        raise entry.error(f'"gravity" must be in m/s^2, [0, 0, -9.81] on a level base; got [{shown}].')
     return gravity
-
-
-def _short(values: Array) -> str:
-    return f"[{', '.join(f'{v:g}' for v in values)}]"
 
 
 def parse_noise(entry: Entry) -> dict[str, float]:
@@ -154,3 +160,63 @@ def _require_arm_for_joints(streams: Sequence[StreamSpec], arm: ArmSpec | None) 
             )
         if twice := [name for other in streams for name in ("rotation", "position") if name in other.names]:
             raise BadDescription(f'{spec.where}: "joint_position" tells the {twice[0]}, too. Give one of them.')
+
+
+@dataclass(frozen=True, eq=False)
+class ObjectPose:
+    """Pose of the scan's frame O in the sensor frame S, and its spread.
+
+    pose  X_SO
+    std   (position [m], rotation [rad]), None where nothing says
+    """
+
+    pose: Pose
+    std: tuple[float, float] | None = None
+
+
+def parse_object_pose(entry: Entry) -> ObjectPose | None:
+    """Return what `pose_in_sensor` of an [object] section says, None where it is not there; raises BadDescription."""
+    entry.only("pose_in_sensor")
+    if "pose_in_sensor" not in entry:
+        return None
+    table = entry.table("pose_in_sensor")
+    rotation, position = parse_pose(table, *_STD)
+    if rotation is None or position is None:
+        raise table.error('give both "rotation" and "position".')
+    return ObjectPose(Pose(rotation, position), _std(table))
+
+
+def _std(table: Entry) -> tuple[float, float] | None:
+    """Return the standard deviations [m], [rad], both zero where the pose is exact; None where nothing says."""
+    given = [key for key in _STD if key in table]
+    if not given:
+        return None
+    for key in _STD:
+        if key not in table:
+            raise table.error(
+                f'"{key}" is missing beside "{given[0]}". Give both, 0 where the pose is exact, or neither.'
+            )
+    mm, deg = (table.spread(key) for key in _STD)
+    return mm * 1e-3, float(np.radians(deg))
+
+
+def read_object_pose(text: str) -> ObjectPose:
+    """Return the pose that `text` gives: a TOML file with an [object] section, or the inline table itself.
+
+    Raises BadDescription.
+    """
+    written = text.strip()
+    try:
+        if not written.startswith("{"):
+            top = load_toml(Path(written))
+        else:
+            top = {"object": parse_toml(f"pose_in_sensor = {written}", "the table given")}
+    except BadInput as error:
+        raise BadDescription(f"pose in sensor: {error} Give a TOML file with [object], or {_EXAMPLE}") from None
+    section = top.get("object", {})
+    found = parse_object_pose(Entry(section if isinstance(section, dict) else {}, "pose in sensor, [object]"))
+    if found is None:
+        raise BadDescription(
+            f"pose in sensor: {text} has no [object] pose_in_sensor. Write pose_in_sensor = {_EXAMPLE}"
+        )
+    return found

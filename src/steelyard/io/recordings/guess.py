@@ -17,24 +17,15 @@ from steelyard.io.entries import listed
 from steelyard.io.recordings.counted import counted, part_names
 from steelyard.io.recordings.description import ASSUMED, Description, default_gravity
 from steelyard.io.recordings.not_told import cannot_tell, left_out, numbered_lines, own_lines, require_told
-from steelyard.io.recordings.sizes import SLOWEST, median_size, stamp_unit, unit_by_size
-from steelyard.io.streams.channels import channel_with_gaps
+from steelyard.io.streams.channels import channel_with_gaps, stand_apart
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec, TimeSpec
-from steelyard.io.streams.missing_rows import stand_apart
 from steelyard.io.streams.usual_names import (
     STEMS,
     Names,
-    clock_by_unit,
     compared,
-    rotation_named,
-    said_unit,
-    said_units,
-    time_columns,
-    vector_named,
 )
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table
-from steelyard.io.units import UNITS, converted
+from steelyard.io.tables.files import Columns, Table
+from steelyard.io.units import SLOWEST, UNITS, converted, median_size, stamp_unit, unit_by_size
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD
 
 _UNIT = re.compile(r"[\[(]\s*(?!\d+\s*[\])])([^\])]*?)\s*[\])]\s*$")
@@ -45,13 +36,13 @@ _NEW_POSE = float(np.cos(np.radians(5)))
 def describe(table: Table) -> tuple[Description, Columns]:
     """Return what the names in the file say, and its cells; raises BadDescription with an example."""
     names = _simplified(table)
-    vectors = {quantity: found for quantity in STEMS if (found := vector_named(names, quantity))}
-    rotation = rotation_named(names)
-    stamps = next(time_columns(names), ())
+    vectors = {quantity: found for quantity in STEMS if (found := names.vector(quantity))}
+    rotation = names.rotation()
+    stamps = next(names.time_columns(), ())
     require_told(table, names, [*vectors, *(["rotation"] if rotation else [])])
     wanted = {n for numbers in vectors.values() for n in numbers} | set(rotation.columns if rotation else ())
     cells = table.read(sorted({*map(int, wanted), *stamps}), stamps)
-    if stamps and stamps == clock_by_unit(names) and not _rises(cells[stamps[0]]):
+    if stamps and stamps == names.clock_by_unit() and not _rises(cells[stamps[0]]):
         stamps = ()
     specs = [spec for q, numbers in vectors.items() if (spec := _vector_spec(table, names, q, numbers, cells))]
     specs += [rotation] if rotation else []
@@ -129,7 +120,7 @@ def _vector_spec(
     table: Table, names: Names, quantity: str, numbers: tuple[int, ...], cells: Columns
 ) -> QuantitySpec | None:
     """Return the vector with its unit, None where its size does not tell what it is."""
-    said = said_units(names, quantity, numbers)
+    said = names.said_units(quantity, numbers)
     if len(said) > 1:
         reason = f"the columns of {quantity} have different units, {' and '.join(said)}; write them in one"
         raise cannot_tell(table, reason, own_lines(table, names))
@@ -145,7 +136,7 @@ def _vector_spec(
 
 def _time_unit(table: Table, names: Names, number: int, cells: Columns) -> str:
     """Return the unit from the name (t_ms, t [ms]), from the size of stamps since 1970, or seconds."""
-    said = said_unit(names, number)
+    said = names.said_unit(number)
     if said is not None:
         return said
     if cells[number].dtype.kind == "M":

@@ -7,24 +7,16 @@ from collections.abc import Mapping, Sequence
 from steelyard.errors import NoDescription
 from steelyard.io.entries import listed
 from steelyard.io.example import columns_text, example_of
-from steelyard.io.recordings.controllers import known_lines
 from steelyard.io.recordings.counted import joints, open_pose, open_quaternion, values
-from steelyard.io.recordings.sizes import SLOWEST, angle_unit, length_unit, stamp_unit
 from steelyard.io.streams.usual_names import (
     ANGLES,
     Names,
-    rotation_named,
-    rotations_named,
-    said_unit,
-    said_units,
-    time_columns,
-    vector_named,
-    vectors_named,
 )
 from steelyard.io.tables.files import Table
-from steelyard.io.units import ANGLE, UNITS
+from steelyard.io.units import ANGLE, SLOWEST, UNITS, angle_unit, length_unit, stamp_unit
 
 ATTITUDES = {"rotation", "gravity", "specific_force"}
+_OF_S = "of S in W; check the unit"
 _ORDERS = ("quaternion-xyzw", "quaternion-wxyz")
 
 
@@ -34,7 +26,7 @@ def require_told(table: Table, names: Names, found: Sequence[str]) -> None:
     if missing:
         lines = own_lines(table, names)
         reason = f"no {' and no '.join(missing)} was recognised"
-        if all(len(vectors_named(names, name)) > 1 for name in missing):
+        if all(len(names.vectors(name)) > 1 for name in missing):
             reason = f"several columns may be the {' and the '.join(missing)}"
         elif set(missing) <= set(lines):
             reason = f"{' and '.join(missing)} are a controller's, whose axes, units and settings only you can confirm"
@@ -102,26 +94,23 @@ def _lying(table: Table) -> str:
 def own_lines(table: Table, names: Names) -> dict[str, str]:
     """Return quantity -> its line of a description, for those whose columns were recognised."""
     lines = {}
-    stamps = next(time_columns(names), ())
+    stamps = next(names.time_columns(), ())
     if stamps:
         lines["time"] = _time_line(table, names, stamps)
     for quantity in ("force", "torque", "specific_force", "gravity", "position"):
         if line := _vector_line(table, names, quantity):
             lines[quantity] = line
     lines |= _open_lines(table, names)
-    if turn := rotation_named(names):
-        numbers = [int(n) for n in turn.columns]
-        lines["rotation"] = f'{{ columns = {_columns(table, numbers)}, form = "{turn.form}" }}   # S to W'
-    elif (rotations := rotations_named(names))[1]:
+    if turn := names.rotation():
+        lines["rotation"] = _line(table, [int(n) for n in turn.columns], f'form = "{turn.form}"', "S to W")
+    elif (rotations := names.rotations())[1]:
         form, turns = rotations
-        lines["rotation"] = (
-            f'{{ columns = {_columns(table, turns[0])}, form = "{form}" }}   # S to W{_or(table, turns)}'
-        )
-    for quantity, columns, rest, remark in known_lines(names):
-        lines[quantity] = f"{{ columns = {_columns(table, columns)}, {rest} }}   # {remark}"
+        lines["rotation"] = _line(table, turns[0], f'form = "{form}"', f"S to W{_or(table, turns)}")
+    for quantity, columns, rest, remark in names.of_controllers():
+        lines[quantity] = _line(table, columns, rest, remark)
     if not ATTITUDES & set(lines) and (found := joints(names)):
         unit = angle_unit(values(table, found)) or "rad"
-        lines["joint_position"] = f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}   # from base to sensor'
+        lines["joint_position"] = _line(table, found, f'unit = "{unit}"', "from base to sensor")
     return lines
 
 
@@ -138,35 +127,34 @@ def numbered_lines(table: Table) -> dict[str, str]:
 
 
 def _time_line(table: Table, names: Names, stamps: Sequence[int]) -> str:
-    columns = _columns(table, stamps)
     if len(stamps) > 1:
-        return f'{{ columns = {columns}, unit = ["s", "ns"] }}'
-    if told := said_unit(names, stamps[0]):
-        return f'{{ columns = {columns}, unit = "{told}" }}'
+        return _line(table, stamps, 'unit = ["s", "ns"]')
+    if told := names.said_unit(stamps[0]):
+        return _line(table, stamps, f'unit = "{told}"')
     found = values(table, stamps) if stamps[0] not in names.dates else None
     unit, step = stamp_unit(found[:, 0]) if found is not None else (None, 0.0)
     if unit is None and step > SLOWEST:
         unit = next(unit for unit, longest in (("ms", 1e3), ("us", 1e6), ("ns", float("inf"))) if step < longest)
-    return f'{{ columns = {columns}, unit = "{unit or "s"}" }}   # check the unit: s, ms, us or ns'
+    return _line(table, stamps, f'unit = "{unit or "s"}"', "check the unit: s, ms, us or ns")
 
 
 def _vector_line(table: Table, names: Names, quantity: str) -> str | None:
     """Return the line of a vector, with the other columns that may be meant; None where there is none."""
-    several = vectors_named(names, quantity)
-    found = vector_named(names, quantity) or next(iter(several), ())
-    said = said_units(names, quantity, found)
+    several = names.vectors(quantity)
+    found = names.vector(quantity) or next(iter(several), ())
+    said = names.said_units(quantity, found)
     if not found or len(said) > 1:
         return None
-    unit, mark = next(iter(UNITS[quantity])), ""
+    unit, remark = next(iter(UNITS[quantity])), ""
     if said and said[0] in UNITS[quantity]:
         unit = said[0]
     elif quantity == "position":
         unit = length_unit(values(table, found))
     if quantity == "position":
-        mark = "   # of S in W; check the unit"
+        remark = _OF_S
     elif found in several and len(several) > 1:
-        mark = f"   #{_or(table, several)}"
-    return f'{{ columns = {_columns(table, found)}, unit = "{unit}" }}{mark}'
+        remark = _or(table, several).lstrip()
+    return _line(table, found, f'unit = "{unit}"', remark)
 
 
 def _or(table: Table, several: Sequence[tuple[int, ...]]) -> str:
@@ -187,7 +175,7 @@ def _open_lines(table: Table, names: Names) -> dict[str, str]:
         unit = length_unit(values(table, place))
         angles = angle_unit(values(table, turn)) or "rad"
         return {
-            "position": f'{{ columns = {_columns(table, place)}, unit = "{unit}" }}   # of S in W; check the unit',
+            "position": _line(table, place, f'unit = "{unit}"', _OF_S),
             "rotation": _quaternion_line(table, turn, False)
             if len(turn) == 4
             else _angle_line(table, turn, "rotation-vector", angles),
@@ -197,15 +185,20 @@ def _open_lines(table: Table, names: Names) -> dict[str, str]:
 
 def _quaternion_line(table: Table, columns: Sequence[int], scalar_first: bool) -> str:
     form, other = _ORDERS[::-1] if scalar_first else _ORDERS
-    shown = f'{{ columns = {_columns(table, columns)}, form = "{form}" }}'
-    return f'{shown}   # S to W; or "{other}": the file does not tell which of the four is w'
+    remark = f'S to W; or "{other}": the file does not tell which of the four is w'
+    return _line(table, columns, f'form = "{form}"', remark)
 
 
 def _angle_line(table: Table, columns: Sequence[int], form: str, unit: str) -> str:
     """Return the line of three angles; in degrees no maker gives a rotation vector."""
     form, other = ("rpy", "rotation-vector") if unit == "deg" or form == "rpy" else ("rotation-vector", "rpy")
-    shown = f'{{ columns = {_columns(table, columns)}, form = "{form}", unit = "{unit}" }}'
-    return f'{shown}   # S to W; check both: the form may be "{other}", too'
+    remark = f'S to W; check both: the form may be "{other}", too'
+    return _line(table, columns, f'form = "{form}", unit = "{unit}"', remark)
+
+
+def _line(table: Table, columns: Sequence[int], rest: str, remark: str = "") -> str:
+    """Return the line of a quantity: its columns by name, the rest, and what its user must know."""
+    return f"{{ columns = {_columns(table, columns)}, {rest} }}{'   # ' if remark else ''}{remark}"
 
 
 def _columns(table: Table, numbers: Sequence[int]) -> str:

@@ -9,11 +9,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.example import columns_text
+from steelyard.io.example import columns_text, toml_string
 from steelyard.io.recordings.description import NOISE, SIGNS, Description, default_gravity
 from steelyard.io.streams.entries import FRAMED
 from steelyard.io.tables.files import TEXT
-from steelyard.io.toml_string import toml_string
 from steelyard.logs.recording import ASSUMED_GRAVITY_STD, Recording, Stream
 from steelyard.spatial import Pose, Rotation
 from steelyard.whole_files import whole_folder, write_text
@@ -84,17 +83,13 @@ def _log(recording: Recording) -> str:
             "a description has no words for channels of the wrench that do not measure: "
             "write the recording as it was read, before its dead channels were found."
         )
-    lines = ["[log]", *_gravity(recording), *_sign(recording)]
+    lines = ["[log]", *_gravity(recording)]
+    # Where nothing said the sign that a description without it has, too, it is left out.
+    if recording.sign_said or recording.wrench_sign != Description.wrench_sign:
+        lines.append(f'wrench  = "{next(word for word, sign in SIGNS.items() if sign == recording.wrench_sign)}"')
     if recording.tool is not None:
         lines.append(f"tool    = {toml_string(str(Path(recording.tool).absolute()))}")
     return "\n".join(lines) + "\n"
-
-
-def _sign(recording: Recording) -> list[str]:
-    """Return the line of the wrench's sign, none where nothing said the one that a description without it has, too."""
-    if not recording.sign_said and recording.wrench_sign == Description.wrench_sign:
-        return []
-    return [f'wrench  = "{next(word for word, sign in SIGNS.items() if sign == recording.wrench_sign)}"']
 
 
 def _gravity(recording: Recording) -> list[str]:
@@ -191,12 +186,8 @@ def _csv(stream: Stream) -> str:
         columns.append(stream.time[:, None])
     for quantity, values in _tabled(stream).items():
         names += _COLUMNS[quantity][0]
-        columns.append(_cells(quantity, values))
+        columns.append(Rotation(values).quaternion_wxyz() if quantity == "rotation" else values)
     rows = np.concatenate(columns, axis=1)
     digits = [12 if name == "t" else 9 for name in names]
     body = "\n".join(",".join(f"{v:.{k}g}" for v, k in zip(row, digits, strict=True)) for row in rows)
     return ",".join(names) + "\n" + body + "\n"
-
-
-def _cells(quantity: str, values: Array) -> Array:
-    return Rotation(values).quaternion_wxyz() if quantity == "rotation" else values

@@ -1,4 +1,8 @@
-"""The streams of a description opened and read: columns, channels in SI, seconds on one origin, names."""
+"""The streams of a description opened and read: columns, channels in SI, seconds on one origin, names.
+
+Of topics joined by time in one table (an outer join, as PlotJuggler and pandas write it) a row belongs to the streams
+that it holds numbers of: where one has a sample, the cells of the others are empty.
+"""
 
 from __future__ import annotations
 
@@ -8,16 +12,47 @@ from pathlib import Path
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
-from steelyard.errors import BadDescription, BadValue
+from steelyard.check import Array, Mask
+from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.entries import listed
 from steelyard.io.streams.channels import channel_with_gaps, require_one_length
-from steelyard.io.streams.clocks import Clock, common_origin, require_likely_step, steady
+from steelyard.io.streams.clocks import Clock, common_origin, one_column, steady
 from steelyard.io.streams.entries import QuantitySpec, StreamSpec
-from steelyard.io.streams.split_stamps import one_column
-from steelyard.io.table_header import Columns
-from steelyard.io.tables.files import Table, choose_columns, find_file, open_table
+from steelyard.io.tables.files import TEXT, Columns, Table, choose_columns, find_file
 from steelyard.logs.recording import Stream
+
+_KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag"
+
+
+def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | None = None) -> Table:
+    """Look at the head of a data file and return its table; raises BadFile.
+
+    topic   that of a bag
+    frames  of a topic of transforms: the pose of the second in the first
+    """
+    from steelyard.io import bags
+    from steelyard.io.tables import array_table, bag_table, parquet_table, text_table, transform_table
+
+    suffix = (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
+    if bags.is_bag(path):
+        if topic is not None and frames is not None:
+            return transform_table.TransformTable.open(path, topic, frames)
+        return bag_table.BagTable.open(path, topic)
+    if path.is_dir() and (inside := bags.bag_in(path)):
+        raise BadFile(f"{path}: the folder of a bag, without its metadata.yaml. Name the file in it: {inside.name}")
+    if topic is not None:
+        raise BadDescription(f'{path}: "topic" belongs to a bag ({", ".join(bags.SUFFIXES)}, or the folder of one).')
+    if path.is_dir():
+        raise BadFile(f"{path}: this is a folder, not a file of data. Name the file in it.")
+    if suffix not in (*TEXT, ".npz", ".parquet"):
+        raise BadFile(f'{path}: unknown kind of data file "{suffix or path.name}". Readable are {_KINDS}.')
+    if path.stat().st_size == 0:
+        raise BadFile(f"{path}: the file is empty (0 bytes). Record again, or correct the path.")
+    if suffix == ".npz":
+        return array_table.ArrayTable.open(path)
+    if suffix == ".parquet":
+        return parquet_table.ParquetTable.open(path)
+    return text_table.TextTable.open(path)
 
 
 def open_tables(specs: Sequence[StreamSpec], folder: Path, data: Path | None) -> list[Table]:
@@ -147,7 +182,7 @@ def _seconds(
     start = min((float(np.nanmin(s)) for s in seconds if s is not None), default=0.0)
     for i, spec in enumerate(specs):
         if spec.time is not None and not spec.time.columns:
-            require_likely_step(1 / spec.time.rate, spec.time.where)
+            check.likely_step(1 / spec.time.rate, spec.time.where)
             seconds[i] = steady(spec.time.rate, rows[i], start)
     return seconds
 
@@ -160,3 +195,24 @@ def _names(specs: Sequence[StreamSpec]) -> list[str]:
         before = called[:i].count(name)
         names.append(f"{name}#{before + 1}" if before else name)
     return names
+
+
+def own_rows(specs: Sequence[StreamSpec], tables: Sequence[Table], cells: Sequence[Columns]) -> list[Columns]:
+    """Return the cells of every stream without rows in which all its quantities are empty, where others share its file.
+
+    Streams without stamps keep all: their rows belong to those of the others by number.
+    """
+    shared = [id(table) for table in tables]
+    stamps = [time_columns(spec, table) for spec, table in zip(specs, tables, strict=True)]
+    return [
+        _own(mine, clock) if clock and shared.count(table) > 1 else mine
+        for mine, clock, table in zip(cells, stamps, shared, strict=True)
+    ]
+
+
+def _own(cells: Columns, clock: Sequence[int]) -> Columns:
+    """Return the rows that hold a quantity; all where none does, or where lengths differ, which others refuse."""
+    if len({len(column) for column in cells.values()}) > 1:
+        return cells
+    empty: Mask = np.logical_and.reduce([np.isnan(column) for n, column in cells.items() if n not in clock])
+    return cells if empty.all() or not empty.any() else {n: column[~empty] for n, column in cells.items()}

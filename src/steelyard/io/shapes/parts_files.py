@@ -17,7 +17,7 @@ import numpy as np
 from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.in_file import in_file
+from steelyard.io.contents import in_file
 from steelyard.io.tables.array_table import npz, read_arrays
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts

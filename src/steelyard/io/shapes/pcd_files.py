@@ -10,8 +10,7 @@ import numba
 import numpy as np
 
 from steelyard.errors import BadFile
-from steelyard.io.ascii_columns import numbers, typed
-from steelyard.io.bounds import read_whole, require_bounded
+from steelyard.io.contents import numbers, read_whole, require_bounded, typed
 
 _TYPES = {
     ("F", "4"): "<f4", ("F", "8"): "<f8", ("U", "1"): "u1", ("U", "2"): "<u2", ("U", "4"): "<u4", ("U", "8"): "<u8",

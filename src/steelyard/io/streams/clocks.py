@@ -1,4 +1,7 @@
-"""Stamps of all streams become seconds after one common origin, without losing the digits of large stamps."""
+"""Stamps of all streams become seconds after one common origin, without losing the digits of large stamps.
+
+They stand in one column or, as ROS writes them, in two: whole seconds, and the nanoseconds above them.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,6 @@ from steelyard.errors import BadValue
 from steelyard.io.streams.channels import require_finite, unfit_text
 from steelyard.io.units import TIME
 
-# [s] Rows of a force-torque log are not closer or further apart than this; else the unit of time is another one.
-_CLOSEST, _FURTHEST = 1e-7, 3600.0
 _FEW_STEPS = 10
 # Signals are put on even stamps: a clock that was set in the middle of a log would make them fill the memory.
 _LONGEST_S = 3 * 86400.0  # from the first row to the last
@@ -29,6 +30,8 @@ _LARGE = 1e6  # [s] stamps below this keep their own origin: float64 holds them 
 # Counters of drivers begin anew at the end of their range: bits, and counts a second. A fall is theirs where stamps
 # before and after it are within so many steps of both ends.
 _BITS, _COUNTS, _WITHIN_STEPS = (16, 32), (TIME["ms"], TIME["us"], TIME["ns"]), 10
+
+Stamps = np.ndarray[Any, np.dtype[Any]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,7 +86,7 @@ class Clock:
         if len(steps) > _FEW_STEPS:
             self._refuse_days()
             step = _usual_step(steps) / self.per_second
-            require_likely_step(step, self.where)
+            check.likely_step(step, self.where)
             self._refuse_jumps(steps, step)
 
     def _refuse_days(self) -> None:
@@ -154,15 +157,32 @@ def common_origin(clocks: Sequence[Clock]) -> int:
     return earliest if abs(earliest) > _LARGE else 0
 
 
-def require_likely_step(step: float, where: str) -> None:
-    """Raise BadValue where rows `step` [s] apart show that the unit of time is another one."""
-    if not _CLOSEST <= step <= _FURTHEST:
-        raise BadValue(
-            f"{where}: rows are {step:.2g} s apart, which no force-torque log is. Correct the unit of time "
-            "(s, ms, us, ns), the column or the rate."
-        )
-
-
 def steady(rate: float, rows: int, start: float) -> Array:
     """Return (rows,) [s] from `start` at `rate` [Hz]."""
     return check.frozen(start + np.arange(rows) / rate)
+
+
+def one_column(columns: Sequence[Stamps], units: Sequence[str], where: str) -> Stamps:
+    """Return stamps (N,): one column as it is; two, in `units` of time, added as datetime64[ns], NaT where one misses.
+
+    Integers are added, because a float64 holds no nanoseconds since 1970. Raises BadValue where the larger unit is not
+    whole, or the smaller one does not count from zero up to it.
+    """
+    if len(columns) == 1:
+        return columns[0]
+    if any(column.dtype.kind == "M" for column in columns):
+        raise BadValue(f"{where}: a date with its time of day is a whole stamp. Name its column alone, with one unit.")
+    known = np.isfinite(columns[0]) & np.isfinite(columns[1])
+    large, small = (np.where(known, column, 0) for column in columns)
+    scale, step = (TIME["ns"] // TIME[unit] for unit in units)
+    fits = (np.abs(large) < 2**62 // scale) & (small >= 0) & (small < scale // step)
+    bad = ~fits | (large != np.round(large)) | (small != np.round(small))
+    if bad.any():
+        row = int(bad.argmax())
+        raise BadValue(
+            f"{where}: two columns of time must be whole {units[0]}, and whole {units[1]} from 0 to "
+            f"{scale // step - 1}; row {row + 1} holds {large[row]} and {small[row]}. "
+            "Correct the columns or their units."
+        )
+    total = large.astype(np.int64) * scale + small.astype(np.int64) * step
+    return np.where(known, total.astype("M8[ns]"), np.datetime64("NaT", "ns"))

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field
 from functools import partial
+from typing import Any
 
 import numpy as np
 
@@ -11,7 +13,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.io.entries import Entry, gathered, listed
 from steelyard.io.rotations import ANGULAR, FORMS, rotation_of
-from steelyard.io.table_header import Column
+from steelyard.io.tables.files import Column
 from steelyard.io.units import ANGLE, LENGTH, TIME, UNITS, instead, spelled
 from steelyard.logs.recording import QUANTITIES, Mount
 from steelyard.spatial import Rotation
@@ -110,30 +112,33 @@ def parse_stream(entry: Entry, robot: bool = False, arm: bool = True) -> StreamS
         raise entry.error('"joint_torque" is of use for an Omnid of a team only. Leave it out: the sensor measures.')
     zero = entry.values.get("torque") == "zero"
     names = [name for name in (*QUANTITIES, *ROBOT) if name in entry and not (zero and name == "torque")]
-    found = gathered(
-        {
-            "keys": lambda: bare.only(*_KEYS, *(ROBOT if robot else _JOINT)),
-            "time": lambda: _time(entry),
-            **{name: partial(_quantity, entry, name, arm) for name in names},
-            "kind": lambda: _kind(entry),
-            "delay": lambda: _delay(entry),
-            "mount": lambda: _mount(entry, set(names)),
-            "frames": lambda: _frames(entry),
-        }
-    )
+    steps: dict[str, Callable[[Entry], Any]] = {
+        "time": _time,
+        **{name: partial(_quantity, name=name, arm=arm) for name in names},
+        "kind": _kind,
+        "delay": _delay,
+        "mount": partial(_mount, names=set(names)),
+        "frames": _frames,
+    }
+    given = {key: partial(step, entry) for key, step in steps.items() if key in entry}
+    found = gathered({"keys": lambda: bare.only(*_KEYS, *(ROBOT if robot else _JOINT)), **given})
+    kind, time = found.get("kind"), found.get("time")
+    if time is None and "topic" in entry and kind != "poses":
+        # A topic whose stream names no clock has the stamps of its messages [ns].
+        time = TimeSpec(("stamp",), ("ns",), 0.0, f"{entry.where}, time")
     if not names:
         raise entry.error('no quantity is given. Example: force = { columns = ["fx", "fy", "fz"], unit = "N" }')
     return StreamSpec(
         path,
         tuple(found[name] for name in names),
         entry.where,
-        found["time"] or _stamped(entry, found["kind"]),
-        found["kind"] == "poses",
+        time,
+        kind == "poses",
         zero,
-        found["delay"],
-        found["mount"],
+        found.get("delay"),
+        found.get("mount"),
         entry.text("topic"),
-        found["frames"],
+        found.get("frames"),
     )
 
 
@@ -146,17 +151,8 @@ def _kind(stream: Entry) -> str | None:
     return kind
 
 
-def _stamped(stream: Entry, kind: str | None) -> TimeSpec | None:
-    """Return the clock of a topic whose stream names none: the stamps of its messages [ns]."""
-    if "topic" not in stream or kind == "poses":
-        return None
-    return TimeSpec(("stamp",), ("ns",), 0.0, f"{stream.where}, time")
-
-
-def _frames(stream: Entry) -> tuple[str, str] | None:
+def _frames(stream: Entry) -> tuple[str, str]:
     """Return the two frames of a topic of transforms, the second of which is meant as it lies in the first."""
-    if "frames" not in stream:
-        return None
     value = stream.values["frames"]
     if not isinstance(value, list) or len(value) != 2 or not all(isinstance(name, str) and name for name in value):
         raise stream.error(f'"frames" must name two frames, such as ["base_link", "tool0"]; got {value!r}.')
@@ -209,9 +205,7 @@ def _columns(entry: Entry, count: int | None) -> tuple[Column, ...]:
     return tuple(value)
 
 
-def _time(stream: Entry) -> TimeSpec | None:
-    if "time" not in stream:
-        return None
+def _time(stream: Entry) -> TimeSpec:
     entry = stream.table("time")
     if "rate" in entry:
         entry.only("rate", "unit")
@@ -243,18 +237,14 @@ def _time_units(entry: Entry) -> tuple[str, ...]:
     return tuple(value)
 
 
-def _delay(stream: Entry) -> float | None:
-    if "delay" not in stream:
-        return None
+def _delay(stream: Entry) -> float:
     entry = stream.table("delay")
     entry.only("value", "unit")
     value = entry.number("value") / TIME[entry.choice("unit", list(TIME), "s")]
     return entry.bounded("value", value, LONGEST_DELAY)
 
 
-def _mount(stream: Entry, names: set[str]) -> Mount | None:
-    if "mount" not in stream:
-        return None
+def _mount(stream: Entry, names: set[str]) -> Mount:
     entry = stream.table("mount")
     if not names & MOUNTED:
         raise entry.error(

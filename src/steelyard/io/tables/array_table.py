@@ -20,8 +20,8 @@ import numpy as np
 from numpy.lib import format as npy
 
 from steelyard.errors import BadFile
-from steelyard.io.bounds import require_bounded
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.contents import require_bounded
+from steelyard.io.tables.files import Columns, Header
 
 _WIDEST = 4096
 _MOST_COLUMNS = 65_536

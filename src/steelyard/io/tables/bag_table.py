@@ -20,10 +20,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription, BadFile, NoDescription
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
-from steelyard.io.bounds import require_bounded
-from steelyard.io.table_header import Columns, Header
-from steelyard.io.tables.bag_example import bag_example, first_wrench
-from steelyard.io.tables.bag_frames import frames_of
+from steelyard.io.contents import require_bounded
+from steelyard.io.example import bag_example, first_wrench, frames_of
+from steelyard.io.tables.files import Columns, Header
 
 STAMP, RECEIVED = "stamp", "received"
 _LOOKED_AT = 500  # messages from the first on that tell what a topic holds: its publishers take turns

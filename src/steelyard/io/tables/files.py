@@ -1,18 +1,47 @@
-"""Data files as named columns: finding the file, choosing its reader, choosing its columns."""
+"""Data files as named columns: what a table holds before its rows are read, finding the file, choosing its columns."""
 
 from __future__ import annotations
 
 import os
 from collections.abc import Sequence
+from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Protocol
+from typing import Any, Protocol
+
+import numpy as np
 
 from steelyard.errors import BadDescription, BadFile
 from steelyard.io.entries import close_match, listed
-from steelyard.io.table_header import Column, Columns, Header
+
+Column = str | int  # as a description names one
+Columns = dict[int, np.ndarray[Any, np.dtype[Any]]]
 
 TEXT = (".csv", ".tsv", ".txt")
-KINDS = ".csv, .tsv, .txt (also .gz), .npz, .parquet, and bags: .mcap, .db3, .bag"
+
+
+@dataclass(frozen=True)
+class Header:
+    """What a table holds before its rows are read.
+
+    names   one per column; None where a text file has no header
+    count   number of columns
+    groups  arrays with several columns (NPZ, lists in cells): name -> its column numbers
+    dates   numbers of the columns of a text that hold dates
+    words   numbers of the columns of a text that hold neither numbers nor dates
+    shapes  shape of every array of an NPZ, also of those that are no columns
+    """
+
+    names: tuple[str, ...] | None
+    count: int
+    groups: dict[str, tuple[int, ...]] = field(default_factory=dict)
+    dates: tuple[int, ...] = ()
+    words: tuple[int, ...] = ()
+    shapes: dict[str, tuple[int, ...]] = field(default_factory=dict)
+
+    def shown(self) -> list[str]:
+        """Return the names to list in a message: arrays with several columns appear once."""
+        inner = {n for group in self.groups.values() for n in group}
+        return [*self.groups, *(name for n, name in enumerate(self.names or ()) if n not in inner)]
 
 
 class Table(Protocol):
@@ -30,37 +59,6 @@ class Table(Protocol):
         """Return columns by number, float64; those in `exact` stay int64 where the file writes integers."""
 
 
-def open_table(path: Path, topic: str | None = None, frames: tuple[str, str] | None = None) -> Table:
-    """Look at the head of a data file and return its table; raises BadFile.
-
-    topic   that of a bag
-    frames  of a topic of transforms: the pose of the second in the first
-    """
-    from steelyard.io import bags
-    from steelyard.io.tables import array_table, bag_table, parquet_table, text_table, transform_table
-
-    suffix = (Path(path.stem) if path.suffix.lower() == ".gz" else path).suffix.lower()
-    if bags.is_bag(path):
-        if topic is not None and frames is not None:
-            return transform_table.TransformTable.open(path, topic, frames)
-        return bag_table.BagTable.open(path, topic)
-    if path.is_dir() and (inside := bags.bag_in(path)):
-        raise BadFile(f"{path}: the folder of a bag, without its metadata.yaml. Name the file in it: {inside.name}")
-    if topic is not None:
-        raise BadDescription(f'{path}: "topic" belongs to a bag ({", ".join(bags.SUFFIXES)}, or the folder of one).')
-    if path.is_dir():
-        raise BadFile(f"{path}: this is a folder, not a file of data. Name the file in it.")
-    if suffix not in (*TEXT, ".npz", ".parquet"):
-        raise BadFile(f'{path}: unknown kind of data file "{suffix or path.name}". Readable are {KINDS}.')
-    if path.stat().st_size == 0:
-        raise BadFile(f"{path}: the file is empty (0 bytes). Record again, or correct the path.")
-    if suffix == ".npz":
-        return array_table.ArrayTable.open(path)
-    if suffix == ".parquet":
-        return parquet_table.ParquetTable.open(path)
-    return text_table.TextTable.open(path)
-
-
 def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Path:
     """Return the file `name`, sought in `data`, $STEELYARD_DATA, `folder`; raises BadFile naming them.
 
@@ -71,10 +69,7 @@ def find_file(name: str, folder: Path, data: Path | None, asked: str = "") -> Pa
         if Path(name).exists():
             return Path(name)
         raise BadFile(f"{by}{name}: no such file.")
-    environment = os.environ.get("STEELYARD_DATA")
-    folders = [data] if data else []
-    folders += [Path(environment)] if environment else []
-    folders.append(folder)
+    folders = [*(Path(each) for each in (data, os.environ.get("STEELYARD_DATA")) if each), folder]
     for each in folders:
         if (each / name).exists():
             return each / name

@@ -10,8 +10,8 @@ from typing import Any
 import numpy as np
 
 from steelyard.errors import BadFile, MissingDependency
-from steelyard.io.bounds import require_bounded
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.contents import require_bounded
+from steelyard.io.tables.files import Columns, Header
 
 
 def _pyarrow() -> tuple[Any, Any]:

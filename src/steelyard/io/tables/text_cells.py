@@ -1,6 +1,7 @@
 """What a cell of a text table may be, and blocks of such cells made plain for numpy's reader.
 
-A cell is a number, nothing, a stamp as ISO 8601, or, between semicolons or tabs, a number with a decimal comma.
+A cell is a number, nothing, a stamp as ISO 8601, or, between semicolons or tabs, a number with a decimal comma. It may
+hold a list of numbers, as pandas writes columns of arrays: "[0.1, 0.2]" becomes cells of their own.
 """
 
 from __future__ import annotations
@@ -26,6 +27,10 @@ _STAMPS = re.compile(rf"(?:(?:{_STAMP_FORM}|nan)\n)*")
 _DATE = re.compile(r"\d{1,4}[./-]\d{1,2}[./-]\d{1,4}\b.*|\d{1,2}:\d\d\b.*")
 # What a decimal point becomes where commas are the decimals: 1.234,5 or 1.234 may mean thousands, so is no number.
 _NO_POINT = "\x01"  # binary, so in no text
+
+# Numbers between brackets, in quotes where the delimiter may stand among them; matrices are lists of lists.
+_LIST = re.compile(r'"\s*(\[[^"]*\])\s*"|(\[[^"\[\];\t]*\])')
+_BETWEEN_ITEMS = re.compile(r"[\[\],;\s]+")
 
 
 def split(line: str, delimiter: str | None) -> tuple[str, ...]:
@@ -145,3 +150,35 @@ def stamps_of(cells: np.ndarray[Any, np.dtype[Any]]) -> np.ndarray[Any, np.dtype
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", UserWarning)  # numpy turns zones into UTC, and says that it keeps none
         return np.array(text.replace("nan", "NaT").split("\n")[:-1]).astype("M8[ns]")
+
+
+def is_list(cell: str) -> bool:
+    """Whether a cell without its quotes holds a list of numbers."""
+    found = items(cell) if cell.startswith("[") and cell.endswith("]") else []
+    return bool(found) and all(map(is_number, found))
+
+
+def items(cell: str) -> list[str]:
+    """Return what stands in a list, row by row where it is one of lists."""
+    return [item for item in _BETWEEN_ITEMS.split(cell) if item]
+
+
+def spread(text: str, delimiter: str | None) -> str:
+    """Return lines with each item of their lists in a cell of its own."""
+    mark = " " if delimiter is None else delimiter
+    return _LIST.sub(lambda found: mark.join(items(found[1] or found[2])), text)
+
+
+def spread_names(names: Sequence[str], cells: Sequence[str]) -> tuple[tuple[str, ...], dict[str, tuple[int, ...]]]:
+    """Return the names of all columns and the groups of those that stood in one cell: force -> force[0], force[1] ..
+
+    cells  the first row, with its lists
+    """
+    out: list[str] = []
+    groups: dict[str, tuple[int, ...]] = {}
+    for name, cell in zip(names, cells, strict=True):
+        count = len(items(cell)) if is_list(cell) else 0
+        if count:
+            groups[name] = tuple(range(len(out), len(out) + count))
+        out += [f"{name}[{i}]" for i in range(count)] if count else [name]
+    return tuple(out), groups

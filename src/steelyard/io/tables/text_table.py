@@ -17,9 +17,8 @@ from pathlib import Path
 import numpy as np
 
 from steelyard.errors import BadFile, BadValue
-from steelyard.io.bounds import require_bounded
-from steelyard.io.table_header import Columns, Header
-from steelyard.io.tables.list_cells import spread, spread_names
+from steelyard.io.contents import require_bounded
+from steelyard.io.tables.files import Columns, Header
 from steelyard.io.tables.text_blocks import blocks, decoded, head_lines
 from steelyard.io.tables.text_cells import (
     STAMP_TYPE,
@@ -35,6 +34,8 @@ from steelyard.io.tables.text_cells import (
     is_stamp,
     may_have_commas,
     split,
+    spread,
+    spread_names,
     stamps_of,
     with_commas,
     with_points,

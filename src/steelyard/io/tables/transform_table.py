@@ -20,12 +20,12 @@ import numpy as np
 from steelyard.check import Integers
 from steelyard.errors import BadDescription, BadFile, BadValue
 from steelyard.io.bags import TRANSFORMS, Bag, open_bag
-from steelyard.io.bounds import require_bounded
+from steelyard.io.contents import require_bounded
 from steelyard.io.entries import listed
 from steelyard.io.rotations import NORM, rotation_of
-from steelyard.io.streams.missing_rows import MOST_MISSING
-from steelyard.io.table_header import Columns, Header
+from steelyard.io.streams.channels import MOST_MISSING
 from steelyard.io.tables.bag_table import STAMP, stamps_of
+from steelyard.io.tables.files import Columns, Header
 from steelyard.spatial import Pose, Rotation
 
 _NAMES = (STAMP, *(f"position.{axis}" for axis in "xyz"), *(f"rotation.{part}" for part in "xyzw"))

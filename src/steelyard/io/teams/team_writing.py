@@ -12,8 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
-from steelyard.io.example import columns_text
-from steelyard.io.toml_string import toml_string
+from steelyard.io.example import columns_text, toml_string
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation

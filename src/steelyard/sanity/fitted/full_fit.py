@@ -1,6 +1,7 @@
 """Full fit: ten parameters and a bias by weighted least squares, with room for what a log should not contain.
 
 Extra columns (a drift, a tilt of gravity) are judged by how much they explain and by leaving out stretches of the log.
+How well a log shows the motion of its load decides which of them may be judged.
 """
 
 from __future__ import annotations
@@ -25,6 +26,11 @@ _SMALLEST = 1e-9
 _MEAN_S = 1.0  # of what is slow in a residual
 FEWEST_BLOCKS = 6  # stretches: leaving each out in turn tells a spread from so many of them on
 RANK = 1e-9  # of the largest eigenvalue: what is below is not told
+
+# Noise of an acceleration hides what follows it by its share of the variance; so many times that is allowed. Where
+# masses and points lie is judged below the second share only.
+NOISE, CALM = 3.0, 0.05
+_FEWEST_MOVING = 50
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,7 +98,9 @@ class Rows:
     def _made(cls, log: MotionLog, drift: bool) -> tuple[Rows, Integers]:
         pick = picked(len(log), _MOST_ROWS)
         thin = log.rows(pick)
-        rows = cls(thin, cls.columns_of(thin), thin.wrench, _first_weights(thin), _blocks(thin))
+        first = ~thin.dead / np.maximum(thin.wrench.var(0), _SMALLEST)
+        weights = np.broadcast_to(first, thin.wrench.shape).copy()
+        rows = cls(thin, cls.columns_of(thin), thin.wrench, weights, _blocks(thin))
         if drift:
             rows = replace(rows, columns=np.concatenate([rows.columns, rows.drifting()], 2))
         for _ in range(2):
@@ -185,11 +193,6 @@ def _solution(scatter: Array, size: int) -> Array:
     return np.asarray(inverse_scaled(scatter[:size, :size].copy(), RANK) @ scatter[:size, size])
 
 
-def _first_weights(log: MotionLog) -> Array:
-    spread = np.maximum(log.wrench.var(0), _SMALLEST)
-    return np.broadcast_to(~log.dead / spread, log.wrench.shape).copy()
-
-
 def _weights(rows: Rows, solution: Array) -> Array:
     """Return inverse variances (N, 6) of the residuals, by class of rows and kind of channel."""
     miss = rows.values - rows.columns @ solution
@@ -209,3 +212,25 @@ def _blocks(log: MotionLog) -> Integers:
     share = (log.time - log.time[0]) / max(float(log.time[-1] - log.time[0]), _SMALLEST)
     block = np.minimum((share * _BLOCKS).astype(np.int64), _BLOCKS - 1)
     return np.asarray(np.unique(block, return_inverse=True)[1].astype(np.int64))
+
+
+def moves(log: MotionLog) -> bool:
+    """Tell whether all channels measure, and enough rows are seen to be accelerated."""
+    return not log.dead.any() and (~log.still).sum() >= _FEWEST_MOVING and bool(log.acceleration.any())
+
+
+def at_rest(log: MotionLog) -> MotionLog:
+    """Return the log as if nothing moved: gravity alone is left."""
+    nothing = np.zeros_like(log.gravity)
+    return replace(log, acceleration=nothing, angular_velocity=nothing, angular_acceleration=nothing)
+
+
+def noise_share(log: MotionLog) -> float:
+    """Return the share of its uncertainty in the squared acceleration of moving rows, linear or angular, the larger."""
+    moving = ~log.still
+    if log.noise is None or not moving.any():
+        return 0.0
+    variance = np.stack([n.acceleration + n.taken for n in log.noise])[log.noise_class][moving]
+    sizes = np.concatenate([log.angular_acceleration, log.acceleration], 1)[moving] ** 2
+    shares = [variance[:, part].sum() / max(float(sizes[:, part].sum()), 1e-300) for part in (slice(0, 3), slice(3, 6))]
+    return float(max(shares))

@@ -8,8 +8,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.log import MotionLog
-from steelyard.sanity.axis_words import direction_words
 from steelyard.sanity.fitted.full_fit import Rows
+from steelyard.sanity.words import direction_words
 from steelyard.spatial import Rotation
 
 _ROUNDS, _FEWEST_ROWS = 4, 8
@@ -46,7 +46,8 @@ def fitted_gravity(log: MotionLog, rotation: Array, gravity: Array, acceleration
     level = given.solve()
     found, phi = gravity, level.phi
     for _ in range(_ROUNDS):
-        rows = _with_gravity(given, R, found)
+        # The weights are kept.
+        rows = replace(given, columns=Rows.columns_of(replace(given.log, gravity=np.swapaxes(R, 1, 2) @ found)))
         columns, axes = _visible(rows, rows.tilting(phi, R, found))
         if columns is None:
             return None
@@ -65,12 +66,6 @@ def levelled(log: MotionLog, rotation: Array, gravity: Array, acceleration_from:
     if acceleration_from != "specific_force":
         return replace(log, gravity=turned)
     return replace(log, gravity=turned, acceleration=log.acceleration - log.gravity + turned)
-
-
-def _with_gravity(rows: Rows, rotation: Array, gravity: Array) -> Rows:
-    """Return the rows for another gravity in W, with the weights kept."""
-    turned = np.swapaxes(rotation, 1, 2) @ gravity
-    return replace(rows, columns=Rows.columns_of(replace(rows.log, gravity=turned)))
 
 
 def _visible(rows: Rows, columns: Array) -> tuple[Array | None, Array]:

@@ -15,13 +15,12 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.logs.log import MotionLog
 from steelyard.sanity.aside import stands_aside
-from steelyard.sanity.axis_words import axis_words
-from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.fitted.seen_motion import CALM, NOISE, moves, noise_share
+from steelyard.sanity.fitted.full_fit import CALM, NOISE, Rows, moves, noise_share
+from steelyard.sanity.fitted.load_motion import two_masses
 from steelyard.sanity.fitted.sensor_matrix import sensor_matrix
-from steelyard.sanity.fitted.two_masses import two_masses
 from steelyard.sanity.readings.levers import UNITS, compared
 from steelyard.sanity.readings.torques import opposed
+from steelyard.sanity.words import axis_words
 from steelyard.spatial import cross_matrix, lever_matrix
 
 # A point this far [m] from S is worth a word, if it is so many standard deviations from none, by leaving out stretches,
@@ -117,7 +116,10 @@ class Misplaced:
     def finding(self) -> Finding:
         """What is said of it."""
         what, such, remedy = self._what
-        text = f"The load moves as if {what} a point {self._size}{such}{self._blind_words}. The answer assumes this."
+        blind = ""
+        if self.blind is not None:
+            blind = f"; where it is along ({axis_words(self.blind)}) of S, turns about that axis alone do not show"
+        text = f"The load moves as if {what} a point {self._size}{such}{blind}. The answer assumes this."
         return Finding("motion-mismatch", text, remedy)
 
     @property
@@ -133,13 +135,6 @@ class Misplaced:
             return "the accelerations were those of", "", "Correct the accelerometer's mount by as much."
         remedy = "Set the controller's TCP to S, or correct the positions."
         return "the positions were those of", ", such as the tip of a tool", remedy
-
-    @property
-    def _blind_words(self) -> str:
-        """Say along which axis the point may lie anywhere."""
-        if self.blind is None:
-            return ""
-        return f"; where it is along ({axis_words(self.blind)}) of S, turns about that axis alone do not show"
 
     def allowed(self, estimate: Estimate) -> Estimate:
         """Return the estimate of the origin of S with bars that hold all that the point would change."""
@@ -177,7 +172,10 @@ def misplaced(log: MotionLog, drift: bool = False) -> Misplaced | None:
     once = rows.solve()
     phi, place = once.phi, np.zeros(3)
     lever = lever_matrix(rows.log.angular_velocity, rows.log.angular_acceleration)
-    axes, blind = _axes(lever)
+    # The axes of S along which turns show a point, and the one along which they do not.
+    values, axes = np.linalg.eigh(np.einsum("nki,nkj->ij", lever, lever))
+    seen = values > BLIND * values[2]
+    axes, blind = (np.eye(3), None) if seen.all() else (axes[:, seen], axes[:, 0])
     for _ in range(ROUNDS):
         # What a body misses in its wrench where the point at one metre along each axis is taken for S.
         missed = -np.concatenate([cross_matrix(phi[1:4]) @ lever, phi[0] * lever], 1) @ axes
@@ -217,10 +215,3 @@ def examine_place(
     ratio, std = found.larger
     # A point at the centre of mass itself has no ratio that tells.
     return None, (opposed(ratio, std) or compared(ratio, std)) if std < TOLD * abs(ratio) else ()
-
-
-def _axes(lever: Array) -> tuple[Array, Array | None]:
-    """Return the axes of S (3, k) along which turns (N, 3, 3) show a point, and the one along which they do not."""
-    values, axes = np.linalg.eigh(np.einsum("nki,nkj->ij", lever, lever))
-    seen = values > BLIND * values[2]
-    return (np.eye(3), None) if seen.all() else (axes[:, seen], axes[:, 0])

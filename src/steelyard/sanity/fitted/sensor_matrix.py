@@ -19,10 +19,9 @@ from steelyard.inertia import forms
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.aside import stands_aside
-from steelyard.sanity.axis_words import axis_words
 from steelyard.sanity.fitted.full_fit import Rows
-from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.readings.glance import stream_of
+from steelyard.sanity.words import axis_words, mount_remedy, mounted
 from steelyard.spatial import Rotation, cross_matrix
 
 # A turn [rad] and a gain are worth a word from what careful mounting and good calibration leave, if they are so many
@@ -139,12 +138,6 @@ def examine_sensor(
     return (_widened(estimate, found), findings) if findings else (estimate, ())
 
 
-def _first_turn(log: MotionLog) -> Rotation:
-    """Return the turn of the force that follows what accelerates and holds the load best (Wahba)."""
-    force, own = log.wrench[:, 3:], log.acceleration - log.gravity
-    return Rotation.aligning((force - force.mean(0)).T @ (own - own.mean(0)))
-
-
 def turn_of(
     log: MotionLog, recording: Recording, known: tuple[Finding, ...], drift: bool = False
 ) -> tuple[float, float, float] | None:
@@ -159,11 +152,15 @@ def turn_of(
 def _looked_at(log: MotionLog, known: tuple[Finding, ...], drift: bool) -> SensorMatrix | None:
     """Return what the wrench, turned back into S, says of the sensor; None where something else is wrong with it.
 
-    Where a large turn was told, it begins with the turn that the force shows at once.
+    Where a large turn was told, it begins with the turn of the force that follows what accelerates and holds the load
+    best (Wahba).
     """
     if stands_aside("sensor", known):
         return None
-    return sensor_matrix(log, drift, _first_turn(log) if "sensor-turned" in codes(known) else None)
+    if "sensor-turned" not in codes(known):
+        return sensor_matrix(log, drift)
+    force, own = log.wrench[:, 3:], log.acceleration - log.gravity
+    return sensor_matrix(log, drift, Rotation.aligning((force - force.mean(0)).T @ (own - own.mean(0))))
 
 
 def in_world(stream: Stream) -> bool:
@@ -184,8 +181,7 @@ def _turn(found: SensorMatrix, stream: Stream) -> tuple[Finding, ...]:
     size, spread = np.linalg.norm(found.turn), np.linalg.norm(found.turn_std)
     message = (
         f"The wrench is turned by {np.degrees(size):.2g} ± {np.degrees(spread):.1g} degrees against what a body gives "
-        f"in these poses: '{stream.name}' looks mounted by the rotation vector ({vector(mount_of(stream, turn))}) rad "
-        "in S. The answer takes S as it was given; its bars hold what that changes."
+        f"in these poses: {mounted(stream, turn)}. The answer takes S as it was given; its bars hold what that changes."
     )
     return (Finding("sensor-turned", message, mount_remedy(stream, turn)),)
 

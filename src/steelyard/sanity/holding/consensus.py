@@ -225,12 +225,9 @@ def refine(slices: Slices, x: Array, kept: Mask) -> Consensus | None:
 
 def _consensus(slices: Slices, x: Array, kept: Mask) -> Consensus:
     residual, tolerance, late = _misfit(slices, x, kept)
-    return Consensus(x, kept, tolerance, residual, late, _cost(tolerance, kept))
-
-
-def _cost(tolerance: Array, kept: Mask) -> float:
-    """Return the mean log tolerance of all slices, and a fine per slice that is not kept."""
-    return float(np.log(tolerance).mean() + FINE * (~kept).mean())
+    # The mean log tolerance of all slices, and a fine per slice that is not kept.
+    cost = float(np.log(tolerance).mean() + FINE * (~kept).mean())
+    return Consensus(x, kept, tolerance, residual, late, cost)
 
 
 def largest(slices: Slices) -> Consensus:

@@ -74,13 +74,11 @@ def untouched(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
     log        in S, wrench as applied to the object; its declared noise is not used
     with_bias  whether a constant wrench bias is free
     """
-    everything = np.ones(len(log), np.bool_)
-    if log.time is None or len(log) < FEWEST_SLICES * FEWEST_ROWS:
-        return everything, ()
+    mask = np.ones(len(log), np.bool_)
+    if log.time is None:
+        return mask, ()
     order = np.argsort(log.time, kind="stable")
-    kept, findings = _in_order(log.rows(order), with_bias)
-    mask = everything.copy()
-    mask[order] = kept
+    mask[order], findings = _in_order(log.rows(order), with_bias)
     return mask, findings
 
 
@@ -89,19 +87,16 @@ def agreeing(log: MotionLog, with_bias: bool) -> Mask:
 
     Unlike `untouched` it asks nothing of the rest: clocks that are late may be what spoils it.
     """
-    everything = np.ones(len(log), np.bool_)
-    if log.time is None or len(log) < FEWEST_SLICES * FEWEST_ROWS:
-        return everything
-    slices, row = _slices(log, with_bias)
-    return consensus.largest(slices).kept[row] if len(slices.y) >= FEWEST_SLICES else everything
+    sliced = _slices(log, with_bias)
+    return np.ones(len(log), np.bool_) if sliced is None else consensus.largest(sliced[0]).kept[sliced[1]]
 
 
 def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...]]:
     """Return what `untouched` returns for rows that are in order of time."""
-    everything = np.ones(len(log), np.bool_)
-    slices, row = _slices(log, with_bias)
-    if len(slices.y) < FEWEST_SLICES:
+    everything, sliced = np.ones(len(log), np.bool_), _slices(log, with_bias)
+    if sliced is None:
         return everything, ()
+    slices, row = sliced
     found = consensus.largest(slices)
     memory = _memory(found)
     touches = _touches(slices, found, memory)
@@ -126,20 +121,23 @@ def _after_change(log: MotionLog, with_bias: bool, change: LoadChange) -> tuple[
     """Return the longer side of a load change, less the time of the hands, searched for contact in its turn."""
     what = f"the load changed from {change.before:.3g} to {change.after:.3g} kg"
     what = slip_words(change.slip) if change.slip else what
-    time = log.time if log.time is not None else np.zeros(0)
-    side, finding = longer_side(time, change.time, what, change.slip > 0)
+    side, finding = longer_side(np.asarray(log.time), change.time, what, change.slip > 0)
     kept, more = untouched(log.rows(side), with_bias)
     mask = side.copy()
     mask[side] = kept
     return mask, (finding, *more)
 
 
-def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers]:
-    """Return the slices of an ordered log and the slice of each row (N,)."""
-    time = log.time if log.time is not None else np.zeros(0)
+def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers] | None:
+    """Return the slices of an ordered log and the slice of each row (N,); None without a clock, or of too few."""
+    time = log.time
+    if time is None or len(log) < FEWEST_SLICES * FEWEST_ROWS:
+        return None
     width = max(SLICE, FEWEST_ROWS * median_step(time), float(time[-1] - time[0]) / MOST_SLICES)
     number = ((time - time[0]) / width).astype(np.int64)
     edges = np.flatnonzero(np.diff(number, prepend=-1))
+    if len(edges) < FEWEST_SLICES:
+        return None
     counts = np.diff(np.append(edges, len(log)))
     z = np.add.reduceat(features(log), edges, axis=0) / counts[:, None]
     T = design(with_bias)

@@ -13,10 +13,8 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import REMEDIES, Finding, percent
+from steelyard.findings import REMEDIES, Finding
 from steelyard.logs.recording import Recording
-from steelyard.sanity.readings.blind_tilt import blind_tilt
-from steelyard.sanity.readings.both_masses import both_masses, examine_both_masses
 from steelyard.sanity.readings.glance import Glance, glance
 from steelyard.sanity.readings.level import examine_level
 from steelyard.sanity.readings.levers import far_away
@@ -30,11 +28,12 @@ from steelyard.sanity.readings.rivals import (
     rival_findings,
     sign_of,
 )
-from steelyard.sanity.readings.swapped import examine_swapped
-from steelyard.sanity.readings.tilt import blind_axis
-from steelyard.sanity.readings.torques import examine_torques
-from steelyard.sanity.readings.weightless import require_weight
-from steelyard.sanity.rows.leaps import examine_leaps
+from steelyard.sanity.readings.silent import require_weight
+from steelyard.sanity.readings.static_fit import both_masses, examine_both_masses
+from steelyard.sanity.readings.tilt import blind_axis, blind_tilt
+from steelyard.sanity.readings.torques import examine_swapped, examine_torques
+from steelyard.sanity.rows.still_rows import examine_leaps
+from steelyard.sanity.words import unexplained
 
 # So many mistakes of one description are put right.
 MOST_MISTAKES = 4
@@ -151,8 +150,7 @@ def _mirrored(
     was, now = _sign_words(recording)
     message = (
         f'As "{was}" the forces are those of the accelerometer mirrored, which no mounting is; the wrench was taken as '
-        f'"{now}": so read, {percent(other.force_share)} of the force variance is left unexplained instead of '
-        f"{percent(reading.fit.force_share)}."
+        f'"{now}": so read, {unexplained(other.force_share, reading.fit.force_share, "the force")}.'
     )
     return replace(recording, wrench_sign=-recording.wrench_sign), (Finding.of("wrench-sign-flipped", message),)
 

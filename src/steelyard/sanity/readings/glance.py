@@ -69,11 +69,6 @@ class Glance:
         return len(self.wrench)
 
     @property
-    def halves(self) -> tuple[Array, Array]:
-        """Torque and force (N, 3), each in its own axes."""
-        return self.wrench[:, :3], self.wrench[:, 3:]
-
-    @property
     def still(self) -> Glance:
         """The same as if nothing told the acceleration."""
         return replace(self, acceleration=None)
@@ -95,7 +90,7 @@ class Glance:
         wrench = np.concatenate(
             [
                 _into_sensor(rotation, v) if part in self.world else v
-                for part, v in zip(_PARTS, self.halves, strict=True)
+                for part, v in zip(_PARTS, np.split(self.wrench, 2, 1), strict=True)
             ],
             1,
         )
@@ -207,12 +202,25 @@ def _of_table(recording: Recording, stream: Stream) -> Glance | None:
     wrench, rows = felt.values, len(stream)
     if any(len(s) != rows for s in recording.streams) or rows < 3:
         return None
-    rotation = next((v for _, _, v in channel(recording, "rotation")), None)
-    pull, mirrored = (None, None) if rotation is not None else _pulls(recording, lambda _, values: values, wrench)
-    if rotation is None and pull is None:
+    posed = _posed(recording, lambda _, values: values, wrench)
+    if posed is None:
         return None
-    place = next((v for _, _, v in channel(recording, "position")), None)
+    rotation, place, pull, mirrored = posed
     return Glance(wrench, rotation, pull, None, np.arange(rows), None, felt.world, mirrored, position=place)
+
+
+def _posed(
+    recording: Recording, on_rows: OnRows, wrench: Array
+) -> tuple[Array | None, Array | None, Array | None, Array | None] | None:
+    """Return rotation, position, gravity in S and the same mirrored at the rows; None where nothing tells gravity."""
+    rotation, place = (_first(recording, quantity, on_rows) for quantity in ("rotation", "position"))
+    pull, mirrored = (None, None) if rotation is not None else _pulls(recording, on_rows, wrench)
+    return None if rotation is None and pull is None else (rotation, place, pull, mirrored)
+
+
+def _first(recording: Recording, quantity: str, on_rows: OnRows) -> Array | None:
+    """Return the first channel that holds a quantity, at the rows of a glance; None where none does."""
+    return next((on_rows(stream, values) for stream, _, values in channel(recording, quantity)), None)
 
 
 def _pulls(recording: Recording, on_rows: OnRows, wrench: Array) -> tuple[Array | None, Array | None]:
@@ -251,21 +259,19 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
         return resampled(_stamps(s), values, grid)
 
     raw = Felt.of(stream, recording.wrench_sign)
-    calm = ~inside(_stamps(stream), _knocks(stream))
+    knocks = merged(*(bursts(_stamps(stream), stream.channels[part]) for part in _PARTS))
+    calm = ~inside(_stamps(stream), knocks)
     wrench = np.where(recording.dead, 0.0, resampled(_stamps(stream)[calm], raw.values[calm], grid))
     seen = replace(recording, streams=tuple(used))
-    rotation = next((on_grid(s, v) for s, _, v in channel(seen, "rotation")), None)
-    pull, mirrored = (None, None) if rotation is not None else _pulls(seen, on_grid, wrench)
-    if rotation is None and pull is None:
+    posed = _posed(seen, on_grid, wrench)
+    if posed is None:
         return None
+    rotation, place, pull, mirrored = posed
     acceleration = _acceleration(recording, rotation, on_grid, rate)
     block = np.minimum(np.arange(rows) * _BLOCKS // rows, _BLOCKS - 1)
     kept = ~inside(grid, _unseen(stream.rows(calm), [s for s in used if s is not stream]))
     whole = bool(kept.all()) or int(kept.sum()) < _FEWEST_ROWS
-    felt = None
-    if rotation is not None:
-        felt = next((on_grid(s, v) for s, _, v in channel(seen, "specific_force")), None)
-    place = next((on_grid(s, v) for s, _, v in channel(seen, "position")), None)
+    felt = None if rotation is None else _first(seen, "specific_force", on_grid)
     return Glance(
         wrench, rotation, pull, acceleration, block if whole else block[kept], rate, raw.world, mirrored, felt,
         recording.dead, place, None if whole else kept,
@@ -275,11 +281,6 @@ def _of_clocks(recording: Recording, stream: Stream) -> Glance | None:
 def _stamps(stream: Stream) -> Array:
     """Return the stamps (N,) [s] of a stream with a clock, less a delay that was given."""
     return np.asarray(stream.time) - (stream.delay or 0.0)
-
-
-def _knocks(stream: Stream) -> Array:
-    """Return the times (K, 2) [s] of knocks and stray readings in the wrench."""
-    return merged(*(bursts(_stamps(stream), stream.channels[part]) for part in _PARTS))
 
 
 def _unseen(felt: Stream, others: list[Stream]) -> Array:

@@ -8,13 +8,11 @@ import numpy as np
 
 from steelyard.findings import Finding, percent
 from steelyard.logs.recording import Recording, Stream
-from steelyard.sanity.axis_words import direction_words
-from steelyard.sanity.mounts import mount_of, mount_remedy, vector
 from steelyard.sanity.readings.glance import Glance
-from steelyard.sanity.readings.mirrored import Mirror, mirrored
 from steelyard.sanity.readings.rivals import LEVEL, MUCH_BETTER, STEEP, Reading, sign_of
 from steelyard.sanity.readings.static_fit import StaticFit
-from steelyard.sanity.readings.tilt import GlanceTilt, Turn, tilt_of, turned_sensor
+from steelyard.sanity.readings.tilt import GlanceTilt, Mirror, Turn, mirrored, tilt_of, turned_sensor
+from steelyard.sanity.words import axis_words, direction_words, mount_remedy, mounted, unexplained
 
 # With fewer poses or stretches than this, a direction of gravity fits by chance.
 FEWEST_BLOCKS = 6
@@ -46,8 +44,8 @@ def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple
 
 def _mixed_finding(mirror: Mirror, given: StaticFit) -> Finding:
     message = (
-        f"The forces fit one body if they are read as {mirror.words}: so, {percent(mirror.force_share)} of their "
-        f"variance is left unexplained instead of {percent(given.force_share)}; the answer does not assume this."
+        f"The forces fit one body if they are read as {mirror.words}: so, "
+        f"{unexplained(mirror.force_share, given.force_share)}; the answer does not assume this."
     )
     remedy = "Check order and signs of the force columns in the description, and of the torque columns with them."
     return Finding("force-unit", message, remedy, left_in=True)
@@ -56,18 +54,19 @@ def _mixed_finding(mirror: Mirror, given: StaticFit) -> Finding:
 def _turned_finding(turned: Turn, given: StaticFit, stream: Stream) -> Finding:
     message = (
         f"The wrench is turned by {np.degrees(turned.rotation.angle()):.0f} degrees against the frame whose "
-        f"rotation is given: '{stream.name}' looks mounted by the rotation vector "
-        f"({vector(mount_of(stream, turned.rotation))}) rad in S. So read, {percent(turned.force_share)} of the "
-        f"force variance is left unexplained instead of {percent(given.force_share)}; the answer does not "
-        "assume this."
+        f"rotation is given: {mounted(stream, turned.rotation)}. So read, "
+        f"{unexplained(turned.force_share, given.force_share, 'the force')}; the answer does not assume this."
     )
     return Finding("sensor-turned", message, mount_remedy(stream, turned.rotation), left_in=True)
 
 
 def _tilted_finding(tilt: GlanceTilt) -> Finding:
+    unseen = ""
+    if tilt.blind is not None:
+        unseen = f"; a tilt toward ({axis_words(tilt.blind)}) of W cannot be seen in this motion"
     message = (
         f"Gravity fits {np.degrees(tilt.angle):.1f} ± {np.degrees(tilt.angle_std):.1g} degrees off the direction "
-        f"given, along ({direction_words(tilt.gravity)}) of W; the answer uses the direction found{tilt.blind_words}."
+        f"given, along ({direction_words(tilt.gravity)}) of W; the answer uses the direction found{unseen}."
     )
     if tilt.angle >= STEEP:
         return Finding.of("gravity-frame", message)

@@ -18,12 +18,13 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array, frozen
-from steelyard.findings import Finding, percent
+from steelyard.findings import Finding
 from steelyard.logs.misread import INVERTED, MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
 from steelyard.sanity.readings.static_fit import StaticFit, better_fit, varies
 from steelyard.sanity.readings.tilt import GlanceTilt, tilt_of, turned_sensor
+from steelyard.sanity.words import unexplained
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
 MUCH_BETTER = 0.25
@@ -223,8 +224,8 @@ def rival_findings(best: Reading, given: Reading) -> tuple[Finding, ...]:
     """Return what is said of the rival that is taken instead of the reading as given."""
     part, instead = ("torque", given.fit.torque_share) if best.by_torque else ("force", given.fit.force_share)
     message = (
-        f"{best.words[0].upper()}{best.words[1:]}; so read, {percent(best.left)} of the {part} variance is "
-        f"left unexplained instead of {percent(instead)}. The answer assumes this."
+        f"{best.words[0].upper()}{best.words[1:]}; so read, "
+        f"{unexplained(best.left, instead, f'the {part}')}. The answer assumes this."
     )
     if best.view is None:
         return (Finding.of("gravity-frame", message) if best.misread is None else best.misread.finding(message),)

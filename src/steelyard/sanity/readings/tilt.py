@@ -1,6 +1,10 @@
-"""Tilt: the direction of gravity in W taken from the wrench itself.
+"""Tilt: the direction of gravity in W taken from the wrench itself; and axes of the force that are turned or mirrored.
 
 Source: f = m a - R^T u + bias is linear in u = m g, so that the force alone gives the direction without a start value.
+
+Where S turns about one axis only, a tilt along that axis adds a constant to the force, which a free bias takes up. It
+also makes gravity sweep less than its full size; an accelerometer of known gain shows that, and a few per cent of gain
+error look the same.
 """
 
 from __future__ import annotations
@@ -10,15 +14,19 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard.check import Array, Integers
-from steelyard.sanity.axis_words import axis_words
+from steelyard.findings import Finding
 from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.sanity.readings.static_fit import beside, better_fit, leave_out, solve
-from steelyard.spatial import Rotation, cross_matrix
+from steelyard.sanity.words import axis_words
+from steelyard.spatial import Rotation, cross_matrix, signed_axes, signed_columns
 
 # Directions of W that the rotations show this much less (in variance) than the best one are left as given.
 _BLIND = 0.02
 # A turn is refined so many times.
 _ROUNDS = 3
+
+# Gains of accelerometers are good to 3 %; a sweep further off, beyond five standard deviations, is a tilt (16 degrees).
+GAIN, SURE, LEFT = 0.04, 5.0, 0.01
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,13 +42,6 @@ class GlanceTilt:
     force_share: float
     torque_share: float
     blind: Array | None = None
-
-    @property
-    def blind_words(self) -> str:
-        """Say which part of a tilt stays unseen."""
-        if self.blind is None:
-            return ""
-        return f"; a tilt toward ({axis_words(self.blind)}) of W cannot be seen in this motion"
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,7 +76,8 @@ def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -
     found = sign * weight * np.linalg.norm(gravity) / np.linalg.norm(weight)
     angle = angle_between(found, gravity)
     best = better_fit(view, found, rotation)
-    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, _axis_unseen(shown))
+    unseen = None if np.trace(shown) > 2.5 else np.asarray(np.linalg.eigh(shown)[1][:, 0])
+    return GlanceTilt(found, angle, spread, best.force_share, best.torque_share, unseen)
 
 
 def free_direction(
@@ -158,8 +160,60 @@ def blind_axis(view: Glance, rotation: Array) -> Array | None:
     return np.asarray(axes[:, 0]) if values[0] < bar < values[1] else None
 
 
-def _axis_unseen(seen: Array) -> Array | None:
-    if np.trace(seen) > 2.5:
+def blind_tilt(view: Glance, gravity: Array, blind: Array) -> tuple[Finding, ...]:
+    """Return `base-tilted` where an accelerometer sees gravity sweep more or less than its direction (3,) in W says.
+
+    blind  (3,) unit vector of W along which a tilt does not show in the force
+    """
+    if view.accelerometer is None or view.rotation is None:
+        return ()
+    seen = view.seen(gravity, view.rotation)
+    felt, up = view.smooth(view.accelerometer), -(seen.pull - seen.pull.mean(0))
+    turn = Rotation.aligning(up.T @ (felt - felt.mean(0)))
+    gain, spread, left = solve(beside(up[:, :, None], seen.lever), felt @ turn.matrix.T, view.block)
+    if abs(gain[0] - 1) < max(GAIN, SURE * spread[0]) or abs(gain[0] - 1) > 0.5 or left > LEFT:
+        return ()
+    size = float(np.linalg.norm(gravity))
+    across = float(np.linalg.norm(gravity - blind * (blind @ gravity))) / size
+    tilt = abs(np.arccos(min(across, 1.0)) - np.arccos(min(across * float(gain[0]), 1.0)))
+    message = (
+        f"Gravity sweeps {abs(gain[0] - 1) * 100:.1f} ± {spread[0] * 100:.1g} % {'more' if gain[0] > 1 else 'less'} in "
+        f"the accelerometer than its direction in W says: a tilt of about {np.degrees(tilt):.0f} degrees toward or "
+        f"from ({axis_words(blind)}) of W, unless the accelerometer's gain is off; the answer does not assume this."
+    )
+    return (Finding.of("base-tilted", message),)
+
+
+@dataclass(frozen=True, eq=False)
+class Mirror:
+    """How the columns of the force would have to be read, and the share of the force variance that is then left."""
+
+    words: str
+    force_share: float
+
+
+# The 24 (24, 3, 3) that turn a right hand into a left one.
+REFLECTIONS = np.stack([X for X in signed_axes() if np.linalg.det(X) < 0])
+
+
+def mirrored(view: Glance, gravity: Array, sign: float) -> Mirror | None:
+    """Return the exchange of axes and signs that explains the force best; None without rotations or all forces.
+
+    gravity  (3,) [m/s^2] in W
+    sign     that of the mass as read, 0 where it is not sure
+    """
+    if view.rotation is None or any(view.dead[3:]):
         return None
-    _, axes = np.linalg.eigh(seen)
-    return np.asarray(axes[:, 0])
+    seen = view.still.seen(gravity, view.rotation)
+    force, down = force_and_weight(seen, sign)
+    # force = X m down: the trace with X is largest for the right one.
+    X = max(REFLECTIONS, key=lambda X: float((X * (force.T @ down)).sum()))
+    _, _, share = solve(beside((down @ X.T)[:, :, None], seen.lever), force, view.block)
+    return Mirror(in_words(X, "F"), share)
+
+
+def in_words(X: Array, letter: str) -> str:
+    """Say what columns must be read as whose numbers are X (3, 3) times those meant: "Fx = -Fy, Fy = .."."""
+    # meant_k = sum_i X_ik read_i
+    pairs = zip("xyz", signed_columns(X.T, letter), strict=True)
+    return ", ".join(f"{letter}{name} = {read}" for name, read in pairs)

@@ -1,4 +1,5 @@
-"""Torques that do not belong to the forces: other axes, another point, columns of another order or sign, another unit.
+"""Torques that do not belong to the forces: other axes, another point, columns of another order or sign or the forces'
+own, another unit.
 
 At rest a torque is h x g for some first moment h of mass, so that axes, the point that torques are about, and most
 orders of columns show. In motion the force shows h, too: how it follows the turning, beside the h of the torque, tells
@@ -12,13 +13,15 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.findings import Finding, percent
-from steelyard.logs.recording import Recording
-from steelyard.sanity.readings.glance import Glance, Seen, in_axes
+from steelyard.findings import Finding
+from steelyard.logs.recording import Recording, Stream
+from steelyard.sanity.readings.glance import Glance, Seen, glance, in_axes
 from steelyard.sanity.readings.levers import by_motion
-from steelyard.sanity.readings.mirrored import REFLECTIONS, in_words
-from steelyard.sanity.readings.rivals import BESIDE, Reading, misread_rotations
-from steelyard.sanity.readings.static_fit import columns, solve
+from steelyard.sanity.readings.rivals import BESIDE, Reading, best_rival, misread_rotations, outdone, reading_of
+from steelyard.sanity.readings.rivals import MUCH_BETTER as RIVAL_BETTER
+from steelyard.sanity.readings.static_fit import columns, fit, solve
+from steelyard.sanity.readings.tilt import REFLECTIONS, in_words
+from steelyard.sanity.words import unexplained
 
 # Forces must fit so well before torques are judged; torques may be in another order where they leave more than the
 # second share, and fit well where they leave less than the third.
@@ -33,6 +36,11 @@ SURE, ALONG = 0.05, 0.2
 REMEDY = "Check order and signs of the torque columns in the description."
 WHICH = "Check order, form, unit and sense of the rotation, and the frame of the torque."
 ABOUT_S = "Take position x force away from the torques, all in the axes of W, or log the wrench at the sensor."
+
+# As given, the force leaves more than the first share of its variance; exchanged, less than the second, and the torque
+# less than the third.
+UNEXPLAINED, SWAPPED_WELL, SWAPPED_TORQUES = 0.5, 0.05, 0.3
+_OTHER = {"force": "torque", "torque": "force"}
 
 
 def examine_torques(recording: Recording, view: Glance, reading: Reading) -> tuple[Recording, tuple[Finding, ...]]:
@@ -79,15 +87,12 @@ def _elsewhere(
     alike = [words for left, words in fitting if BESIDE * left < least or doubtful]
     if len(alike) > 1 or doubtful:
         text = (
-            f"The torques fit one body where {'; or where '.join(alike)}: so read, {percent(least)} of their "
-            f"variance is left unexplained instead of {percent(share)}. The answer does not assume this."
+            f"The torques fit one body where {'; or where '.join(alike)}: so read, "
+            f"{unexplained(least, share)}. The answer does not assume this."
         )
         return recording, (Finding("wrench-unexplained", text, WHICH, left_in=True),)
     if fitting and fitting[0] == axes:
-        text = (
-            f"T{axes[1][1:]}: so read, {percent(axes[0])} of their variance is left unexplained "
-            f"instead of {percent(share)}. The answer assumes this."
-        )
+        text = f"T{axes[1][1:]}: so read, {unexplained(axes[0], share)}. The answer assumes this."
         remedy = f'Set frame = "{"S" if "torque" in view.world else "W"}" in the torque of this stream.'
         return in_axes(recording, view.world ^ {"torque"}), (Finding("gravity-frame", text, remedy),)
     if view.position is None:
@@ -97,8 +102,8 @@ def _elsewhere(
     if left > MUCH_BETTER * share:
         return recording, ()
     text = (
-        f"The torques are about the origin of W, not of S: so read, {percent(left)} of their variance is left "
-        f"unexplained instead of {percent(share)}; the answer does not assume this."
+        f"The torques are about the origin of W, not of S: so read, {unexplained(left, share)}; the answer does not "
+        "assume this."
     )
     return recording, (Finding("wrench-unexplained", text, ABOUT_S, left_in=True),)
 
@@ -119,8 +124,8 @@ def _ordered(view: Glance, seen: Seen, turned: Array, share: float, felt: Array)
     # Either sign fits as well: the force decides, or else fewer changes are likelier.
     side = float(moment[:3] @ felt) or float(X.sum())
     text = (
-        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, {percent(left)} of "
-        f"their variance is left unexplained instead of {percent(share)}; the answer does not assume this."
+        f"The torques fit one body if they are read as {in_words(np.sign(side) * X, 'T')}: so, "
+        f"{unexplained(left, share)}; the answer does not assume this."
     )
     return (Finding("force-unit", text, REMEDY, left_in=True),)
 
@@ -147,3 +152,46 @@ def opposed(ratio: float, std: float) -> tuple[Finding, ...]:
         "other side of S. The answer does not assume this."
     )
     return (Finding("force-unit", text, REMEDY, left_in=True),)
+
+
+def examine_swapped(recording: Recording, view: Glance) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with forces and torques exchanged where that explains both, and a finding."""
+    if any(recording.dead) or view.mirrored is not None:
+        return recording, ()
+    given = fit(view.seen(recording.gravity, view.rotation), view.block)
+    if given.force_share < UNEXPLAINED:
+        return recording, ()
+    other = replace(recording, streams=tuple(map(_exchanged, recording.streams)))
+    seen = glance(other)
+    if seen is None:
+        return recording, ()
+    found = fit(seen.seen(recording.gravity, seen.rotation), seen.block)
+    if found.sign == 0 or found.force_share > SWAPPED_WELL or found.torque_share > SWAPPED_TORQUES:
+        return recording, ()
+    if _explained(recording, view, Reading("", recording.gravity, seen.rotation, found, view=seen)):
+        return recording, ()
+    text = (
+        "Forces and torques are in each other's columns: exchanged, "
+        f"{unexplained(found.force_share, given.force_share, 'the force')}. The answer assumes this."
+    )
+    remedy = "Exchange the columns of force and torque in the description."
+    return other, (Finding("force-unit", text, remedy),)
+
+
+def _explained(recording: Recording, view: Glance, exchanged: Reading) -> bool:
+    """Tell whether the columns as they stand explain much more, with a turned sensor or rotations read otherwise.
+
+    In turns about few axes a force in other axes leaves torques that follow gravity, too.
+    """
+    rival = best_rival(recording, view, reading_of(view, "", recording.gravity, view.rotation))
+    better = rival is not None and rival.fit.force_share < RIVAL_BETTER * exchanged.fit.force_share
+    return better or outdone(exchanged, view, recording.gravity)
+
+
+def _exchanged(stream: Stream) -> Stream:
+    """Return the stream with what is called force called torque, and the other way round."""
+    if not _OTHER.keys() <= stream.channels.keys():
+        return stream
+    channels = {_OTHER.get(quantity, quantity): values for quantity, values in stream.channels.items()}
+    frames = {_OTHER.get(quantity, quantity): frame for quantity, frame in stream.frames.items()}
+    return replace(stream, channels=channels, frames=frames)

@@ -1,4 +1,10 @@
-"""Units that the numbers themselves give away: gravity near one, a hand that moves at hundreds of metres per second."""
+"""Units and axes that the numbers of a channel themselves give away, whatever is held.
+
+Gravity near one is in g, and a hand that moves at hundreds of metres per second is in millimetres. A gyroscope's
+angular velocity stands beside that of the rotations, which shows in which axes and unit it is: read otherwise it would
+give accelerations that no body felt. Where there are no rotations, the accelerometer of its stream shows how gravity
+turns.
+"""
 
 from __future__ import annotations
 
@@ -9,16 +15,30 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadDescription
-from steelyard.findings import Finding
-from steelyard.logs.imu import unit_factor
+from steelyard.findings import Finding, percent
+from steelyard.logs.conditioning import lowpass
+from steelyard.logs.imu import first_mount, unit_factor
 from steelyard.logs.recording import STANDARD_GRAVITY, Recording, Stream
-from steelyard.sanity.readings.glance import channel
+from steelyard.sanity.readings.glance import CUTOFF_HZ, angular_velocity, channel, resampled, stream_of
+from steelyard.spatial import Rotation
 
 # No arm moves its hand faster [m/s], or stands in poses further apart [m]: such numbers are millimetres.
 FASTEST, FURTHEST = 10.0, 20.0
-# A length of gravity in this range is one g, not metres per second squared.
 _MOST_PLACES = 2_000_000  # looked at, of positions over time
+# A length of gravity in this range is one g, not metres per second squared.
 ONE_G = (0.9, 1.1)
+
+# As given more than the first share of the square of the angular velocity is unlike that of the rotations; as it was
+# meant less than the second. A delay of 0.1 s leaves less.
+UNLIKE, ALIKE = 0.25, 0.1
+# Beside an accelerometer: of the square of how gravity turns the gyroscope leaves less than this in the axes of the
+# accelerometer, and in S more by UNLIKE. Accelerations of the arm leave the same of both.
+FOLLOWED = 0.3
+_DEGREE = np.pi / 180
+_ABOUT = 0.2  # a gyroscope in another unit is that much off the rotations at most
+_RATE_HZ = 60.0
+_FEWEST_ROWS = 60
+_SECOND = 0.02  # of the largest: turns about one axis do not tell how a gyroscope sits
 
 
 def examine_units(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
@@ -121,3 +141,138 @@ def _far(stream: Stream, values: Array) -> str:
 def _fast(stream: Stream, values: Array) -> str:
     top = float(np.quantile(np.linalg.norm(values, axis=1), 0.98))
     return f"reaches {top:.4g} m/s" if top > FASTEST else ""
+
+
+def examine_turning(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the angular velocity in the axes and unit in which it follows the rotations.
+
+    Also returns a finding where those are not the ones that it was said to be in.
+    """
+    given = next(channel(recording, "angular_velocity"), None)
+    turned = next(channel(recording, "rotation"), None)
+    if given is not None and turned is None:
+        return _beside_accelerometer(recording, given[0])
+    both = None if given is None or turned is None else _side_by_side(given[0], turned[0])
+    if given is None or both is None:
+        return recording, ()
+    stream, shown, rotation, omega = given[0], *both
+    frame = stream.frames.get("angular_velocity", "S")
+    unlike = _share(shown, omega if frame == "S" else _into_world(rotation, omega))
+    if unlike < UNLIKE:
+        return recording, ()
+    factor, said, remedies = _unit(shown, omega)
+    if (other := _axes(factor * shown, rotation, omega, frame)) is not None:
+        left, meant = other
+        if meant != frame:
+            said.append(f"in the axes of {meant}, not of {frame}")
+            remedies.append(f'frame = "{meant}"')
+        text = f"The angular velocity of '{stream.name}' is {' and '.join(said)}"
+        remedy = f"Set {' and '.join(remedies)} in its angular_velocity."
+        return _read(recording, stream, factor, meant), (Finding("gravity-frame", _text(text, left, unlike), remedy),)
+    mount = _mount(shown, omega)
+    if frame == "W" or mount is None or (left := _share(mount.apply(factor * shown), omega)) > ALIKE:
+        return recording, ()
+    degrees = f"{np.degrees(float(mount.angle())):.1f} degrees"
+    text = f"The gyroscope of '{stream.name}' is {' and '.join([*said, f'turned by {degrees} against S'])}"
+    remedy = "Turn the angular velocity into the axes of S beforehand, or leave it out: the rotations tell it, too."
+    return _read(recording, stream, factor, "S", mount), (Finding("imu-rotated", _text(text, left, unlike), remedy),)
+
+
+def _into_world(rotation: Array, omega: Array) -> Array:
+    return np.asarray(np.einsum("nij,nj->ni", rotation, omega))
+
+
+def _unit(shown: Array, omega: Array) -> tuple[float, list[str], list[str]]:
+    """Return what the angular velocity must be multiplied with to be as large as that of the rotations, and words."""
+    ratio = float(np.sqrt((shown**2).sum() / max(float((omega**2).sum()), 1e-300)))
+    for factor, is_in, read_as in ((_DEGREE, "deg/s", "rad/s"), (1 / _DEGREE, "rad/s", "deg/s")):
+        if abs(ratio * factor - 1) < _ABOUT:
+            return factor, [f"in {is_in}, not in {read_as}"], [f'unit = "{is_in}"']
+    return 1.0, [], []
+
+
+def _axes(shown: Array, rotation: Array, omega: Array, frame: str) -> tuple[float, str] | None:
+    """Return the share that is left, and the axes in which an angular velocity is that of the rotations."""
+    shares = {"S": _share(shown, omega), "W": _share(shown, _into_world(rotation, omega))}
+    best = min(shares, key=lambda name: (shares[name] > ALIKE, name != frame))
+    return (shares[best], best) if shares[best] < ALIKE else None
+
+
+def _side_by_side(given: Stream, turned: Stream) -> tuple[Array, Array, Array] | None:
+    """Return the angular velocity (N, 3) as given, rotations (N, 3, 3) and theirs in S (N, 3), on one even clock."""
+    both = _on_one_clock((given, "angular_velocity"), (turned, "rotation"))
+    if both is None:
+        return None
+    shown, rotation = both
+    slow = lowpass(np.concatenate([shown, angular_velocity(rotation, _RATE_HZ)], 1), CUTOFF_HZ, _RATE_HZ, order=2)
+    return slow[:, :3], rotation, slow[:, 3:]
+
+
+def _on_one_clock(*channels: tuple[Stream, str]) -> list[Array] | None:
+    """Return channels (N, ..) of streams with clocks in the same even steps, None where there are few."""
+    if any(s.time is None or len(s) < _FEWEST_ROWS for s, _ in channels):
+        return None
+    clocks = [np.asarray(s.time) - (s.delay or 0.0) for s, _ in channels]
+    start, end = max(float(t[0]) for t in clocks), min(float(t[-1]) for t in clocks)
+    rows = int((end - start) * _RATE_HZ)
+    if rows < _FEWEST_ROWS:
+        return None
+    grid: Array = np.asarray(start + (np.arange(rows) + 0.5) / _RATE_HZ, dtype=np.float64)
+    return [resampled(t, s.channels[name], grid) for t, (s, name) in zip(clocks, channels, strict=True)]
+
+
+def _beside_accelerometer(recording: Recording, stream: Stream) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return the recording with the angular velocity in S where it is in the axes of its stream's accelerometer.
+
+    One inertial unit has one set of axes, and its drivers write both in those: f' = -omega x f at rest, in them.
+    """
+    felt = stream_of(recording, "force")
+    if felt is None or "specific_force" not in stream.channels or "W" in (
+        stream.frames.get("angular_velocity"), felt.frames.get("force")
+    ):  # fmt: skip
+        return recording, ()
+    rows = _on_one_clock((stream, "angular_velocity"), (stream, "specific_force"), (felt, "force"))
+    if rows is None:
+        return recording, ()
+    force = recording.wrench_sign * (rows[2] if felt.turn is None else felt.turn.apply(rows[2]))
+    mount = first_mount(rows[1], None, force) if stream.turn is None else stream.turn
+    slow = lowpass(np.concatenate(rows[:2], 1), CUTOFF_HZ, _RATE_HZ, order=2)
+    shown, pull = slow[:, :3], slow[:, 3:]
+    change = np.gradient(pull, 1 / _RATE_HZ, axis=0)
+    left, given = (_share(change, np.cross(pull, omega)) for omega in (shown, mount.inverse().apply(shown)))
+    if left > FOLLOWED or given - left < UNLIKE:
+        return recording, ()
+    text = (
+        f"The gyroscope of '{stream.name}' is in the axes of its accelerometer, turned by "
+        f"{np.degrees(float(mount.angle())):.1f} degrees against S: so read, {percent(left)} of the square of how "
+        f"gravity turns is left instead of {percent(given)}. The answer assumes this."
+    )
+    remedy = "Turn the angular velocity into the axes of S beforehand, or record orientations."
+    return _read(recording, stream, 1.0, "S", mount), (Finding("imu-rotated", text, remedy),)
+
+
+def _share(shown: Array, meant: Array) -> float:
+    """Return the share of the square of angular velocities (N, 3) that others leave."""
+    size = float((shown**2).sum())
+    return float(((shown - meant) ** 2).sum()) / size if size > 0 else 0.0
+
+
+def _mount(shown: Array, omega: Array) -> Rotation | None:
+    """Return the turn of the gyroscope's axes into S, None where the turns are about one axis."""
+    match = omega.T @ shown
+    sizes = np.linalg.svd(match, compute_uv=False)
+    return Rotation.aligning(match) if sizes[1] > _SECOND * sizes[0] else None
+
+
+def _text(what: str, left: float, unlike: float) -> str:
+    return (
+        f"{what}: so read, {percent(left)} of its square is unlike that of the rotations instead of {percent(unlike)}."
+    )
+
+
+def _read(recording: Recording, old: Stream, factor: float, frame: str, mount: Rotation | None = None) -> Recording:
+    """Return the recording with the angular velocity of a stream times a factor, in a frame, or turned into S."""
+    values = factor * old.channels["angular_velocity"]
+    channels = {**old.channels, "angular_velocity": values if mount is None else mount.apply(values)}
+    new = replace(old, channels=channels, frames={**old.frames, "angular_velocity": frame})
+    return replace(recording, streams=tuple(new if stream is old else stream for stream in recording.streams))

@@ -8,26 +8,212 @@ from __future__ import annotations
 
 from dataclasses import replace
 
+import numpy as np
+
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.logs.clipping import NOISE_SHARE, clipped_rows, left_out, noise_shares, saturated, with_neighbours
 from steelyard.logs.recording import Recording, Stream
-from steelyard.logs.repeated_rows import rising
-from steelyard.sanity.rows.clipped_rows import clipped_table, known_gravity, without_clipped
-from steelyard.sanity.rows.frozen_rows import without_frozen
-from steelyard.sanity.rows.repeated_rows import repeated_in_tables, without_repeats
+from steelyard.logs.repeated_rows import NOISY, columns_of, repeats, rising
+from steelyard.logs.runs import around, lasting, runs
+from steelyard.spatial import cross_matrix
+
+# A channel is frozen when it holds still for this long although it never else does.
+FROZEN_ROWS, FROZEN_S = 50, 0.25
+
+# Rows in which gravity and forces are the same to so small a share of themselves repeat a pose without noise.
+SAME_PULL = 1e-6
+_MEASURED = ("force", "torque", "specific_force", "angular_velocity")
 
 
 def examine_rows(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
     """Return the recording without repeated, frozen and clipped rows and with rising clocks, and what was found."""
     tables = all(s.time is None for s in recording.streams)
     if tables:
-        recording, findings = repeated_in_tables(recording)
+        recording, findings = _repeated_in_tables(recording)
         gravity = known_gravity(recording)
         return recording, (*findings, *(f for s in recording.streams for f in clipped_table(s, gravity)))
     streams: list[Stream] = []
     found: list[Finding] = []
     for stream in recording.streams:
-        for step in (without_repeats, without_clipped, without_frozen):
+        for step in (_without_repeats, without_clipped, without_frozen):
             stream, findings = step(stream)
             found.extend(findings)
         streams.append(rising(stream))
     return replace(recording, streams=tuple(streams)), tuple(found)
+
+
+def _without_repeats(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
+    """Return the stream with each repeated row once, where rows repeat more often than its quantum explains."""
+    again, stamped = repeats(stream)
+    if not again.any():
+        return stream, ()
+    count = int(again.sum())
+    message = (
+        f"{count} of {len(stream)} rows of '{stream.name}' ({100 * count / len(stream):.0f} %) repeat the row before "
+        f"in every channel{_with_stamps(stamped, count)}; each was used once."
+    )
+    return stream.rows(~again), (Finding.of("rows-duplicated", message),)
+
+
+def _with_stamps(stamped: int, count: int) -> str:
+    if stamped == 0:
+        return ""
+    return ", with the same stamp" if stamped == count else f", {stamped} of them with the same stamp"
+
+
+def _repeated_in_tables(recording: Recording) -> tuple[Recording, tuple[Finding, ...]]:
+    """Return tables without rows that come again anywhere in all streams together."""
+    if len({len(s) for s in recording.streams}) != 1 or len(recording.streams[0]) < 4:
+        return recording, ()
+    together = np.concatenate([columns_of(s) for s in recording.streams], 1)
+    _, first = np.unique(together, axis=0, return_index=True)
+    count = len(together) - len(first)
+    if count < max(2, 0.05 * len(together)):
+        return recording, ()
+    rows = np.zeros(len(together), bool)
+    rows[first] = True
+    message = (
+        f"{count} of {len(together)} rows ({100 * count / len(together):.0f} %) repeat an earlier row in every "
+        "channel; each was used once."
+    )
+    streams = tuple(s.rows(rows) for s in recording.streams)
+    return replace(recording, streams=streams), (Finding.of("rows-duplicated", message),)
+
+
+def without_frozen(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
+    """Return the stream without stretches in which a channel stood still although nothing else says rest."""
+    found: list[tuple[str, str]] = []
+    if stream.time is None or len(stream) < 4 * FROZEN_ROWS:
+        return stream, ()
+    frozen = _hung_rows(stream)
+    if frozen.any():
+        found.append(("every channel", f"stands still in {int(frozen.sum())} of {len(frozen)} rows and jumps after"))
+    for quantity in (q for q in NOISY if q in stream.channels):
+        values = stream.channels[quantity]
+        same = values[1:] == values[:-1]
+        dead, noisy = _dead(values), noise_shares(values) > NOISE_SHARE
+        for axis in range(3):
+            name = f"{quantity} {'xyz'[axis]}"
+            others = np.delete(np.arange(3), axis)
+            rows = _frozen_rows(values[:, axis], stream.time) & ~frozen & noisy[others].any()
+            if dead[axis]:
+                found.append((name, "does not change at all while its neighbours do"))
+            elif rows.any() and (same[rows[1:]][:, others].mean(0) < 0.5).any():
+                found.append((name, f"stands still in {int(rows.sum())} of {len(rows)} rows and nowhere else"))
+                frozen |= rows
+    rest, then = left_out(stream, frozen)
+    words = [(f"{name[0].upper()}{name[1:]} of '{stream.name}' {what}", what) for name, what in found]
+    done = [(text, "it was not used" if "at all" in what else then) for text, what in words]
+    return rest, tuple(Finding.of("channel-stuck", f"{text}; {end}.") for text, end in done)
+
+
+def dead_channels(recording: Recording) -> tuple[bool, ...]:
+    """Return which channels (6,) [tau, f] of the wrench never change while their neighbours do.
+
+    Where the wrench is not given in the axes of S, a dead channel is none of the six, and none is returned.
+    """
+    dead = np.array(recording.dead)
+    for stream in (s for s in recording.streams if "force" in s.channels and s.time is not None):
+        if stream.turn is not None or len(stream) < 4 * FROZEN_ROWS:
+            continue
+        for k, quantity in enumerate(("torque", "force")):
+            if quantity in stream.channels and stream.frames.get(quantity, "S") == "S":
+                dead[3 * k : 3 * k + 3] |= _dead(stream.channels[quantity])
+        if stream.arm is not None:
+            # Moments about the S origin take from the force.
+            dead[:3] |= (cross_matrix(stream.arm) != 0) @ dead[3:]
+    return tuple(bool(d) for d in dead)
+
+
+def _dead(values: Array) -> Mask:
+    """Return which of three channels (N, 3) never change while one beside them carries noise."""
+    same = (values[1:] == values[:-1]).mean(0)
+    lively = (same < 0.3) & (noise_shares(values) > NOISE_SHARE)
+    return np.asarray((values == values[0]).all(0) & lively.any())
+
+
+def _hung_rows(stream: Stream) -> Mask:
+    """Return rows (N,) in which a noisy stream repeats one row for long and then jumps, as a hung driver does."""
+    values, none = columns_of(stream), np.zeros(len(stream), bool)
+    if not set(NOISY) & set(stream.channels) or stream.time is None or not values.shape[1]:
+        return none
+    same = (values[1:] == values[:-1]).all(1)
+    long = lasting(same, _rows_needed(stream.time))
+    held = runs(long)
+    if not 1 <= len(held) <= 3 or same[~long].mean() > 0.05:
+        return none
+    steps = np.abs(np.diff(values, axis=0))
+    typical = np.maximum(np.median(steps[~long], 0), 1e-300)
+    for start, stop in held:
+        if stop < len(steps) and (steps[stop] > 5 * typical).any():
+            none[start : stop + 1] = True
+    return none
+
+
+def _frozen_rows(column: Array, time: Array) -> Mask:
+    """Return rows (N,) of runs of one value that are long, in a channel that moves on everywhere else."""
+    same = column[1:] == column[:-1]
+    long = lasting(same, _rows_needed(time))
+    if not long.any():
+        return np.zeros(len(column), bool)
+    elsewhere = same[~long]
+    blocks = max(len(elsewhere) // FROZEN_ROWS, 1)
+    if len(elsewhere) < FROZEN_ROWS or max(b.mean() for b in np.array_split(elsewhere, blocks)) > 0.5:
+        return np.zeros(len(column), bool)
+    return around(long)
+
+
+def _rows_needed(time: Array) -> float:
+    return max(FROZEN_ROWS, FROZEN_S * (len(time) - 1) / max(float(time[-1] - time[0]), 1e-9))
+
+
+def without_clipped(stream: Stream) -> tuple[Stream, tuple[Finding, ...]]:
+    """Return the stream without rows at the end of a channel's range."""
+    found: list[tuple[str, int, float, int]] = []
+    clipped = np.zeros(len(stream), bool)
+    for quantity in (q for q in _MEASURED if q in stream.channels):
+        values = stream.channels[quantity]
+        noisy = noise_shares(values) > NOISE_SHARE
+        for axis in np.flatnonzero(noisy).tolist():
+            for extreme in (values[:, axis].min(), values[:, axis].max()):
+                rows = clipped_rows(values[:, axis], float(extreme))
+                if rows.any():
+                    found.append((quantity, axis, float(extreme), int(rows.sum())))
+                    clipped |= rows
+    rest, then = left_out(stream, with_neighbours(clipped))
+    return rest, tuple(saturated(stream.name, *each, len(stream), then) for each in found)
+
+
+def clipped_table(stream: Stream, gravity: Array | None) -> list[Finding]:
+    """Return a finding for each wrench channel of a table whose extreme value comes again and no other does.
+
+    gravity  (N, 3) in S; rows of which it asks the same value are no clipped ones. None where it is not known
+    """
+    out = []
+    for quantity in (q for q in ("force", "torque") if q in stream.channels and len(stream) >= 8):
+        for axis, column in enumerate(stream.channels[quantity].T):
+            values, counts = np.unique(column, return_counts=True)
+            for end in (0, -1):
+                if len(values) > 4 and counts[end] >= 3 and counts[1:-1].max() == 1:
+                    at = column == values[end]
+                    if not _same_pull(stream, at, gravity):
+                        extreme, rows = values[end], int(at.sum())
+                        out.append(saturated(stream.name, quantity, axis, extreme, rows, len(stream), "check them"))
+    return out
+
+
+def _same_pull(stream: Stream, at: Mask, gravity: Array | None) -> bool:
+    """Tell whether rows `at` (N,) are repeats of one pose without noise: gravity (N, 3) and all forces agree."""
+    if gravity is None or "force" not in stream.channels:
+        return False
+    alike = (np.ptp(values[at], axis=0).max() / np.abs(values).max() for values in (gravity, stream.channels["force"]))
+    return all(share < SAME_PULL for share in alike)
+
+
+def known_gravity(recording: Recording) -> Array | None:
+    """Return gravity in S (N, 3) where rotations or a channel tell it in every row."""
+    found = {q: v for s in recording.streams for q, v in s.channels.items()}
+    if "rotation" in found and np.isfinite(found["rotation"]).all():
+        return np.asarray(np.swapaxes(found["rotation"], 1, 2) @ recording.gravity)
+    return found.get("gravity")

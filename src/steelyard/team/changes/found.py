@@ -2,6 +2,9 @@
 
 First the rows in which a robot pushes with nothing are left out, then those stay out in which it is not where the
 others say. Then slips, the clearest first, each judged anew by a fit without what follows it.
+Whose grasp slipped, in a team of two, motion does not show: the wrenches tell. If the grasp of one slipped the payload
+stayed where the other held it, and its weight acts from there; the two explanations put the centre of mass apart by the
+slip.
 """
 
 from __future__ import annotations
@@ -12,12 +15,12 @@ from functools import partial
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
-from steelyard.logs.log import Mask
+from steelyard.check import FAILURES, Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.changes.presence import LIGHT, SHARE, as_long, idle, let_go, presence_findings, strayers
-from steelyard.team.changes.slips import SlipAt
+from steelyard.team.changes.slips import Slip
 from steelyard.team.clocks.errors import NOTHING
+from steelyard.team.estimate import TeamEstimate
 from steelyard.team.motion_fit import F
 from steelyard.team.stacked import Stretch
 
@@ -27,6 +30,9 @@ MOST_SLIPS = 3
 BETTER = 3.0
 
 Edit = Callable[[tuple[Stretch, ...]], tuple[Stretch, ...]]
+# Residuals of forces times those of torques, beside the other explanation's, from which on the wrenches tell.
+TOLD = 1.25
+DOUBT = "It may have been the other robot's: of two, only wrenches tell, and not here."
 
 
 def without_changes(
@@ -47,7 +53,12 @@ def without_changes(
         return _without_slips(log, clocks, given, fitted, _unchanged, other)
     resting, team = asked
     off = team.off(log)
-    edit = partial(_gone, bare=bare, light=resting, off=off, strays=strayers(raw, resting, off))
+    strays = strayers(raw, resting, off)
+
+    def edit(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
+        each = zip(parts, bare, resting, off, strict=True)
+        return tuple(let_go(part, rows, light, apart, strays) for part, rows, light, apart in each)
+
     found = presence_findings(raw, edit(raw), log.names)
     team = _without_slips(log, clocks, fitted(edit), fitted, edit, other)
     return replace(team, findings=(*found, *team.findings))
@@ -79,13 +90,6 @@ def _asked(bare: Sequence[Mask], light: Sequence[Mask], fitted: Callable[[Edit],
     return best
 
 
-def _gone(
-    parts: tuple[Stretch, ...], bare: Sequence[Mask], light: Sequence[Mask], off: Sequence[Array], strays: Mask
-) -> tuple[Stretch, ...]:
-    """Return recordings with robots let go that push with little and are `off`, as in `let_go`."""
-    return tuple(let_go(p, b, x, o, strays) for p, b, x, o in zip(parts, bare, light, off, strict=True))
-
-
 def _without_slips(
     log: TeamLog, clocks: bool, given: F, fitted: Callable[[Edit], F], edit: Edit, other: Sequence[bool]
 ) -> F:
@@ -93,14 +97,14 @@ def _without_slips(
 
     Clocks are judged before: one that is set anew passes for slips.
     """
-    team, slips = given, list[SlipAt]()
+    team, slips = given, list[Slip]()
     left = given.clock_errors(log) if clocks else NOTHING
     for _ in range(MOST_SLIPS):
         found = team.slip(log)
         if found is None:
             break
         if any(other[len(slips) : len(slips) + 1]):
-            found = replace(found, slip=replace(found.slip, robot=1 - found.slip.robot))
+            found = replace(found, robot=1 - found.robot)
         # Once more without what follows the slip, which has bent the first fit.
         before, again = team, edited(edit, [*slips, found])
         try:
@@ -113,7 +117,7 @@ def _without_slips(
             break
         measured = team.measured(log, found.beside(slips))
         # What bends the first fit looks larger in it.
-        if not measured.slip.large:
+        if not measured.large:
             break
         slips.append(measured)
     if not slips:
@@ -122,7 +126,7 @@ def _without_slips(
     return replace(team, findings=tuple(slip.finding(log) for slip in slips), clocks_left=left)
 
 
-def edited(edit: Edit, slips: Sequence[SlipAt]) -> Edit:
+def edited(edit: Edit, slips: Sequence[Slip]) -> Edit:
     """Return an edit of recordings after which slips are taken out too."""
 
     def both(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
@@ -140,3 +144,46 @@ def _unchanged(parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
 
 def _unseen(parts: tuple[Stretch, ...], rows: Sequence[Mask]) -> tuple[Stretch, ...]:
     return tuple(replace(p, seen=p.seen & ~as_long(r, len(p))) for p, r in zip(parts, rows, strict=True))
+
+
+Other = tuple[bool, ...]
+
+
+def whose_slip(log: TeamLog, answer: Callable[[Other], TeamEstimate]) -> TeamEstimate:
+    """Return the answer of a team with every slip taken for that of the robot with which the wrenches fit best.
+
+    answer  makes it with some slips, of those that motion shows, the clearest first, taken for the other robot's
+    """
+    found = answer(())
+    if len(log.names) != 2:
+        return found
+    chosen: Other = ()
+    doubtful = []
+    for number in range(sum(finding.code == "grasp-slipped" for finding in found.findings)):
+        try:
+            turned = answer((*chosen, True))
+        except FAILURES:
+            chosen = (*chosen, False)
+            continue
+        better = _misfit(found) / max(_misfit(turned), np.finfo(float).tiny)
+        chosen = (*chosen, better > 1)
+        found = turned if better > 1 else found
+        if 1 / TOLD < better < TOLD:
+            doubtful.append(number)
+    return _doubted(found, doubtful)
+
+
+def _misfit(found: TeamEstimate) -> float:
+    return found.evidence.residual_force_N * found.evidence.residual_torque_Nm
+
+
+def _doubted(found: TeamEstimate, doubtful: Sequence[int]) -> TeamEstimate:
+    """Return the answer with a word at some of its slips, by number, that they may be the other robot's."""
+    findings, number = [], 0
+    for finding in found.findings:
+        if finding.code == "grasp-slipped":
+            if number in doubtful:
+                finding = replace(finding, message=f"{finding.message} {DOUBT}")
+            number += 1
+        findings.append(finding)
+    return replace(found, findings=tuple(findings))

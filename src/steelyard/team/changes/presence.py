@@ -12,9 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.log import Mask
 from steelyard.logs.runs import lasting, runs
 from steelyard.team.payload.body_rows import averaged
 from steelyard.team.stacked import Stretch

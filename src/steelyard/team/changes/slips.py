@@ -14,9 +14,8 @@ import numba
 import numpy as np
 from scipy.special import gammainccinv
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Rotation
 from steelyard.team.stacked import Stretch
@@ -32,66 +31,63 @@ FILLED = 0.5
 CLEAR_S = 0.2
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Slip:
-    """A step of robot `robot` at row `row` of its recording, by `distance` [m] and `angle` [rad]."""
+    """A slip of robot `robot` in one recording at `time` [s].
+
+    step   (6,) rotation vector and position of the grasp after it, in its own axes
+    told   whether the step is known by a fit without what follows it; else the rows after it are left out of everything
+    A time of -inf is before the recording, and after recording `since`; that is the one before unless it is given. It
+    is timed before `until` [s].
+    """
 
     robot: int
-    row: int
-    distance: float
-    angle: float
+    recording: int
+    time: float
+    step: Array
     score: float
+    told: bool = False
+    since: int | None = None
+    until: float = np.inf
+
+    @property
+    def distance(self) -> float:
+        """How far the grasp moves [m]."""
+        return float(np.linalg.norm(self.step[3:]))
+
+    @property
+    def angle(self) -> float:
+        """How far it turns [rad]."""
+        return float(np.linalg.norm(self.step[:3]))
 
     @property
     def large(self) -> bool:
         """Whether the step is one that counts."""
         return self.distance > LEAST_M or self.angle > LEAST_RAD
 
-    @classmethod
-    def of(cls, robot: int, row: int, step: Array, score: float) -> Slip:
-        """Return the slip by a step (6,), rotation vector and position."""
-        return cls(robot, row, float(np.linalg.norm(step[3:])), float(np.linalg.norm(step[:3])), score)
-
-
-@dataclass(frozen=True, eq=False)
-class SlipAt:
-    """A slip in one recording at `time` [s]; `step` (6,) rotation and position of the grasp after it, in its own axes.
-
-    Without a step the rows after it are left out of everything. A time of -inf is before the recording, and after
-    recording `since`; that is the one before unless it is given. It is timed before `until` [s].
-    """
-
-    recording: int
-    time: float
-    slip: Slip
-    step: Array | None = None
-    since: int | None = None
-    until: float = np.inf
-
     @property
     def between(self) -> bool:
         """Whether the grasp slipped before the recording began."""
         return not np.isfinite(self.time)
 
-    def renewed(self, apart: Array, seen: Mask, part: Stretch, noise: Array, drifts: bool = False) -> SlipAt:
+    def renewed(self, part: Stretch, apart: Array, noise: Array, drifts: bool) -> Slip:
         """Return the slip from the residuals (T, 6) of its robot against the others' motion, as `find_slip`."""
-        seen = seen & (part.time < self.until)
+        seen = part.seen[:, self.robot] & (part.time < self.until)
         score, step = _steps(apart, seen, *_window(part.rate, drifts), noise)
         row = int(np.argmax(score))
         middle = part.time[row]
         after, before = seen & (part.time > middle + GAP_S), seen & (part.time < middle - GAP_S)
         full = step[row] if drifts else apart[after].mean(0) - apart[before].mean(0)
-        slip = Slip.of(self.slip.robot, row, full, float(score[row]))
-        return replace(self, time=float(middle), slip=slip, step=full)
+        return replace(self, time=float(middle), step=full, score=float(score[row]), told=True)
 
-    def beside(self, slips: Sequence[SlipAt]) -> SlipAt:
+    def beside(self, slips: Sequence[Slip]) -> Slip:
         """Return the slip, to be timed before others of its robot in its recording: they are clear, and known."""
-        own = (slip.time for slip in slips if (slip.recording, slip.slip.robot) == (self.recording, self.slip.robot))
+        own = (slip.time for slip in slips if (slip.recording, slip.robot) == (self.recording, self.robot))
         return replace(self, until=min(own, default=np.inf))
 
     def applied(self, parts: tuple[Stretch, ...]) -> tuple[Stretch, ...]:
         """Return the recordings without the slipped grasp's poses from then on, its wrench moved to where it was."""
-        out, robot = list(parts), self.slip.robot
+        out, robot = list(parts), self.robot
         for number in range(self.recording, len(parts)):
             part = parts[number]
             after, near = np.ones(len(part), np.bool_), np.zeros(len(part), np.bool_)
@@ -101,7 +97,7 @@ class SlipAt:
             seen, felt, wrench = part.seen.copy(), part.felt.copy(), part.wrench.copy()
             seen[after | near, robot] = False
             felt[near, robot] = False
-            if self.step is None:
+            if not self.told:
                 felt[after, robot] = False
             else:
                 turn = Rotation.exp(self.step[:3])
@@ -113,11 +109,11 @@ class SlipAt:
 
     def finding(self, log: TeamLog) -> Finding:
         """Return the finding with robot, time and size."""
-        name, record = log.names[self.slip.robot], log.recordings[self.recording].name
-        size = f"{1e3 * self.slip.distance:.1f} mm and {np.rad2deg(self.slip.angle):.2f} deg"
+        name, record = log.names[self.robot], log.recordings[self.recording].name
+        size = f"{1e3 * self.distance:.1f} mm and {np.rad2deg(self.angle):.2f} deg"
         if self.between:
             before = log.recordings[self.recording - 1 if self.since is None else self.since].name
-            base = "" if log.robots[self.slip.robot].base == "moving" else ", or its base was moved,"
+            base = "" if log.robots[self.robot].base == "moving" else ", or its base was moved,"
             what = f"The grasp of '{name}' slipped by {size}{base} between '{before}' and '{record}'"
         else:
             what = f"The grasp of '{name}' slipped by {size} at {self.time:.2f} s of '{record}'"
@@ -127,17 +123,9 @@ class SlipAt:
         )
 
 
-def clearest(found: Iterable[SlipAt | None]) -> SlipAt | None:
+def clearest(found: Iterable[Slip | None]) -> Slip | None:
     """Return the slip of the highest score, None where there is none."""
-    return max((slip for slip in found if slip is not None), key=lambda slip: slip.slip.score, default=None)
-
-
-def slip_within(
-    number: int, part: Stretch, apart: Array, seen: Mask, noise: Array, drifts: bool = False
-) -> SlipAt | None:
-    """Return the clearest slip of recording `number`, None where there is none; the others as of `find_slip`."""
-    slip = find_slip(apart, seen, part.rate, noise, drifts)
-    return None if slip is None else SlipAt(number, float(part.time[slip.row]), slip)
+    return max((slip for slip in found if slip is not None), key=lambda slip: slip.score, default=None)
 
 
 def alone(residual: Array, J: Array, W: Array) -> Array:
@@ -178,29 +166,27 @@ def noise_alone(J: Array, W: Array) -> Array:
     return np.asarray(out)
 
 
-def find_slip(apart: Array, seen: Mask, rate: float, noise: Array, drifts: bool = False) -> Slip | None:
-    """Return the clearest slip of one recording, None where there is none.
+def find_slip(number: int, part: Stretch, apart: Array, noise: Array, drifts: bool = False) -> Slip | None:
+    """Return the clearest slip of recording `number`, None where there is none.
 
     apart   (T, N, 6) rotation vector and position of each grasp against what the others say
     noise   (N, 6, 6) of a row of it, as far as its directions go
     drifts  whether rows far apart in time differ by more than a slip, as added up twists do
     """
-    width, gap = _window(rate, drifts)
-    rows, count = seen.shape
+    width, gap = _window(part.rate, drifts)
+    rows, count = part.seen.shape
     if rows < 4 * (width + gap) or count < 2:
         return None
-    best: Slip | None = None
+    found = list[Slip]()
     # One who is seen alone is where he says, exactly.
-    seen = seen & (seen.sum(1, keepdims=True) > 1)
+    seen = part.seen & (part.seen.sum(1, keepdims=True) > 1)
     # Every row of every robot is a look; a chi-square of six numbers.
     threshold = float(2 * gammainccinv(3.0, CHANCE / (rows * count)))
     for i in range(count):
         score, step = _steps(apart[:, i], seen[:, i], width, gap, noise[i])
         row = int(np.argmax(score))
-        slip = Slip.of(i, row, step[row], float(score[row]))
-        if slip.score > threshold and slip.large and (best is None or slip.score > best.score):
-            best = slip
-    return best
+        found.append(Slip(i, number, float(part.time[row]), step[row], float(score[row])))
+    return clearest(slip for slip in found if slip.score > threshold and slip.large)
 
 
 def _window(rate: float, drifts: bool) -> tuple[int, int]:

@@ -10,7 +10,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.logs.team_log import TeamLog, TeamRecording
-from steelyard.team.clocks.steps import Step
 
 # A difference is worth a word from so many standard deviations and so much [s], or [s/s].
 BEYOND, LEAST_S, LEAST_RATE = 6.0, 1e-4, 1e-6
@@ -56,6 +55,16 @@ PUNCTUAL = ClockError()
 
 # By robot; others are punctual.
 Errors = Mapping[str, ClockError]
+
+
+@dataclass(frozen=True)
+class Step:
+    """Stamps of `name` in one recording (its number) that are later by `size` [s] from `at` [s] on."""
+
+    recording: int
+    name: str
+    at: float
+    size: float
 
 
 @dataclass(frozen=True)

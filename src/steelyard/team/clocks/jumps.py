@@ -21,9 +21,8 @@ from steelyard.errors import BadValue
 from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors
-from steelyard.team.clocks.steps import Step
-from steelyard.team.turns import turning_speed
+from steelyard.team.adjoint import turning_speed
+from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors, Step
 
 # Shifts are looked for up to so many seconds, and a share of the recording, in steps, and jumps by so much about the
 # one that fits best throughout; speeds are those over OVER_S.
@@ -214,8 +213,10 @@ class _Split:
     @property
     def sure(self) -> bool:
         far = abs(self.after - self.before) > JUMPS_S
-        # What a steady drift leaves takes longest to tell, and is asked last.
-        return far and self.fits > FITS and self.left < LEFT and _steady(self.cost) > BETTER * self.both
+        if not (far and self.fits > FITS and self.left < LEFT):
+            return False
+        # A shift that grows or falls steadily, by up to all that is looked for, leaves much more.
+        return min((left for left, _, _ in _lines(self.cost, len(self.cost) - 1)), default=np.inf) > BETTER * self.both
 
 
 def _split(x: Array, y: Array, common: int, most: int) -> _Split | None:
@@ -264,11 +265,6 @@ def _costs(x: Array, y: Array, most: int, width: int) -> Array:
         for shift in range(shifts):
             out[shift, k] = total[shift]
     return out
-
-
-def _steady(cost: Array) -> float:
-    """Return the least that a shift leaves which grows or falls steadily, by up to all that is looked for."""
-    return min((left for left, _, _ in _lines(cost, len(cost) - 1)), default=np.inf)
 
 
 def _lines(cost: Array, most: int) -> Iterator[tuple[float, int, int]]:

@@ -3,26 +3,28 @@
 What is left of a grasp's poses or twists, along how they move, is how late its stamps are beside the offset that all
 recordings share: e_i = s_i (late_i + rate_i (t - middle)), with the payload's motion, which all robots see, taken out.
 Standard deviations come from the scores of stretches of each recording, so that slow noise does not pass for a clock.
+A jump too small to show in how fast robots turn is a step of how late a fit finds the stamps: beside an offset and a
+rate of every clock, one that steps at some time explains what the fit leaves by so many standard deviations. These hold
+for slow noise, since they are those of long stretches. Where it stepped, short ones tell.
 Source: own.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
-from steelyard.logs.log import Integers, Mask
+from steelyard.check import FAILURES, Array, Integers
 from steelyard.logs.runs import distinct_rows
 from steelyard.logs.team_log import TeamLog
-from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors
+from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Step
 from steelyard.team.clocks.jumps import LEAST_S as PART_S
 from steelyard.team.clocks.jumps import MOST, cut_at_step
-from steelyard.team.clocks.steps import Best, Step, clearest
 from steelyard.team.motion_fit import F
 from steelyard.team.scores import Scores
+from steelyard.team.stacked import Stretch
 
 # Stretches of a recording whose scores tell the standard deviations, and rows that a recording must have.
 STRETCHES, ROWS = 20, 100
@@ -32,21 +34,9 @@ STEP_S = 0.1
 # One that is called so is put right until less than SETTLED standard deviations are left, at most so many times.
 BEYOND, LEAST_S, LEAST_RATE = 8.0, 1e-4, 1e-6
 SETTLED, ROUNDS = 0.5, 6
-
-
-@dataclass(frozen=True, eq=False)
-class Left:
-    """What a fit leaves of one recording.
-
-    time   (T,) [s]                  seen  (T, N)
-    apart  (T, N, 6) residuals of each grasp in its own axes
-    slope  (T, N, 6) residuals per second that the robot's stamps are late
-    """
-
-    time: Array
-    seen: Mask
-    apart: Array
-    slope: Array
+# A clock steps by so much [s] at least, and beyond so many standard deviations; this share of what is known of it comes
+# from either side: of rests, noise alone tells, and amiss.
+STEP_LEAST_S, STEP_BEYOND, EITHER = 5e-4, 8.0, 0.08
 
 
 def steadied(
@@ -70,7 +60,8 @@ def steadied(
     for _ in range(ROUNDS):
         called = called.joined(team.clocks_left)
         wrong = called.of(team.clocks_left)
-        if not any(_unsettled(error) for each in wrong.recordings for error in each.values()):
+        every = [error for each in wrong.recordings for error in each.values()]
+        if all(abs(e.late) <= SETTLED * e.late_std and abs(e.rate) <= SETTLED * e.rate_std for e in every):
             break
         try:
             moved = wrong.corrected(log)
@@ -107,18 +98,19 @@ class _Called:
         ))  # fmt: skip
 
 
-def _unsettled(error: ClockError) -> bool:
-    return abs(error.late) > SETTLED * error.late_std or abs(error.rate) > SETTLED * error.rate_std
-
-
-def clock_errors(log: TeamLog, parts: tuple[Left, ...], J: Array, W: Array) -> ClockErrors:
+def clock_errors(
+    log: TeamLog, left: Iterable[tuple[Stretch, Array]], slopes: Iterable[Array], J: Array, W: Array
+) -> ClockErrors:
     """Return what clocks seem to be off by, recording by recording, against the reference's.
 
-    J  (N, 6, 6) residuals per motion of the payload      W  (N, 6) their weights
+    left    rows of every recording, and residuals (T, N, 6) of each grasp in its own axes
+    slopes  (T, N, 6) residuals per second that the robot's stamps are late, of every recording
+    J       (N, 6, 6) residuals per motion of the payload     W  (N, 6) their weights
     """
-    told: list[_Told | None] = [
-        None if recording.kind == "still" else _Told.of(part, J, W, log.names.index(log.reference))
-        for recording, part in zip(log.recordings, parts, strict=True)
+    reference = log.names.index(log.reference)
+    told = [
+        None if part.kind == "still" else _Told.of(part, apart, slope, J, W, reference)
+        for (part, apart), slope in zip(left, slopes, strict=True)
     ]
     steps = [step for k, one in enumerate(told) if one is not None and (step := one.step(k, log.names)) is not None]
     return ClockErrors(tuple({} if one is None else one.errors(log.names) for one in told), steps[0] if steps else None)
@@ -129,7 +121,7 @@ class _Told:
     """What the rows of one recording that most often see the same robots tell of their clocks.
 
     robots  (n,) numbers of those     base  which of them clocks are told against
-    time    (T,) [s] of those rows    apart, slope  (T, n, 6) as in `Left`
+    time    (T,) [s] of those rows    apart, slope  (T, n, 6) as of `clock_errors`
     J, W    of those robots
     scores  of offsets, and of rates per half of the recording [s], of all robots in turn
     common  (2 n, 2 n) information on what all clocks have in common: it moves the motion along itself
@@ -148,7 +140,7 @@ class _Told:
     common: Array
 
     @classmethod
-    def of(cls, part: Left, J: Array, W: Array, reference: int) -> _Told | None:
+    def of(cls, part: Stretch, apart: Array, slope: Array, J: Array, W: Array, reference: int) -> _Told | None:
         """Return what is told, None where rows or robots are too few."""
         found, which = distinct_rows(part.seen)
         most = int(np.argmax(np.bincount(which) * (found.sum(1) > 1)))
@@ -157,7 +149,7 @@ class _Told:
             return None
         middle, half = 0.5 * float(part.time[0] + part.time[-1]), 0.5 * float(part.time[-1] - part.time[0])
         time, some = part.time[rows], len(robots)
-        apart, slope = part.apart[rows][:, robots], part.slope[rows][:, robots]
+        apart, slope = apart[rows][:, robots], slope[rows][:, robots]
         columns = np.concatenate([slope, slope * ((time - middle) / half)[:, None, None]], axis=1)
         scores = Scores.of(apart, columns, np.tile(np.arange(some), 2), J[robots], W[robots], STRETCHES)
         common = np.kron(np.eye(2), np.ones((some, some))) * np.trace(scores.information.sum(0)) / (2 * some)
@@ -200,3 +192,47 @@ class _Told:
         at = np.array([rows.mean() for rows in np.array_split((self.time - self.middle) / self.half, stretches)])
         some = len(self.robots)
         return clearest(scores.pull[:, :some], scores.information[:, :some, :some], at, held)
+
+
+@dataclass(frozen=True)
+class Best:
+    """The clearest step: of which robot, from which stretch on, its size [s], and its share of its own noise."""
+
+    robot: int
+    first: int
+    size: float
+    score: float
+
+    @property
+    def sure(self) -> bool:
+        """Whether it is no noise."""
+        return abs(self.size) > STEP_LEAST_S and self.score > STEP_BEYOND
+
+
+def clearest(pull: Array, information: Array, at: Array, held: Array) -> Best:
+    """Return the clearest step of one clock beside offsets and rates of all.
+
+    pull         (B, n) scores of how late each of n robots is, by stretches in order
+    information  (B, n, n) theirs
+    at           (B,) the stretches' times, -1 to 1
+    held         (n, n) information on what all have in common, which nothing shows
+    """
+    count = pull.shape[1]
+    powers = np.stack([np.ones_like(at), at], axis=1)
+    # Columns of offset and rate by robots: (B, n, 2 n).
+    beside = (information[:, :, None] * powers[:, None, :, None]).reshape(len(at), count, -1)
+    H = np.einsum("bp,bic->pic", powers, beside).reshape(2 * count, -1) + np.kron(np.eye(2), held)
+    inverse = np.linalg.pinv(H, rcond=1e-12, hermitian=True)
+    left = pull - beside @ (inverse @ (powers.T @ pull).ravel())
+    # A step from every stretch on: (B, n, ...), the first being an offset.
+    after = [np.cumsum(x[::-1], axis=0)[::-1][1:] for x in (left, beside, np.einsum("bii->bi", information))]
+    known = after[2] - ((after[1] @ inverse) * after[1]).sum(-1)
+    share = after[2] / np.maximum(np.einsum("bii->i", information), 1e-300)
+    known = np.where((share > EITHER) & (share < 1 - EITHER) & (known > 1e-9 * after[2]), known, np.inf)
+    k, i = np.unravel_index(int(np.argmax(after[0] ** 2 / known)), known.shape)
+    size = float(after[0][k, i] / known[k, i])
+    own = information[:, :, i] * (np.arange(len(at)) > k)[:, None] - beside @ (inverse @ after[1][k, i])
+    left = left - size * own
+    noise = np.einsum("bi,bi->i", left, left)[i] / max(float(np.einsum("bii->bi", information)[:, i].sum()), 1e-300)
+    score = abs(size) * float(np.sqrt(known[k, i] / max(noise, 1.0))) if np.isfinite(known[k, i]) else 0.0
+    return Best(int(i), int(k) + 1, size, score)

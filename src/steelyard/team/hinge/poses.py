@@ -15,14 +15,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.spatial import Pose, Rotation
 from steelyard.spatial.screws import log_pose
 from steelyard.team.adjoint import adjoint_inverse, exp
 from steelyard.team.adjoint import log as pose_log
+from steelyard.team.definite import shown_axes
 from steelyard.team.poses.measured import TeamMotion
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.solver import OWN
 
 STEPS = 30
 # A fit is done where a step lowers chi^2 by less than this and noise changes by a smaller share.
@@ -122,11 +122,6 @@ def _seen(data: TeamMotion, team: Hinged) -> tuple[Array, Array, Array]:
     along[..., :6] = adjoint_inverse(placed)
     along[..., 6][:, team.second] = adjoint_inverse(team.grasps[team.second]) @ team.screw
     return left, along, adjoint_inverse(predicted)
-
-
-def residuals(data: TeamMotion, team: Hinged) -> Array:
-    """Return rotation and position (T, N, 6) from predicted to measured in each grasp's axes, zero where not seen."""
-    return _seen(data, team)[0]
 
 
 def _slopes(team: Hinged, along: Array, turned: Array, speed: Array | None, robot: int) -> Array:
@@ -275,7 +270,7 @@ def finished(data: TeamMotion, fit: HingedFit, reference: int, speed: Array | No
     team = followed(data, fit.team.moved(step, np.zeros((rows, 7))), fit.noise, 1)
     team, spread = _centred(team, unknown, answer)
     inflated = _inflation(every, H) * inverse
-    return HingedFit(team, spread @ inflated @ spread.T, residuals(data, team), fit.noise, fit.path, lost)
+    return HingedFit(team, spread @ inflated @ spread.T, _seen(data, team)[0], fit.noise, fit.path, lost)
 
 
 def _unknown(count: int, reference: int, timed: bool) -> Integers:
@@ -289,11 +284,8 @@ def _inverse(H: Array, timed: bool) -> tuple[Array, int]:
 
     timed  whether clocks are among the unknown: what they have in common shows in nothing
     """
-    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
-    good = values > NULL * values[-1]
-    root = scale[:, None] * vectors[:, good]
-    return (root / values[good]) @ root.T, max(int((~good).sum()) - FREE - timed, 0)
+    root, values = shown_axes(H, NULL)
+    return (root / values) @ root.T, max(len(H) - root.shape[1] - FREE - timed, 0)
 
 
 def _inflation(scores: Array, H: Array) -> float:

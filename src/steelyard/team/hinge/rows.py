@@ -7,19 +7,25 @@ that H' is H turned by the hinge's angle q. About H:
 Mass on the line of the hinge turns with both bodies alike: its mass, first and second moment along the line can be
 moved from one body to the other and no wrench changes. Three of the twenty parameters are so beyond any motion, and the
 seventeen others are: ten of the whole with the hinge at zero, seven of the second body.
+Whether forces have the sign that they should is told as in `misread.signs`: what robots push against one another
+through the hinge cancels in the sum of forces too. Beside the first body's motion, that of the second, turned by the
+hinge's angle, is taken out of every force, and so is a bias that turns.
 Source: Atkeson, An, Hollerbach 1986 for L; Ayusawa, Venture, Nakamura 2014 for what floating trees of bodies show.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.findings import Finding
 from steelyard.inertia.regressor import basis
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.hinge.poses import Hinged
+from steelyard.team.misread.signs import odd_one_out
 from steelyard.team.payload.body_rows import BodyRows, Run, from_poses, summing
 from steelyard.team.payload.spectra import as_frequencies, bands, frequencies
 from steelyard.team.stacked import Stretch
@@ -34,6 +40,9 @@ for _column, _entries in enumerate(((1,), (2,), (7, 9), (4, 9), (5,), (6,), (8,)
 # What may be moved from one body to the other: mass, first and second moment along the hinge.
 EXCHANGED = np.zeros((10, 3))
 EXCHANGED[0, 0] = EXCHANGED[3, 1] = EXCHANGED[4, 2] = EXCHANGED[7, 2] = 1.0
+# Columns before the robots' forces: motion of the first body, of the second, that turned, means and means turned.
+MOTION = 12
+INNER = 4 * MOTION + 3
 
 
 def hinge_frame(team: Hinged) -> Pose:
@@ -160,3 +169,41 @@ def _rows(run: Run, other: Run, team: Hinged, sums: Sums) -> Array:
     both[:, :6, -1] = run.pushed @ sums.first.T + np.einsum("tij,tj->ti", turn, own)
     both[:, 6, -1] = own[:, 2]
     return np.concatenate([both.reshape(len(angle), -1), run.pushed, other.motion], axis=1)
+
+
+def robot_of_other_sign(
+    made: Sequence[tuple[Hinged, BodyRows, BodyRows]], sums: Sums, names: Sequence[str], highest_hz: float
+) -> tuple[int | None, tuple[Finding, ...]]:
+    """Return the robot whose sign must be turned, None where all are right, and the finding that says so.
+
+    made  of every recording, where everything is and the rows of either body
+    """
+    count = len(names)
+    each, lifted = np.zeros((count, count)), np.zeros(count)
+    for still in (True, False):
+        some = [_scatter(team, one, two, sums, highest_hz) for team, one, two in made if one.still == still]
+        if some:
+            S = np.sum(some, axis=0)
+            inner, pushes = S[:INNER, :INNER], S[INNER:, :INNER]
+            left = S[INNER:, INNER:] - pushes @ np.linalg.pinv(inner, 1e-9, hermitian=True) @ pushes.T
+            each += np.einsum("aiaj->ij", left.reshape(3, count, 3, count))
+            lifted += np.einsum("aia->i", pushes[:, 3:6].reshape(3, count, 3))
+    return odd_one_out(each, lifted, names)
+
+
+def _scatter(team: Hinged, one: BodyRows, two: BodyRows, sums: Sums, highest_hz: float) -> Array:
+    """Return the scatter of motion and forces of one recording, as far as frequencies are used."""
+    count = len(team.second)
+    out = np.zeros((INNER + 3 * count, INNER + 3 * count))
+    # (N, 3, 6): the force that each robot's push adds, with the hinge at zero.
+    forces = np.split((sums.first + sums.second)[3:], count, axis=1)
+    for run, other in zip(one.runs, two.runs, strict=True):
+        turn = about_z(team.angle[run.rows])[:, 3:, 3:]
+        pushed = np.split(run.pushed, count, axis=1)
+        force = np.stack([own @ F.T for own, F in zip(pushed, forces, strict=True)], axis=2)
+        force[..., team.second] = turn @ force[..., team.second]
+        cos, sin = turn[:, :1, 0], turn[:, 1:2, 0]
+        seen = [run.motion, other.motion, cos * other.motion, sin * other.motion, np.ones_like(cos), cos, sin]
+        z = as_frequencies([*seen, force.reshape(len(force), -1)], run, highest_hz, not one.still)
+        out += z.T @ z
+    return out

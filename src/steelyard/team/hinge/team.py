@@ -2,40 +2,44 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import Evidence
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.parameters import frame_change
 from steelyard.inertia.regressor import basis
-from steelyard.logs.log import Integers, Mask
 from steelyard.logs.team_log import TeamLog
-from steelyard.spatial import Pose, cross_matrix
+from steelyard.spatial import Pose, Rotation, axial_vector, cross_matrix
 from steelyard.team.adjoint import adjoint_inverse
-from steelyard.team.assembled import known
-from steelyard.team.consistent import consistent
+from steelyard.team.assembled import consistent, known
 from steelyard.team.estimate import BodyEstimate, GraspEstimate, HingeEstimate, TeamEstimate
-from steelyard.team.hinge.bodies import FROM_TEN, both_bodies, second_body, seen_from, seven_rows
-from steelyard.team.hinge.payload import HingedPayload, Kind, fit_hinged_payload
+from steelyard.team.hinge.payload import (
+    FROM_TEN,
+    HingedPayload,
+    Kind,
+    both_bodies,
+    fit_hinged_payload,
+    second_body,
+    seen_from,
+    seven_rows,
+)
 from steelyard.team.hinge.poses import GUESS, Hinged, HingedFit, finished, fit_hinged, followed, rates
-from steelyard.team.hinge.rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame
-from steelyard.team.hinge.signs import robot_of_other_sign
-from steelyard.team.hinge.start import first_hinged
+from steelyard.team.hinge.rows import COUNT, WHOLE, Bands, Sums, bodies_of, gathered, hinge_frame, robot_of_other_sign
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
 from steelyard.team.motion_fit import CLOCK_ROUNDS, PUNCTUAL, against, later
 from steelyard.team.payload.body_rows import BodyRows, reach, require_runs
 from steelyard.team.payload.doubt import turned_by_step
 from steelyard.team.payload.gain_sight import of_force
-from steelyard.team.payload.motion_noise import shares_of, tilt_noise
-from steelyard.team.payload.spectra import band_edges
+from steelyard.team.payload.spectra import band_edges, shares_of, tilt_noise
+from steelyard.team.poses.covariance import Spread, variances_against
 from steelyard.team.poses.measured import TeamMotion
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.solver import OWN
 from steelyard.team.poses.team import FEW_ROWS, mean_gravity
 from steelyard.team.split import Split
 from steelyard.team.stacked import Stretch, row_slices, stretches
@@ -114,7 +118,8 @@ def identify_two_bodies(
     body = InertialParameters(vector).in_frame(frame)
     change = frame_change(frame)
     outer = change @ doubt.covariance(np.eye(COUNT)[whole], payload.covariance) @ change.T
-    grasps = {name: GraspEstimate(team.grasps[i], _grasp_covariance(fit, i)) for i, name in enumerate(log.names)}
+    spread = _spread(fit, log.names.index(log.reference))
+    grasps = {name: GraspEstimate(team.grasps[i], spread.of(i)) for i, name in enumerate(log.names)}
     moment, push = payload.residual
     rows, still = (sum(p.samples for k in kinds for p in k.parts if p.still or every) for every in (True, False))
     late = against(late, log.reference)
@@ -128,7 +133,7 @@ def identify_two_bodies(
         identified=known(body, outer, units) if payload.lost.size else np.ones(10, np.bool_),
         frame=log.reference, reference=log.reference, grasps=grasps,
         clock_offsets_s=late if clocks else {},
-        clock_offset_std_s=_late_std(fit, log) if clocks else {}, hinge=hinge, findings=turned,
+        clock_offset_std_s=spread.delays(log.names) if clocks else {}, hinge=hinge, findings=turned,
         wrench_maps=maps,
     )  # fmt: skip
     return found, payload
@@ -180,19 +185,13 @@ def _largest(covariance: Array, across: Array) -> float:
     return float(np.sqrt(max(float(np.linalg.eigvalsh(across @ covariance @ across)[-1]), 0.0)))
 
 
-def _grasp_covariance(fit: HingedFit, robot: int) -> Array:
-    """Return the covariance (6, 6) of one grasp in R's axes."""
-    own = slice(OWN * robot, OWN * robot + 6)
-    turn = np.kron(np.eye(2), fit.team.grasps.rotation.matrix[robot])
-    return np.asarray(turn @ fit.covariance[own, own] @ turn.T)
-
-
-def _late_std(fit: HingedFit, log: TeamLog) -> dict[str, float]:
-    """Return the standard deviation [s] of every delay against the reference's."""
-    delay = OWN * np.arange(len(log.names)) + 12
-    C, own = fit.covariance[np.ix_(delay, delay)], log.names.index(log.reference)
-    variance = np.diag(C) + C[own, own] - 2 * C[own]
-    return {name: float(np.sqrt(max(v, 0.0))) for name, v in zip(log.names, variance, strict=True)}
+def _spread(fit: HingedFit, reference: int) -> Spread:
+    """Return the covariance of grasps and clocks."""
+    robots = OWN * np.arange(len(fit.team.second))
+    grasp, delay = (robots[:, None] + np.arange(6)).ravel(), robots + 12
+    late = np.sqrt(np.maximum(variances_against(fit.covariance[np.ix_(delay, delay)], reference), 0.0))
+    shown = fit.covariance[np.ix_(grasp, grasp)]
+    return Spread(shown, np.zeros((len(grasp), 0)), late, fit.team.grasps)
 
 
 def _kinds(
@@ -292,3 +291,44 @@ class _Doubt:
         slope = rows @ self.slope
         slope[:, -6:] += elsewhere
         return np.asarray(rows @ (known + self.gains) @ rows.T + slope @ self.steps @ slope.T)
+
+
+def from_twists(first: Array, second: Array) -> Pose:
+    """Return the pose of a grasp in another from their twists (T, 6): M in second = M first is Ad^-1 but for noise.
+
+    A hinge's own motion, which M cannot hold, is averaged out of it.
+    """
+    M = np.linalg.lstsq(first, second, rcond=1e-6)[0].T
+    turn = Rotation.nearest(M[:3, :3].T)
+    lever = -turn.matrix @ M[3:, :3]
+    return Pose(turn, 0.5 * axial_vector(lever))
+
+
+def first_hinged(
+    data: TeamMotion, twist: Array, reference: int, second: Sequence[int], line: tuple[Array, Array]
+) -> Hinged:
+    """Return a first team; twist (T', N, 6) of all grasps, line (axis, point) of the hinge in grasp second[0]."""
+    count = data.count
+    made = [Pose.identity() if i == reference else from_twists(twist[:, reference], twist[:, i]) for i in range(count)]
+    one = second[0]
+    for i in second[1:]:
+        # Grasps of the second body hang together better than each with the first.
+        made[i] = made[one] @ from_twists(twist[:, one], twist[:, i])
+    grasps = Pose.from_matrix(np.array([pose.matrix() for pose in made]))
+    held = np.zeros(count, np.bool_)
+    held[list(second)] = True
+    rows = data.valid[:, reference]
+    measured = data.poses[:, reference]
+    homes = [Pose.identity()] * count
+    for i in range(count):
+        both = rows & data.valid[:, i]
+        if i != reference and both.any():
+            every = (measured[both] @ grasps[i]) @ data.poses[both, i].inverse()
+            turn = Rotation.nearest(every.rotation.matrix.mean(0))
+            homes[i] = Pose(turn, every.position.mean(0))
+    place = Pose.from_matrix(np.array([home.matrix() for home in homes]))
+    first = [i for i in range(count) if not held[i]]
+    seer = np.array(first)[np.argmax(data.valid[:, first], axis=1)]
+    motion = place[seer] @ data.poses[np.arange(len(seer)), seer] @ grasps[seer].inverse()
+    axis, point = grasps[one].rotation.apply(line[0]), grasps[one].apply(line[1])
+    return Hinged(grasps, place, held, axis, point, motion, np.zeros(len(seer)), np.zeros(count))

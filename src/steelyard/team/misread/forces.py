@@ -13,14 +13,13 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.findings import Finding, percent
 from steelyard.inertia.regressor import basis
-from steelyard.logs.log import Integers, Mask
 from steelyard.team.misread.readings import AXES, FACTORS, READINGS, SIGN, Reading, torques_beside
 from steelyard.team.misread.signs import sign_finding
-from steelyard.team.payload.leftover import centred, pseudoinverse, scatter, unexplained
-from steelyard.team.payload.model import Group
+from steelyard.team.payload.gain_sight import of_force
+from steelyard.team.payload.model import Group, centred, pseudoinverse, scatter, unexplained
 
 # Both variances that are left must together, on average, fall by this factor each.
 FALLS = 4.0
@@ -176,7 +175,7 @@ def _without_bias(groups: Sequence[Group]) -> Array:
 
 def _left(S: Array, D: Array) -> _Left:
     """Return what mass and first moment leave of the sum of forces."""
-    own, E = _forces(S), basis()[:4, 3:].reshape(12, 12)
+    own, E = 12 + np.flatnonzero(of_force(len(S) - 13)), basis()[:4, 3:].reshape(12, 12)
     total, count = D[3:, own - 12], len(own) // 3
     both, seen = S[own[:, None], own], (E @ S[:12, own]).reshape(4, -1)
     inverse = pseudoinverse((E @ S[:12, :12]).reshape(4, 36) @ E.reshape(4, 36).T)
@@ -195,12 +194,6 @@ def _left(S: Array, D: Array) -> _Left:
     nine = curvature.reshape(count, 9, 9) - np.swapaxes(mine, 1, 2) @ inverse @ mine
     sloped = back @ np.moveaxis(slope.reshape(3, count, 3), 1, 0)
     return _Left(variance, sloped.reshape(count, 9), nine, np.trace(blocks, axis1=1, axis2=2))
-
-
-def _forces(S: Array) -> Integers:
-    """Return which columns of a scatter are forces."""
-    pushes = np.arange(len(S) - 13)
-    return np.asarray(12 + pushes[pushes % 6 >= 3], dtype=np.int64)
 
 
 def _turned(S: Array, robot: int, wrench: Array) -> Array:

@@ -3,12 +3,16 @@
 No grasps and homes then fit the team. Every common misreading is undone for each robot in turn, in all recordings or in
 one, and for all robots at once where rotations are misread, as where one logger wrote them all: where one of them makes
 poses fit, it is named. A reading is judged by its first grasps in closed form; only the best few are fitted.
+Two robots whose files stand in each other's place in one recording leave no grasps and homes that fit, either.
+Exchanged in every recording they are merely called by each other's name, which no pose can tell.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from itertools import combinations
+from typing import Generic, TypeVar
 
 import numpy as np
 
@@ -17,14 +21,13 @@ from steelyard.errors import BadValue
 from steelyard.logs.misread import MISREAD
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
+from steelyard.team.adjoint import extent
 from steelyard.team.changes.presence import SHARE as IDLE
 from steelyard.team.changes.presence import idle
-from steelyard.team.clocks.search import far_lags
+from steelyard.team.clocks.lags import far_lags
 from steelyard.team.poses.fit import GUESS, ROUGHLY, Rows, fit_poses
-from steelyard.team.poses.measured import TeamMotion, in_words
-from steelyard.team.poses.start import first_team
+from steelyard.team.poses.measured import TeamMotion, first_team, in_words
 from steelyard.team.stacked import Stretch, stretches
-from steelyard.team.turns import extent
 
 # Rows of a recording that are enough to tell; readings that are fitted at most.
 ROWS, MOST = 50, 4
@@ -39,16 +42,22 @@ MANY = 4
 # A payload that turns by less [rad] does not turn.
 STILL = 0.02
 
-Read = Callable[[Pose], Pose | None]
+X = TypeVar("X")
+SWAP = "Set the form that its quaternions have: quaternion-wxyz or quaternion-xyzw."
+TRANSPOSE = 'Give its "rotation" from its grasp into its home: name the columns of the matrix in transposed order.'
+# Rows of a recording that are enough to tell; exchanges that are tried at most.
+EXCHANGED_ROWS, EXCHANGES = 100, 120
+# The noise of all robots' turns and places must fall by this factor each on average.
+EXCHANGE_CLOSES = 5.0
 
 
 @dataclass(frozen=True)
-class Reading:
-    """A way to read poses: what was wrong, what to do, what turns poses (T,) into those meant; None if impossible."""
+class Reading(Generic[X]):
+    """A way to read what is given: what was wrong, what to do, what turns it into what was meant; None if it cannot."""
 
     words: str
     remedy: str
-    meant: Read
+    meant: Callable[[X], X | None]
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,19 +65,19 @@ class Try:
     """A reading of poses of one robot or all (None), in one recording (its number) or all (None), and rows so read."""
 
     robot: int | None
-    reading: Reading
+    reading: Reading[Pose]
     recording: int | None
     parts: tuple[Stretch, ...]
 
 
-def _scaled(meant: str, read: str, factor: float) -> Reading:
+def _scaled(meant: str, read: str, factor: float) -> Reading[Pose]:
     much = f"{factor:.5g} times too small" if factor > 1 else f"{1 / factor:.5g} times too large"
     words = f"positions are {much}, as when {meant} are read as {read}"
     remedy = 'Set the unit ("m" or "mm") that its "position" has, or convert the numbers to one.'
     return Reading(words, remedy, lambda poses: Pose(poses.rotation, factor * poses.position))
 
 
-def _turned(right: Callable[[Array], Array | None]) -> Read:
+def _turned(right: Callable[[Array], Array | None]) -> Callable[[Pose], Pose | None]:
     def meant(poses: Pose) -> Pose | None:
         turned = right(poses.rotation.matrix)
         return None if turned is None else Pose(Rotation.nearest(turned), poses.position)
@@ -77,8 +86,6 @@ def _turned(right: Callable[[Array], Array | None]) -> Read:
 
 
 METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
-SWAP = "Set the form that its quaternions have: quaternion-wxyz or quaternion-xyzw."
-TRANSPOSE = 'Give its "rotation" from its grasp into its home: name the columns of the matrix in transposed order.'
 SCALES = tuple(_scaled(a, b, METRES[a] / METRES[b]) for a in METRES for b in METRES if a != b)
 # Lengths that all robots tell in another unit fit one another as well as before; turns do not.
 TURNS = (
@@ -110,40 +117,42 @@ def require_well_read(log: TeamLog) -> None:
         return
     held = zip(parts, idle(parts, IDLE), strict=True)
     parts = tuple(replace(part, seen=part.seen & ~rows).thinned(ROWS) for part, rows in held)
-    judge = Judge(names, reference)
     # A fit may end beside the optimum: then its start is the better of the two.
-    given = min((judge(parts, exact) for exact in (True, False)), key=lambda judged: judged.cost)
-    turns = judge.turns(parts)
+    given = min((judged(parts, reference, exact) for exact in (True, False)), key=lambda one: one.cost)
+    # Misread rotations show where the payload turns.
+    turns = bool(_extents(TeamMotion.of(parts))[:, 0].max() > STILL)
     readings = READINGS if turns else SCALES
-    suspects = _suspects(parts, judge, given)
+    suspects = _suspects(parts, reference, given)
     for tried in (
         _everywhere(parts, suspects, readings),
         _everywhere(parts, [None], TURNS if turns else ()),
-        _in_one(parts, suspects, readings, judge, given),
+        _in_one(parts, suspects, readings, reference, given),
     ):
-        best = _best(tuple(tried), given, judge)
+        best = _best(tuple(tried), reference, given)
         if best:
             raise BadValue(_words(best, names, [part.name for part in parts], given))
 
 
-def _best(tried: Sequence[Try], given: Judged, judge: Judge) -> list[tuple[Try, Judged]]:
+def _best(tried: Sequence[Try], reference: int, given: Judged) -> list[tuple[Try, Judged]]:
     """Return the readings that make poses fit, best first: several where one is as good as another."""
-    first = [judge(one.parts, False) for one in tried]
+    first = [judged(one.parts, reference, False) for one in tried]
     order = sorted(range(len(tried)), key=lambda k: first[k].cost)[:MOST]
     bar = min((j.cost for j in first), default=0.0) + np.log(NEAR)
     near = [tried[k] for k in order if first[k].cost < bar and first[k].beats(given, BETTER)]
-    fitted = [(one, judge(one.parts, True)) for one in near]
+    fitted = [(one, judged(one.parts, reference, True)) for one in near]
     able = [(one, j) for one, j in fitted if j.worst < FITS and j.beats(given, CLOSES)]
     able.sort(key=lambda pair: pair[1].cost)
     return [pair for pair in able if pair[1].cost < able[0][1].cost + np.log(AS_GOOD)]
 
 
-def _suspects(parts: tuple[Stretch, ...], judge: Judge, given: Judged) -> list[int]:
+def _suspects(parts: tuple[Stretch, ...], reference: int, given: Judged) -> list[int]:
     """Return the robots that may be misread: those without whom the others' poses fit better, or not at all."""
-    count = len(judge.names)
+    count = parts[0].seen.shape[1]
     if count < MANY:
         return list(range(count))
-    without = [judge.without(i)(_left_out(parts, i), False) for i in range(count)]
+    # The first of the others is the reference where that is left out.
+    references = [0 if i == reference else reference - (i < reference) for i in range(count)]
+    without = [judged(_left_out(parts, i), references[i], False) for i in range(count)]
     return [i for i, w in enumerate(without) if not w.fits or w.beats(given, BETTER)]
 
 
@@ -153,7 +162,9 @@ def _left_out(parts: tuple[Stretch, ...], robot: int) -> tuple[Stretch, ...]:
     return tuple(replace(part, poses=part.poses[:, others], seen=part.seen[:, others]) for part in parts)
 
 
-def _everywhere(parts: tuple[Stretch, ...], whose: Sequence[int | None], readings: Sequence[Reading]) -> Iterator[Try]:
+def _everywhere(
+    parts: tuple[Stretch, ...], whose: Sequence[int | None], readings: Sequence[Reading[Pose]]
+) -> Iterator[Try]:
     """Yield readings in all recordings, of one robot or, for None, of all at once."""
     for robot in whose:
         robots = range(parts[0].seen.shape[1]) if robot is None else [robot]
@@ -167,14 +178,14 @@ def _everywhere(parts: tuple[Stretch, ...], whose: Sequence[int | None], reading
 
 
 def _in_one(
-    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading], judge: Judge, given: Judged
+    parts: tuple[Stretch, ...], robots: Sequence[int], readings: Sequence[Reading[Pose]], reference: int, given: Judged
 ) -> Iterator[Try]:
     """Yield readings of one robot in one recording, where poses fit better without them, or not at all."""
     for k, part in enumerate(parts if len(parts) > 1 else ()):
         for i in (robot for robot in robots if part.seen[:, robot].any()):
             seen = part.seen.copy()
             seen[:, i] = False
-            without = judge((*parts[:k], replace(part, seen=seen), *parts[k + 1 :]), False)
+            without = judged((*parts[:k], replace(part, seen=seen), *parts[k + 1 :]), reference, False)
             if without.fits and not without.beats(given, BETTER):
                 continue
             for reading in readings:
@@ -183,7 +194,7 @@ def _in_one(
                     yield Try(i, reading, k, (*parts[:k], made, *parts[k + 1 :]))
 
 
-def _read(part: Stretch, i: int, reading: Reading) -> Stretch | None:
+def _read(part: Stretch, i: int, reading: Reading[Pose]) -> Stretch | None:
     """Return the recording with one robot's poses read in another way."""
     seen = part.seen[:, i]
     if not seen.any():
@@ -219,42 +230,24 @@ class Judged:
         return self.cost < given.cost - np.log(factor) or self.worst < given.worst / factor
 
 
-@dataclass(frozen=True)
-class Judge:
-    """How well poses fit, for a team of these names."""
-
-    names: tuple[str, ...]
-    reference: int
-
-    def __call__(self, parts: tuple[Stretch, ...], exact: bool) -> Judged:
-        """Return the noise of a rough fit, or only of where it would start."""
-        data = TeamMotion.of(parts)
-        size = _size(data)
-        try:
-            noise = self._noise(data, exact)
-        except FAILURES:
-            noise = np.full_like(size, np.nan)
-        fits = bool(np.isfinite(noise).all())
-        return Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)
-
-    def without(self, robot: int) -> Judge:
-        """Return the same for the other robots, whose first is the reference where it was the one left out."""
-        reference = 0 if robot == self.reference else self.reference - (robot < self.reference)
-        return Judge(self.names[:robot] + self.names[robot + 1 :], reference)
-
-    def turns(self, parts: tuple[Stretch, ...]) -> bool:
-        """Return whether the payload turns, so that misread rotations show."""
-        return bool(_size(TeamMotion.of(parts))[:, 0].max() > STILL)
-
-    def _noise(self, data: TeamMotion, exact: bool) -> Array:
-        start = first_team(data, self.reference, self.names)
+def judged(parts: tuple[Stretch, ...], reference: int, exact: bool) -> Judged:
+    """Return the noise of a rough fit, or only of where it would start."""
+    data = TeamMotion.of(parts)
+    size, guess = _extents(data), np.full((data.count, 2), GUESS)
+    try:
+        # What fails to start is not told by name.
+        start = first_team(data, reference, ("",) * data.count)
         if exact:
-            return fit_poses(data, start, self.reference, close=ROUGHLY).noise
-        guess = np.full((data.count, 2), GUESS)
-        return Rows.settled(data, start, guess).noise(guess)
+            noise = fit_poses(data, start, reference, close=ROUGHLY).noise
+        else:
+            noise = Rows.settled(data, start, guess).noise(guess)
+    except FAILURES:
+        noise = np.full_like(size, np.nan)
+    fits = bool(np.isfinite(noise).all())
+    return Judged(noise if fits else size, noise / size if fits else np.ones_like(size), fits)
 
 
-def _size(data: TeamMotion) -> Array:
+def _extents(data: TeamMotion) -> Array:
     """Return how much each robot turns and moves (N, 2) [rad, m], as read."""
     out = np.empty((data.count, 2))
     for i in range(data.count):
@@ -276,4 +269,50 @@ def _words(best: list[tuple[Try, Judged]], names: tuple[str, ...], recordings: S
     return (
         f"the robots' poses do not fit one payload, and do so if {' or if '.join(said)}: what they say of it then "
         f"differs by {in_words(best[0][1].noise)}, as given by {in_words(given.noise)}. {' '.join(remedies)}"
+    )
+
+
+def require_own_files(log: TeamLog) -> None:
+    """Raise BadValue where exchanging two robots in one recording makes poses fit that do not fit as they are.
+
+    Clocks are taken as they are: what a fit makes of them where files are exchanged is nothing to go by.
+    """
+    names, reference = log.names, log.names.index(log.reference)
+    parts = stretches(log, {})
+    few = tuple(part.thinned(EXCHANGED_ROWS) for part in parts)
+    as_given, tried = judged(few, reference, True), _exchanges(few)
+    if not as_given.fits or len(tried) > EXCHANGES:
+        return
+    best, noise = None, as_given.noise
+    for number, pair in tried:
+        found = judged((*few[:number], _exchanged(few[number], *pair), *few[number + 1 :]), reference, True)
+        if found.fits and found.noise.prod() < noise.prod():
+            best, noise = (number, pair), found.noise
+    if best is None or float(np.log(as_given.noise / noise).mean()) < np.log(EXCHANGE_CLOSES):
+        return
+    number, (i, j) = best
+    where = " or ".join(f"'{part.name}'" for part in (parts if len(parts) == 2 else parts[number : number + 1]))
+    raise BadValue(
+        f"the files of '{names[i]}' and '{names[j]}' look exchanged in {where}: with each in the other's place, "
+        f"what robots say of their poses differs by {in_words(noise)}, as given by {in_words(as_given.noise)}. "
+        'Exchange their "path" there.'
+    )
+
+
+def _exchanges(parts: Sequence[Stretch]) -> list[tuple[int, tuple[int, int]]]:
+    """Return recordings and pairs of robots to try; of two recordings, either one is as good."""
+    numbers = range(len(parts)) if len(parts) > 2 else range(len(parts) - 1)
+    return [
+        (number, (i, j))
+        for number in numbers
+        for i, j in combinations(range(parts[0].seen.shape[1]), 2)
+        if parts[number].seen[:, i].any() or parts[number].seen[:, j].any()
+    ]
+
+
+def _exchanged(part: Stretch, i: int, j: int) -> Stretch:
+    order = np.arange(part.seen.shape[1])
+    order[[i, j]] = j, i
+    return replace(
+        part, poses=Pose(part.poses.rotation[:, order], part.poses.position[:, order]), seen=part.seen[:, order]
     )

@@ -5,7 +5,7 @@ They fit the others' once they are read otherwise; those of all robots, as where
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -14,6 +14,7 @@ from steelyard.check import FAILURES
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
+from steelyard.team.misread.poses import Reading
 from steelyard.team.twists.team import TwistTeam
 
 # So read, noise is below this share of the twists, and these shares fall by this factor (rms).
@@ -22,15 +23,6 @@ FITS, CLOSES = 0.3, 4.0
 AGREES = 1.25
 # Readings within this factor of the best are as good.
 AS_GOOD = 1.5
-
-
-@dataclass(frozen=True)
-class _Reading:
-    """What is said of whose twists, what to do, and what turns a track into the one meant; None if it cannot be."""
-
-    words: str
-    remedy: str
-    meant: Callable[[Track], Track | None]
 
 
 @dataclass(frozen=True)
@@ -47,13 +39,13 @@ class _Tried:
     remedy: str
 
 
-def _unit(name: str, size: float) -> _Reading:
+def _unit(name: str, size: float) -> Reading[Track]:
     def meant(track: Track) -> Track | None:
         if not track.has("linear_velocity"):
             return None
         return replace(track, channels={**track.channels, "linear_velocity": size * track.channels["linear_velocity"]})
 
-    return _Reading(f"the linear velocities of {{}} are in {name}", "Convert them to m/s.", meant)
+    return Reading(f"the linear velocities of {{}} are in {name}", "Convert them to m/s.", meant)
 
 
 def _from_home(track: Track) -> Track | None:
@@ -71,7 +63,7 @@ def _from_home(track: Track) -> Track | None:
 
 # What velocities may be in, read as m/s [m/s].
 UNITS = {"mm/s": 1e-3, "cm/s": 1e-2, "inches/s": 0.0254}
-HOME = _Reading(
+HOME = Reading(
     "the twists of {} are in the axes of its home", "Turn them into those of its grasp, by its rotation.", _from_home
 )
 READINGS = (*(_unit(name, size) for name, size in UNITS.items()), HOME)
@@ -115,7 +107,7 @@ def _tried(log: TeamLog) -> Iterator[_Tried]:
         yield _Tried(float(np.sqrt((share**2).mean())), float(share.max()), level, words, remedy)
 
 
-def _read(recording: TeamRecording, who: frozenset[str], reading: _Reading) -> TeamRecording:
+def _read(recording: TeamRecording, who: frozenset[str], reading: Reading[Track]) -> TeamRecording:
     meant = {name: reading.meant(track) for name, track in recording.tracks.items() if name in who}
     new = {name: track for name, track in meant.items() if track is not None}
     return replace(recording, tracks={**recording.tracks, **new}) if new else recording

@@ -13,12 +13,10 @@ from functools import lru_cache
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers
+from steelyard.check import Array, Integers
 from steelyard.team.definite import definite, inverses, logarithms
 from steelyard.team.payload.gain_sight import GainSight
-from steelyard.team.payload.model import Normal
-from steelyard.team.payload.shown import RANK, SHOWN, Shown
+from steelyard.team.payload.model import RANK, SHOWN, Normal, Shown
 
 # [N] bias of a force axis: from none to as much as a light payload weighs. Error of its gain: from none to 10 %.
 BIAS = np.geomspace(1e-3, 10.0, 13)

@@ -2,7 +2,8 @@
 
 B is the balance frame at the middle of the grasps: there the noise of the summed force and moment is uncorrelated. The
 motion comes from poses of the whole team, which place the payload far better than one gimbal encoder: rotation then
-comes from positions over a baseline of a metre. Rows are cut into runs without gaps.
+comes from positions over a baseline of a metre. PayloadRows are cut into runs without gaps.
+Whether those who carry a payload at rest can hold it at all shows here too.
 """
 
 from __future__ import annotations
@@ -15,14 +16,14 @@ import numpy as np
 from scipy.fft import prev_fast_len
 from scipy.ndimage import uniform_filter1d
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.logs.conditioning import lowpass
-from steelyard.logs.log import Mask
 from steelyard.logs.runs import runs
+from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation, classical_acceleration, cross_matrix, unit_vectors
+from steelyard.team.adjoint import turns_between
 from steelyard.team.stacked import Stretch
-from steelyard.team.turns import turns_between
 
 # The path is smoothed at so many times the highest frequency that is used, which leaves that band as it is.
 PATH_FILTER = 2.0
@@ -31,11 +32,13 @@ PATH_FILTER = 2.0
 LEAST_CYCLES, END_CYCLES = 4.0, 1.0
 # Share of the grasps' own axes in those of the balance frame.
 ALIKE = 1e-3
+# [rad] about the line of two grasps, over which a payload that hangs from them cannot rest.
+HANGS = 0.05
 
 
 @dataclass(frozen=True, eq=False)
 class Run:
-    """Rows of one recording without a gap, all in B's axes.
+    """PayloadRows of one recording without a gap, all in B's axes.
 
     motion   (T, 12) angular acceleration, acceleration less gravity, omega omega^T (xx xy xz yy yz zz)
     pushed   (T, 6 N) moment and force of every robot in its own grasp axes, zero where it holds nothing
@@ -74,6 +77,10 @@ class BodyRows:
     def seconds(self, rows: Sequence[Mask]) -> float:
         """Return how long rows (T,) of each run last in all [s]."""
         return sum(float(some.sum()) / run.rate for some, run in zip(rows, self.runs, strict=True))
+
+
+# Of every recording, beside the residuals (T, N, 6) of its poses or twists.
+PayloadRows = list[tuple[BodyRows, Array]]
 
 
 def balance_frame(grasps: Pose) -> Pose:
@@ -222,3 +229,32 @@ def require_runs(kinds: Sequence[object]) -> None:
             "no recording has rows in which every robot that carries measured a wrench, for long enough. Give "
             "the force of every robot; if all are there, record longer or faster, or correct the unit of time."
         )
+
+
+def require_balance(log: TeamLog, recordings: Sequence[BodyRows], X_BG: Pose) -> None:
+    """Raise CannotAnswer where two force-only robots are said to hold the payload still at different turns about the
+    line of their grasps.
+
+    Nothing that they push turns the payload about that line, so that it would swing to where it hangs: somebody else
+    carries, and the sum of forces is short. recordings in the order of the log; X_BG (N,) in the axes of their motion.
+    """
+    seen: dict[tuple[str, ...], list[tuple[str, Array]]] = {}
+    for recording, body in zip(log.recordings, recordings, strict=True):
+        carriers = tuple(name for name in log.names if name not in recording.away)
+        if not body.still or not body.runs or len(carriers) != 2 or not all(map(log.force_only, carriers)):
+            continue
+        up = np.concatenate([run.motion[:, 3:6] for run in body.runs]).mean(0)
+        seen.setdefault(carriers, []).append((recording.name, up))
+    for carriers, poses in seen.items():
+        one, two = (X_BG.position[log.names.index(name)] for name in carriers)
+        line = (two - one) / max(float(np.linalg.norm(two - one)), 1e-12)
+        first, *others = ((name, up - (up @ line) * line) for name, up in poses)
+        for name, up in others:
+            turned = float(np.arctan2(abs(line @ np.cross(first[1], up)), first[1] @ up))
+            if turned > HANGS:
+                apart = f"turns {np.rad2deg(turned):.0f} deg apart about the line of their grasps"
+                raise CannotAnswer(
+                    f"two robots with passive gimbals, '{carriers[0]}' and '{carriers[1]}', cannot hold a payload "
+                    f"still at {apart}, as in '{first[0]}' and '{name}': somebody else carries it. Add the forces "
+                    "of that robot, or leave the still recordings out."
+                )

@@ -12,17 +12,11 @@ from steelyard.spatial import Pose, cross_matrix
 from steelyard.team.payload.body_rows import summing
 from steelyard.team.payload.fit import PayloadFit
 from steelyard.team.payload.gain_sight import gain_columns
-from steelyard.team.payload.leftover import scatter
-from steelyard.team.payload.model import Group
+from steelyard.team.payload.model import Group, scatter
 from steelyard.team.payload.spectra import Spectra
 
 # The features of the motion and the one of a bias among all that `Spectra` scatters.
 SEEN = np.array([*range(12), -1])
-
-
-def moved_by_grasps(fit: PayloadFit, X_BG: Pose) -> Array:
-    """Return d phi / d grasps (10, 6 N) for steps in each grasp's own axes; X_BG (N,) in the balance frame."""
-    return _moved(fit, turned_by_step(X_BG))
 
 
 def moved_by_pushes(fit: PayloadFit, D: Array) -> Array:
@@ -30,7 +24,7 @@ def moved_by_pushes(fit: PayloadFit, D: Array) -> Array:
 
     D  (6, 6 N) sums the pushes at B
     """
-    return _moved(fit, np.moveaxis(D.reshape(6, -1, 6), 1, 0)[:, None])
+    return moved_by(fit, np.moveaxis(D.reshape(6, -1, 6), 1, 0)[:, None])
 
 
 def lost_turns(fit: PayloadFit, X_BG: Pose, lost: Array) -> Array:
@@ -42,7 +36,7 @@ def lost_turns(fit: PayloadFit, X_BG: Pose, lost: Array) -> Array:
     forces that are turned do not lift; so the mass is as unsure as it is from what they lift on average.
     """
     bends = _bends(X_BG, lost)
-    out = _squares(_moved(fit, bends[:, None]))
+    out = _squares(moved_by(fit, bends[:, None]))
     S = scatter(fit.groups)
     up, pushed = S[-1, 3:6] / S[-1, -1], S[-1, 12:-1].reshape(-1, 6, 1) / S[-1, -1]
     lift = up / (up @ up)
@@ -63,7 +57,7 @@ def _squares(each: Array) -> Array:
     return np.asarray(np.outer(each.sum(1), each.sum(1)) + 0.5 * each @ each.T)
 
 
-def _moved(fit: PayloadFit, changes: Array) -> Array:
+def moved_by(fit: PayloadFit, changes: Array) -> Array:
     """Return d phi (10, N C) of each of C changes of the block (6, 6) that sums what a grasp pushes, (N, C, 6, 6)."""
     count, kinds = changes.shape[:2]
     flat = changes.reshape(count, 6 * kinds, 6)

@@ -8,8 +8,9 @@ Source: the linear form of Atkeson, An, Hollerbach 1986; the paper fits mass, ce
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
+from typing import Generic, Protocol, TypeVar
 
 import numpy as np
 
@@ -17,6 +18,7 @@ from steelyard.check import Array
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import motion_map
 from steelyard.team.payload.bias_models import Models, Recordings, ladder_of
+from steelyard.team.payload.body_rows import PayloadRows
 from steelyard.team.payload.gain_sight import of_force
 from steelyard.team.payload.model import (
     LEAST_MASS,
@@ -27,7 +29,7 @@ from steelyard.team.payload.model import (
     residual_scatter,
     units_of_body,
 )
-from steelyard.team.payload.settling import settled
+from steelyard.team.stacked import row_slices
 
 # With two robots, whose moment is balanced through the payload alone, it takes up to nine.
 FEWEST, ROUNDS = 1, 12
@@ -90,6 +92,9 @@ class Weighing:
     payload: PayloadFit
 
 
+Fitted = Callable[[PayloadRows], Weighing]
+
+
 def fit_payload(groups: tuple[Group, ...], D: Array, C: Array, size: float, with_gain: bool = True) -> PayloadFit:
     """Return the fit of groups of recordings.
 
@@ -123,7 +128,8 @@ class _Equations:
         return group.weights(phi)
 
     def normals(self, group: Group, W: Array) -> list[Normal]:
-        return [normal(part, self.D, W, group.motion_noise, group.noise_of_gains) for part in group.parts]
+        beside = group.wrench_noise if group.sighted else None
+        return [normal(part, self.D, W, group.motion_noise, beside) for part in group.parts]
 
     def judged(self, group: Group, W: Array, beside: Recordings, start: int) -> Group:
         """Return the group with its wrench noise renewed: what is left in each band, less the motion's share."""
@@ -183,3 +189,81 @@ def _residual(groups: tuple[Group, ...]) -> Array:
 def _rows(groups: tuple[Group, ...]) -> float:
     """Return how many rows there are in all bands."""
     return sum(float(part.rows.sum()) for group in groups for part in group.parts)
+
+
+class Banded(Protocol):
+    """Recordings of one kind with common bands."""
+
+    @property
+    def wrench_noise(self) -> Array:
+        """Variances (K, ...) of the wrench in every band."""
+
+
+G = TypeVar("G", bound=Banded)
+
+
+class Equations(Protocol[G]):
+    """The wrench equations of a payload of P parameters."""
+
+    def weights(self, group: G, phi: Array) -> Array:
+        """Return the inverse (K, E, E) of the noise of a row, for parameters phi (P,)."""
+
+    def normals(self, group: G, W: Array) -> list[Normal]:
+        """Return the normal equations of every recording with these weights."""
+
+    def judged(self, group: G, W: Array, beside: Recordings, start: int) -> G:
+        """Return the group, whose recordings are `start` and those after it, with its noise renewed."""
+
+
+@dataclass(frozen=True, eq=False)
+class Round(Generic[G]):
+    """The models of one round, with what they were made from, and the groups renewed by them.
+
+    normals  of all recordings, from the noise and the weights of groups
+
+    phi  (P,)     blind  (P, B) per group and recording, as of `Recordings`
+    """
+
+    phi: Array
+    normals: tuple[Normal, ...]
+    models: Models
+    blind: tuple[tuple[Array, ...], ...]
+    groups: tuple[G, ...]
+    weights: tuple[Array, ...]
+    renewed: tuple[G, ...]
+
+    @classmethod
+    def of(
+        cls, groups: tuple[G, ...], phi: Array, equations: Equations[G], C: Array, ladder: Array, scale: Array
+    ) -> Round[G]:
+        """Return the round from phi (P,) and the noise of groups; C, ladder and scale as of `Models`."""
+        weights = tuple(equations.weights(group, phi) for group in groups)
+        normals = [equations.normals(group, W) for group, W in zip(groups, weights, strict=True)]
+        every = tuple(one for each in normals for one in each)
+        models = Models.of(every, C, ladder, scale)
+        beside = models.recordings(models.best)
+        places = row_slices(normals)
+        renewed = tuple(
+            equations.judged(group, W, beside, own.start) for group, W, own in zip(groups, weights, places, strict=True)
+        )
+        blind = tuple(tuple(beside.blind[own]) for own in places)
+        return cls(models.mean(), every, models, blind, groups, weights, renewed)
+
+    @property
+    def change(self) -> float:
+        """By how much the noise of a band changed at most: the logarithm of its share."""
+        pairs = zip(self.renewed, self.groups, strict=True)
+        return max(float(np.abs(np.log(new.wrench_noise / old.wrench_noise)).max()) for new, old in pairs)
+
+
+def settled(
+    groups: tuple[G, ...], phi: Array, equations: Equations[G], C: Array, ladder: Array, scale: Array,
+    fewest: int, most: int, least: float,
+) -> Round[G]:  # fmt: skip
+    """Return the last of `fewest` to `most` rounds: that in which no noise changes by the share `least` or more."""
+    for number in range(1, most + 1):
+        now = Round.of(groups, phi, equations, C, ladder, scale)
+        if number >= fewest and now.change < least:
+            break
+        groups, phi = now.renewed, now.phi
+    return now

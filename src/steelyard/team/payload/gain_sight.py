@@ -13,9 +13,9 @@ from functools import cached_property
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.inertia.regressor import basis
-from steelyard.logs.log import Integers, Mask
+from steelyard.team.definite import shown_axes
 from steelyard.team.payload.spectra import Spectra
 
 # What changes by so many times the power of its noise counts: of a band, with all the sum's noise on each axis, and of
@@ -89,7 +89,8 @@ def gain_sight(part: Spectra, D: Array, W: Array, noise: Array, levers: Array | 
     own = 3 * each * rows / len(axes)
     noisy = (unit * (np.tensordot(own, W, 1) @ unit)).sum(0)
     g[beside:] -= noisy
-    held = _root_of_inverse(H[:beside, :beside])
+    axes_beside, known = shown_axes(H[:beside, :beside], RANK)
+    held = axes_beside / np.sqrt(known)
     blind = H[beside:, :beside] @ held
     return _loud(H[beside:, beside:] - blind @ blind.T, g[beside:] - blind @ (held.T @ g[:beside]), noisy)
 
@@ -119,11 +120,3 @@ def _changes(S: Array, axes: Integers) -> Array:
     constant = S[:, -1, -1, None]
     power = S[:, axes, axes] - np.where(constant > 0, S[:, axes, -1] ** 2 / np.maximum(constant, 1e-300), 0.0)
     return np.asarray(power.mean(1))
-
-
-def _root_of_inverse(H: Array) -> Array:
-    """Return A (P, Q) with A A^T the pseudoinverse of normal equations (P, P) that may not show everything."""
-    scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-    values, vectors = np.linalg.eigh(H * np.outer(scale, scale))
-    told = values > RANK * values[-1]
-    return np.asarray(scale[:, None] * vectors[:, told] / np.sqrt(values[told]))

@@ -102,51 +102,34 @@ def with_home_bias(
     """
     if not len(places):
         return fit, 0.0
-    homes = _Homes.of(fit, D, C, places)
+    levers, plain = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3), fit.normals
+    wide, scale = _wide(fit, D, levers), np.concatenate([fit.scale, np.ones(len(levers))])
+
+    def tried(ladder: Array, sizes: Array) -> _Tried:
+        none = Models.of(plain, C, ladder, fit.scale)
+        beside = [Models.of(_held(wide, size), C, ladder, scale) for size in sizes]
+        chance = [one.evidence - len(levers) * np.log(size) for one, size in zip(beside, sizes, strict=True)]
+        return _Tried([none, *beside], shares(np.array([none.evidence + np.log(NONE), *chance])), sizes)
+
     # Without gains first, at a tenth of the cost: where no such bias shows, none does with them.
-    if not with_gain or homes.tried(ladder_of(len(homes.plain), False), ASKED).counts:
-        found = homes.tried(homes.likely(ladder_of(len(homes.plain), with_gain)), SIZES)
+    if not with_gain or tried(ladder_of(len(plain), False), ASKED).counts:
+        ladder = ladder_of(len(plain), with_gain)
+        likely = (Models.of(plain, C, ladder, fit.scale).share > UNLIKELY) | ~ladder[:, 2:].any(1)
+        found = tried(ladder[likely], SIZES)
         if found.counts:
-            return found.averaged(fit, homes.levers), found.size
+            return found.averaged(fit, levers), found.size
     return fit, 0.0
 
 
-@dataclass(frozen=True, eq=False)
-class _Homes:
-    """The equations of every recording in [phi (10), bias (6)] and, `wide`, in [phi (10), u (U,), bias (6)]."""
-
-    plain: tuple[Normal, ...]
-    wide: list[Normal]
-    levers: Array
-    C: Array
-    scale: Array
-
-    @classmethod
-    def of(cls, fit: PayloadFit, D: Array, C: Array, places: Array) -> _Homes:
-        """Return the equations with the weights of a fit."""
-        levers = home_levers(places, fit.groups[0].parts[0].room.shape[1] // 3)
-        wide: list[Normal] = []
-        for group, weights in zip(fit.groups, fit.weights, strict=True):
-            for part in group.parts:
-                given = fit.normals[len(wide)]
-                gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else given.gains
-                wide.append(replace(beside_home(given, part, D, weights, levers), gains=gains))
-        return cls(fit.normals, wide, levers, C, fit.scale)
-
-    def likely(self, ladder: Array) -> Array:
-        """Return the sizes of a ladder (L, 4) without gains, and those with gains that count for something."""
-        share = Models.of(self.plain, self.C, ladder, self.scale).share
-        return ladder[(share > UNLIKELY) | ~ladder[:, 2:].any(1)]
-
-    def tried(self, ladder: Array, sizes: Array) -> _Tried:
-        """Return the answers without such a bias and at `sizes` [N] of it, each averaged over a ladder."""
-        none = Models.of(self.plain, self.C, ladder, self.scale)
-        models, chance = [none], [none.evidence + np.log(NONE)]
-        scale = np.concatenate([self.scale, np.ones(len(self.levers))])
-        for size in sizes:
-            models.append(Models.of(_held(self.wide, size), self.C, ladder, scale))
-            chance.append(models[-1].evidence - len(self.levers) * np.log(size))
-        return _Tried(models, shares(np.array(chance)), sizes)
+def _wide(fit: PayloadFit, D: Array, levers: Array) -> list[Normal]:
+    """Return the equations of every recording in [phi (10), u (U,), bias (6)] with the weights of a fit."""
+    out: list[Normal] = []
+    for group, weights in zip(fit.groups, fit.weights, strict=True):
+        for part in group.parts:
+            given = fit.normals[len(out)]
+            gains = gain_sight(part, D, weights, group.wrench_noise, levers) if group.sighted else given.gains
+            out.append(replace(beside_home(given, part, D, weights, levers), gains=gains))
+    return out
 
 
 def home_levers(places: Array, axes: int) -> Array:

@@ -18,9 +18,9 @@ from steelyard.findings import Finding, with_bar
 from steelyard.inertia.regressor import motion_map
 from steelyard.logs.conditioning import FILTERED, taken_by_filter
 from steelyard.logs.curve import Curve
-from steelyard.team.payload.body_rows import BodyRows, Run
+from steelyard.team.payload.body_rows import BodyRows, PayloadRows, Run
 from steelyard.team.payload.doubt import moved_by_pushes
-from steelyard.team.payload.fit import PayloadFit, Weighing
+from steelyard.team.payload.fit import Fitted, PayloadFit, Weighing
 from steelyard.team.payload.spectra import Spectra, band_edges, with_rates
 
 # Forces are late from so much [s] and so many standard deviations, and no later than this: beyond, clocks are apart.
@@ -29,8 +29,6 @@ LATE_S, LATE_STD, LATEST_S = 1e-3, 5.0, 0.3
 USUAL_S = 0.05
 # Forces are moved until a step is below this share of its standard deviation, at most so many times.
 SETTLED, ROUNDS = 1.0, 12
-
-Rows = list[tuple[BodyRows, Array]]
 
 
 @dataclass(frozen=True, eq=False)
@@ -99,8 +97,8 @@ class LateForces:
 
 
 def with_timely_forces(
-    rows: Rows, fit: Weighing, fitted: Callable[[Rows], Weighing], highest_hz: float
-) -> tuple[Rows, Weighing, LateForces | None]:
+    rows: PayloadRows, fit: Weighing, fitted: Fitted, highest_hz: float
+) -> tuple[PayloadRows, Weighing, LateForces | None]:
     """Return rows and their fit with forces that are late moved to when they were; None where none are."""
     late = _asked(fit, rows, highest_hz)
     if late is None or not late.sure:
@@ -122,7 +120,7 @@ def with_timely_forces(
     return rows, fit, None
 
 
-def _asked(fit: Weighing, rows: Rows, highest_hz: float) -> LateForces | None:
+def _asked(fit: Weighing, rows: PayloadRows, highest_hz: float) -> LateForces | None:
     """Return how late forces are beside those of these rows; None where nothing moves."""
     D, count = fit.given, fit.given.shape[1] // 6
     moving = [body for body, _ in rows if body.runs and not body.still]

@@ -5,17 +5,20 @@ motion. The bias b_r is that of every force axis, c ~ N(0, s_c^2) all session lo
 recording, and the error of its gain ~ N(0, s_g^2), lasting or drawn anew, times the mean force on it. It is integrated
 out, so that what it hides is not pretended. Constant biases sum to six numbers, since grasps do not move in the
 payload. Gains are not fitted as factors of the measured force: noise would then explain itself.
+Beside it what a motion and a body leave of sums over the robots' pushes, from sums of products, and which directions of
+the parameters rows show, once biases and gains are integrated out.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.inertia.regressor import basis, motion_map
-from steelyard.logs.log import Mask
 from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.payload.gain_sight import GainSight, gain_columns, gain_sight, of_force
 from steelyard.team.payload.spectra import Spectra
@@ -24,6 +27,10 @@ from steelyard.team.payload.spectra import Spectra
 ROUNDING = 1e-6
 # [kg] Units of a payload are those of no less than this.
 LEAST_MASS = 1e-3
+# What a body of this mass and size could be: a direction whose error is not below this share of it is lost.
+SHOWN = 0.3
+# Information below this share of the largest is rounding.
+RANK = 1e-11
 
 
 def weight(phi: Array) -> float:
@@ -49,11 +56,6 @@ class Group:
     motion_noise: Array
     wrench_noise: Array
     sighted: bool = True
-
-    @property
-    def noise_of_gains(self) -> Array | None:
-        """Noise of the wrench (K, 6) beside which gains are asked; None where they are not."""
-        return self.wrench_noise if self.sighted else None
 
     def weights(self, phi: Array) -> Array:
         """Return the inverse (K, 6, 6) of the noise of a row of the wrench equation."""
@@ -138,3 +140,73 @@ def residual_scatter(part: Spectra, D: Array, solution: Array, covariance: Array
     flat = T.transpose(1, 2, 0).reshape(-1, 16)
     doubt = (flat @ covariance @ flat.T).reshape(6, 13, 6, 13)
     return np.asarray(out + np.einsum("ixiy,kxy->ki", doubt, motion))
+
+
+def scatter(groups: Sequence[Group]) -> Array:
+    """Return the scatter of all recordings and bands."""
+    return np.asarray(sum(part.scatter.sum(0) for group in groups for part in group.parts))
+
+
+def centred(S: Array) -> Array:
+    """Return a scatter with its constant left out."""
+    return S - np.outer(S[-1], S[-1]) / max(float(S[-1, -1]), 1e-300)
+
+
+def pseudoinverse(G: Array) -> Array:
+    """Return the pseudoinverse of normal equations, which may not show everything."""
+    values, axes = np.linalg.eigh(G)
+    kept = values > 1e-9 * values[-1]
+    return np.asarray((axes[:, kept] / values[kept]) @ axes[:, kept].T)
+
+
+def unexplained(K: Array, E: Array, S: Array) -> float:
+    """Return what the motion and a constant leave of rows K (k, 6 N) of the pushes.
+
+    E  (p, k, 12) is what parameters make of the motion, or (12, 12): any motion explains any row
+    """
+    S = centred(S)
+    pushed = K @ S[12:-1, 12:-1] @ K.T
+    seen = K @ S[12:-1, :12]
+    if E.ndim == 2:
+        return float(np.trace(pushed - seen @ pseudoinverse(S[:12, :12]) @ seen.T))
+    G = np.einsum("pix,xy,qiy->pq", E, S[:12, :12], E, optimize=True)
+    along = np.tensordot(E, seen, ([1, 2], [0, 1]))
+    return float(np.trace(pushed) - along @ pseudoinverse(G) @ along)
+
+
+class Shown(NamedTuple):
+    """Directions (..., P, P), as columns, in units of what a body can be.
+
+    values  (..., P) information about each, rising     told  (..., P) whether the rows show it
+    """
+
+    values: Array
+    vectors: Array
+    told: Mask
+
+    @classmethod
+    def of(cls, information: Array, noise: Array) -> Shown:
+        """Return the directions of an information (..., P, P), less what noise in the motion adds to it (P, P).
+
+        What noise in the motion alone would seem to say is known to no better than its own size.
+        """
+        values, vectors = np.linalg.eigh(information - noise)
+        seeming = np.einsum("...pk,pq,...qk->...k", vectors, noise, vectors)
+        told = (values > SHOWN**-2.0) & (values > RANK * values[..., -1:]) & (values > seeming)
+        return cls(values, vectors, np.asarray(told))
+
+    @property
+    def inverse(self) -> Array:
+        """The inverse information (..., P, P) in what is shown, zero in what is lost."""
+        each = np.where(self.told, 1 / np.where(self.told, self.values, 1.0), 0.0)
+        return np.asarray((self.vectors * each[..., None, :]) @ self.vectors.swapaxes(-1, -2))
+
+    @property
+    def lost(self) -> Array:
+        """The directions (P, L) that are lost, of one information."""
+        return self.vectors[:, ~self.told]
+
+    @property
+    def condition(self) -> float:
+        """The condition number in what is shown, of one information; infinite where nothing is."""
+        return float(np.sqrt(self.values[-1] / self.values[self.told][0])) if self.told.any() else np.inf

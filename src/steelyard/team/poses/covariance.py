@@ -14,11 +14,10 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.spatial import cross, cross_matrix
-from steelyard.team.adjoint import adjoint
-from steelyard.team.poses.calibration import recurring
+from steelyard.spatial import Pose, cross, cross_matrix
 from steelyard.team.poses.fit import PoseFit
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.recurring import recurring
+from steelyard.team.poses.solver import OWN
 
 # Which of rotation and position of grasp and home, and delay, each parameter of a robot is.
 KIND = np.repeat(np.arange(5), [3, 3, 3, 3, 1])
@@ -33,7 +32,7 @@ class Spread:
     full      (6 N, 6 N) [rad, m]; zero for the reference
     blind     (6 N, L) directions that the motion does not show
     late      (N,) standard deviations of the delays [s], None where they were not estimated
-    turns     (N, 6, 6) from a grasp's own axes to those of R
+    grasps    (N,) in R
     level     (N, 3) direction of gravity in each grasp's own axes over how well [rad] its base and the reference's
               agree on it, zero where they do not tell: it holds turns that the motion does not show
     recurring (2,) [rad, m] rms errors of poses that come back with the pose, None where none show
@@ -42,7 +41,7 @@ class Spread:
     full: Array
     blind: Array
     late: Array | None
-    turns: Array
+    grasps: Pose
     level: Array | None = None
     recurring: Array | None = None
 
@@ -72,16 +71,20 @@ class Spread:
 
     def of(self, robot: int) -> Array:
         """Return the covariance (6, 6) of one grasp, rotation and position in R's axes."""
-        part = slice(6 * robot, 6 * robot + 6)
-        return np.asarray(self.turns[robot] @ self.full[part, part] @ self.turns[robot].T)
+        part, turn = slice(6 * robot, 6 * robot + 6), self._turn(robot)
+        return np.asarray(turn @ self.full[part, part] @ turn.T)
 
     def lost(self, robot: int) -> Array:
         """Return directions (k, 6) of one grasp, in R's axes, that the motion does not show."""
         part = self.blind[6 * robot : 6 * robot + 6]
         if not part.size:
             return np.zeros((0, 6))
-        u, s, _ = np.linalg.svd(self.turns[robot] @ part)
+        u, s, _ = np.linalg.svd(self._turn(robot) @ part)
         return np.asarray(u[:, : len(s)][:, s > 1e-3 * max(s.max(), 1e-300)].T)
+
+    def _turn(self, robot: int) -> Array:
+        """Return what turns (6, 6) a grasp's own axes into those of R."""
+        return np.kron(np.eye(2), self.grasps.rotation.matrix[robot])
 
     def delays(self, names: Sequence[str]) -> dict[str, float]:
         """Return the standard deviation of each robot's delay [s]."""
@@ -113,13 +116,11 @@ def grasp_covariance(fit: PoseFit) -> Spread:
     full[np.ix_(place, place)] = covariance[np.ix_(grasp, grasp)]
     blind[place] = fit.solved.lost[asked[grasp]]
     if len(delay):
-        late = np.sqrt(np.maximum(_against(covariance[np.ix_(delay, delay)], fit.reference), 0))
-    turn = adjoint(fit.team.grasps)
-    turn[:, 3:, :3] = 0.0
-    return Spread(full, blind, late, turn, recurring=None if again is None else again.size)
+        late = np.sqrt(np.maximum(variances_against(covariance[np.ix_(delay, delay)], fit.reference), 0))
+    return Spread(full, blind, late, fit.grasps, recurring=None if again is None else again.size)
 
 
-def _against(covariance: Array, reference: int) -> Array:
+def variances_against(covariance: Array, reference: int) -> Array:
     """Return the variances (N,) of differences from one of them."""
     variance = np.diag(covariance)
     return np.asarray(variance + variance[reference] - 2 * covariance[reference])

@@ -17,17 +17,14 @@ from functools import cached_property
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers
+from steelyard.check import Array, Integers
 from steelyard.spatial import Pose, Rotation, cross_matrix
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.definite import inverses
 from steelyard.team.poses import rows as pose_rows
-from steelyard.team.poses import statistic as pose_statistic
 from steelyard.team.poses.measured import Team, TeamMotion
-from steelyard.team.poses.noise import pose_noise
-from steelyard.team.poses.solver import Shown, Solver
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.noise import noise_of_scatter
+from steelyard.team.poses.solver import OWN, Shown, Solver, pattern_information
 
 STEPS = 25
 # Noise to begin with [rad, m].
@@ -84,11 +81,13 @@ class Rows:
         return pose_rows.in_own(self.apart, self.team.grasps.rotation.matrix)
 
     def noise(self, noise: Array) -> Array:
-        """Return the noise (N, 2) that the residuals show, from one to begin with."""
+        """Return the noise (N, 2) that residuals of rows in which all robots speak show, from one to begin with."""
+        whole = self.data.complete
+        rows = (self.apart if whole.all() else self.apart[whole]).reshape(-1, 6 * self.data.count)
         J = np.zeros((self.data.count, 6, 6))
         J[:, range(6), range(6)] = 1.0
         J[:, 3:, :3] = -cross_matrix(self.team.grasps.position)
-        return pose_noise(self.apart, self.data.complete, J, noise)
+        return noise_of_scatter(rows.T @ rows, float(len(rows)), J, noise)
 
     def pull(self, noise: Array) -> Array:
         """Return half the gradient of chi^2 (13 N,), sign turned."""
@@ -116,19 +115,8 @@ def information(data: TeamMotion, grasps: Pose, noise: Array) -> Array:
     out = np.zeros((OWN * data.count, OWN * data.count))
     for S, seen in zip(data.scatter, data.patterns[0], strict=True):
         if seen.any():
-            out += pose_statistic.information(S, J, weight * seen[:, None])
+            out += pattern_information(S, J, weight * seen[:, None])
     return out
-
-
-def _gauged(information: Array, common: float, unknown: Integers) -> Array:
-    """Return the information (K, K) about the unknown parameters, and `common` [s^-2] that their delays sum to zero.
-
-    What all clocks have in common moves the motion along itself and shows in nothing: the sum, unlike any one robot's
-    delay, is the same whoever is the reference.
-    """
-    H, timed = information[np.ix_(unknown, unknown)], unknown % OWN == OWN - 1
-    H[np.ix_(timed, timed)] += common
-    return H
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,8 +132,12 @@ class Known:
     def of(cls, data: TeamMotion, grasps: Pose, noise: Array, unknown: Integers) -> Known:
         """Return what the rows say of the unknown parameters near these grasps."""
         H = information(data, grasps, noise)
+        # What all clocks have in common moves the motion along itself and shows in nothing: the sum of the delays,
+        # unlike any one robot's, is the same whoever is the reference.
         common = float(np.diag(H)[OWN - 1 :: OWN].mean())
-        return cls(noise, H, common, Solver.of(_gauged(H, common, unknown), unknown, noise, len(data.valid)))
+        held, timed = H[np.ix_(unknown, unknown)], unknown % OWN == OWN - 1
+        held[np.ix_(timed, timed)] += common
+        return cls(noise, H, common, Solver.of(held, unknown, noise, len(data.valid)))
 
     def holds(self, noise: Array, close: Close) -> bool:
         """Return whether the noise is still so near that steps from here lead to the optimum."""
@@ -182,14 +174,9 @@ class PoseFit:
         return self.rows.team
 
     @property
-    def J(self) -> Array:
-        """Residuals per motion of the payload (N, 6, 6)."""
-        return adjoint_inverse(self.team.grasps)
-
-    @property
-    def W(self) -> Array:
-        """Weights of residuals (N, 6)."""
-        return np.repeat(self.noise**-2.0, 3, axis=1)
+    def grasps(self) -> Pose:
+        """Where robots hold (N,), in the reference grasp."""
+        return self.team.grasps
 
 
 def fit_poses(

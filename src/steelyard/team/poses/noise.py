@@ -8,7 +8,6 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.log import Mask
 from steelyard.team.definite import inverses_by_pivots
 
 ROUNDS = 60
@@ -20,24 +19,11 @@ SETTLED = 1e-4
 ALIKE = 1.0
 
 
-def pose_noise(residual: Array, complete: Mask, J: Array, noise: Array) -> Array:
-    """Return the standard deviations (N, 2) of rotation [rad] and position [m].
-
-    residual  (T, N, 6) of the joint fit     complete  (T,) rows in which all robots speak; only they count
-    J         (N, 6, 6) residuals per motion of the payload     noise  (N, 2) to begin with
-
-    The motion of the payload takes up six combinations of the residuals, so that their scatter S is that of
-    (1 - J A^-1 J^T W) n; no pass over the rows.
-    """
-    rows = (residual if complete.all() else residual[complete]).reshape(-1, 6 * residual.shape[1])
-    if not len(rows):
-        return noise
-    return noise_of_scatter(rows.T @ rows, float(len(rows)), J, noise)
-
-
 def noise_of_scatter(scatter: Array, rows: float, J: Array, noise: Array) -> Array:
-    """Return the same from the scatter (6 N, 6 N) of residuals, or of measured twists, of which J explains six.
+    """Return the standard deviations (N, 2) of turns and places from the scatter (6 N, 6 N) of so many `rows`.
 
+    Those of residuals of a joint fit, or of measured twists: the payload's motion takes up six combinations of them, by
+    J (N, 6, 6) per motion, so that their scatter is that of (1 - J A^-1 J^T W) n. noise (N, 2) to begin with.
     Restricted maximum likelihood by Fisher scoring, with a faint belief that the robots of a team err alike: two grasps
     alone tell the sum of their noise, not who makes it.
     Source: Patterson and Thompson 1971.

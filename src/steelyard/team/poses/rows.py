@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.team.poses.row_numbers import (
     NOTHING,
     apart,
@@ -24,7 +23,7 @@ from steelyard.team.poses.row_numbers import (
     turn_by,
     write_six,
 )
-from steelyard.team.poses.statistic import OWN
+from steelyard.team.poses.solver import OWN
 
 
 @passes

@@ -12,23 +12,20 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
-from steelyard.team.adjoint import adjoint_inverse
+from steelyard.team.adjoint import adjoint_inverse, extent, twists_between
 from steelyard.team.changes.found import Edit, without_changes
-from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
-from steelyard.team.changes.slips_between import slip_between, step_between
+from steelyard.team.changes.slips import Slip
+from steelyard.team.changes.slips_between import slip_between
 from steelyard.team.clocks.errors import ClockErrors
-from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.level import Tilted, tilted
-from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, later
-from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_poses
+from steelyard.team.clocks.unsteady import clock_errors
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, Tilted, later, tilted
+from steelyard.team.payload.body_rows import PayloadRows, balance_frame, from_poses
 from steelyard.team.poses import rows as pose_rows
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.fit import NEARLY, ROUGHLY, PoseFit, Rows, fit_poses
-from steelyard.team.poses.measured import Team, TeamMotion
-from steelyard.team.poses.rest import shares_at_rest
-from steelyard.team.poses.start import ENOUGH, first_team
+from steelyard.team.poses.measured import ENOUGH, Team, TeamMotion, first_team
+from steelyard.team.poses.recurring import shares_at_rest
 from steelyard.team.stacked import Stretch, row_slices, stretches
-from steelyard.team.turns import extent, twists_between
 
 # Clocks that were moved are moved until they stand still to this [s]: a step of 10 ms depends by a microsecond on who
 # is the reference, and by where noisy rows are then read the answer does in its sixth digit.
@@ -98,34 +95,26 @@ class PoseTeam(MotionFit):
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        apart, slope = self.fit.rows.residual, self.fit.rows.data.twists
-        each = zip(self.parts, row_slices(self.parts), strict=True)
-        left = tuple(Left(part.time, part.seen, apart[rows], slope[rows]) for part, rows in each)
-        return clock_errors(log, left, self.fit.J, self.fit.W)
+        slope = (self.fit.rows.data.twists[rows] for rows in row_slices(self.parts))
+        return clock_errors(log, self._left(), slope, self.J, self.W)
 
-    def slip(self, log: TeamLog) -> SlipAt | None:
-        """Return the clearest slip, within a recording or else between two."""
-        apart, noise = alone(self.fit.rows.residual, self.fit.J, self.fit.W), noise_alone(self.fit.J, self.fit.W)
-        places = enumerate(zip(self.parts, row_slices(self.parts), strict=True))
-        within = clearest(slip_within(k, part, apart[rows], part.seen, noise) for k, (part, rows) in places)
-        return slip_between(self.parts, apart) if within is None else within
+    def _left(self) -> list[tuple[Stretch, Array]]:
+        every = zip(self.parts, row_slices(self.parts), strict=True)
+        return [(part, self.fit.rows.residual[rows]) for part, rows in every]
 
-    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
-        """Return the slip with its time and step renewed against the others' motion."""
-        parts = stretches(log, self.late)
-        if found.between:
-            return step_between(found, parts, self._off(parts))
-        raw = parts[found.recording]
-        apart = self.residuals(raw, row_slices(self.parts)[found.recording].start)[:, found.slip.robot]
-        noise = noise_alone(self.fit.J, self.fit.W)[found.slip.robot]
-        return found.renewed(apart, raw.seen[:, found.slip.robot], raw, noise)
+    def _left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
+        every = zip(stretches(log, self.late), row_slices(self.parts), strict=True)
+        return [(raw, self._residuals(raw, rows.start)) for raw, rows in every]
+
+    def _slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
+        return slip_between(parts, apart)
 
     @cached_property
     def rough(self) -> bool:
         """Whether poses err by a good part of what the payload moves, as they do where it is not rigid."""
         return bool((self.fit.noise > LOUD * self._moved).any())
 
-    @cached_property
+    @property
     def apart(self) -> Array | None:
         """By how much robots disagree (2,) [rad, m], where that is a good part of a turn that is more than it."""
         worst = self.fit.noise.max(0)
@@ -136,9 +125,10 @@ class PoseTeam(MotionFit):
         """How far the payload turned and moved (2,), rms [rad, m]."""
         return extent(self.fit.team.motion)
 
-    def gravity(self, log: TeamLog) -> Array:
-        """Return gravity (3,) [m/s^2] in the reference home."""
-        return mean_gravity(log, self.fit.team.homes)
+    def down(self, log: TeamLog) -> Array:
+        """Return the mean direction of gravity (3,) in R."""
+        mean = self.fit.team.motion.rotation.inverse().apply(mean_gravity(log, self.fit.team.homes)).mean(0)
+        return np.asarray(mean / max(float(np.linalg.norm(mean)), 1e-300))
 
     def tilt(self, log: TeamLog, spread: Spread) -> Tilted | None:
         """Return who disagrees on where gravity points, for homes turned as well as grasps are known to be."""
@@ -154,47 +144,34 @@ class PoseTeam(MotionFit):
         told = said.any(1, keepdims=True) & own.any()
         return np.where(told, team.grasps.rotation.inverse().apply(seen) / np.hypot(LEVEL, apart), 0.0)
 
-    def residuals(self, raw: Stretch, start: int) -> Array:
+    def _residuals(self, raw: Stretch, start: int) -> Array:
         """Return rotation vector and position (T, N, 6) from where the team says to what was measured, used or not."""
         motion = self.fit.team.motion[np.minimum(start + np.arange(len(raw)), len(self.fit.team.motion.position) - 1)]
-        G, Z = self.fit.team.grasps, self.fit.team.homes
+        G, Z = self.fit.grasps, self.fit.team.homes
         return pose_rows.residuals(
             raw.poses.rotation.matrix, raw.poses.position, raw.seen, G.rotation.matrix, G.position, Z.rotation.matrix,
             Z.position, motion.rotation.matrix, motion.position,
         )  # fmt: skip
 
-    def off(self, log: TeamLog) -> list[Array]:
-        """Return by how many times its noise each grasp is off (T, N) where the others say, for every recording."""
-        # How two robots share their noise is open: one alone may seem to have next to none.
-        noise = noise_alone(self.fit.J, self.fit.W)
-        left = self._off(stretches(log, self.late)) / np.sqrt(np.einsum("nii->ni", noise))
-        each = np.sqrt((left**2).mean(-1))
-        return np.split(each, [rows.stop for rows in row_slices(self.parts)[:-1]])
-
-    def _off(self, parts: tuple[Stretch, ...]) -> Array:
-        """Return the residuals (T, N, 6) of recordings one after the other."""
-        places = row_slices(self.parts)
-        return np.concatenate([self.residuals(raw, rows.start) for raw, rows in zip(parts, places, strict=True)])
-
-    def rows(self, log: TeamLog, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
+    def rows(self, log: TeamLog, highest_hz: float) -> tuple[PayloadRows, Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their poses, and a row's covariance.
 
         The covariance (6, 6) is that of the path, in the balance frame's axes.
         """
-        gravity, fit = self.gravity(log), self.fit
-        frame = balance_frame(fit.team.grasps)
-        noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", fit.J, fit.W, fit.J))
+        gravity, fit = mean_gravity(log, self.fit.team.homes), self.fit
+        frame = balance_frame(fit.grasps)
+        noise = np.linalg.inv(np.einsum("nia,ni,nib->ab", self.J, self.W, self.J))
         noise = adjoint_inverse(frame) @ noise @ adjoint_inverse(frame).T
         out = []
-        for part, rows in zip(self.parts, row_slices(self.parts), strict=True):
-            body = from_poses(part, fit.team.motion[rows] @ frame, np.asarray(part.seen.any(1)), gravity, highest_hz)
-            out.append((body, fit.rows.residual[rows]))
+        for (part, left), rows in zip(self._left(), row_slices(self.parts), strict=True):
+            path = fit.team.motion[rows] @ frame
+            out.append((from_poses(part, path, np.asarray(part.seen.any(1)), gravity, highest_hz), left))
         return out, noise
 
 
 def _followed(data: TeamMotion, fit: PoseFit) -> Team:
     """Return the team of a fit with the motion that its grasps and homes give the rows of `data`."""
-    seen = replace(fit.team, motion=data.motion_seen(fit.team.grasps, fit.team.homes), delays=0 * fit.team.delays)
+    seen = replace(fit.team, motion=data.motion_seen(fit.grasps, fit.team.homes), delays=0 * fit.team.delays)
     return Rows.settled(data, seen, fit.noise, FOLLOWED).team
 
 

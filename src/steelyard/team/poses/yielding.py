@@ -15,10 +15,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import FAILURES, Array
+from steelyard.check import FAILURES, Array, Integers
 from steelyard.findings import Finding
-from steelyard.logs.log import Integers
-from steelyard.logs.team_log import TeamLog, TeamRecording
+from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose, Rotation, cross
 from steelyard.team.adjoint import adjoint_inverse
@@ -55,7 +54,12 @@ class Yields:
         Where a wrench is not known, poses are off by the mean one, and left out where other recordings in motion do.
         """
         yielding = [i for i in range(len(log.names)) if self.size[i].any()]
-        enough = any(r.kind != "still" and all(_felt(r, log.names[i]) for i in yielding) for r in log.recordings)
+        felt = (
+            {name for name, track in r.tracks.items() if track.has("force")}
+            for r in log.recordings
+            if r.kind != "still"
+        )
+        enough = any(names >= {log.names[i] for i in yielding} for names in felt)
         by_name = {log.names[i]: (self.size[i], self.mean[i], enough) for i in yielding}
         return log.with_recordings(*(r.changed(_stiff, by_name) for r in log.recordings))
 
@@ -154,7 +158,7 @@ class _Pushed:
     def explained(self, columns: Array, robot: Integers) -> tuple[Array, Array]:
         """Return how far residuals go with columns (T, C, 6) of robots (C,), and standard deviations (C,)."""
         fit = self.team.fit
-        scores = Scores.of(fit.rows.residual[self.rows], columns, robot, fit.J, fit.W, STRETCHES)
+        scores = Scores.of(fit.rows.residual[self.rows], columns, robot, self.team.J, self.team.W, STRETCHES)
         size, covariances = scores.solved()
         std = np.sqrt(np.maximum(*(np.diag(V) for V in covariances)))
         return size, np.where(std > 0, std, np.inf)
@@ -186,7 +190,7 @@ def _yields(team: PoseTeam, known: Yields) -> Yields:
 
 def _grasps_and_homes(team: PoseTeam, rows: Integers) -> tuple[Array, Integers]:
     """Return how residuals move with grasps and homes (T, C, 6) of all but the reference, and whose they are (C,)."""
-    poses, others = team.fit.rows.data.poses[rows], [i for i in range(len(team.fit.J)) if i != team.fit.reference]
+    poses, others = team.fit.rows.data.poses[rows], [i for i in range(len(team.fit.noise)) if i != team.fit.reference]
     ones = np.broadcast_to(np.eye(6), (len(rows), 6, 6))
     columns = [np.concatenate([ones, adjoint_inverse(poses[:, i]).swapaxes(1, 2)], axis=1) for i in others]
     return np.concatenate(columns, axis=1), np.repeat(others, 12)
@@ -209,10 +213,6 @@ def _positive(size: Array, std: Array) -> tuple[Array, Array]:
                 out[i, axes] = np.maximum((w * told + prior * alike) / (w + prior), 0.0) * (w > 0)
                 doubt[i, axes] = (w + prior) ** -0.5
     return out, doubt
-
-
-def _felt(recording: TeamRecording, name: str) -> bool:
-    return name in recording.tracks and recording.tracks[name].has("force")
 
 
 def _stiff(track: Track, by: tuple[Array, Array, bool]) -> Track:

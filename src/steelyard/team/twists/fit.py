@@ -16,16 +16,14 @@ import numba
 import numpy as np
 from scipy.linalg import LinAlgError, cho_factor, cho_solve
 
-from steelyard.check import Array
-from steelyard.logs.log import Integers, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.spatial import Pose
-from steelyard.team.adjoint import BRACKETS, adjoint, adjoint_inverse, exp
+from steelyard.team.adjoint import BRACKETS, adjoint_inverse, exp
 from steelyard.team.poses.covariance import Spread
 from steelyard.team.poses.fit import EXACT
 from steelyard.team.poses.noise import noise_of_scatter
 from steelyard.team.poses.solver import SHOWN
-from steelyard.team.twists.start import first_grasps
-from steelyard.team.twists.statistic import TwistScatter
+from steelyard.team.twists.statistic import TwistScatter, first_grasps
 
 STEPS = 25
 
@@ -50,16 +48,6 @@ class TwistFit:
     delays: Array
     delay_covariance: Array
     left: float
-
-    @property
-    def J(self) -> Array:
-        """Twists of the grasps per twist of the payload (N, 6, 6)."""
-        return adjoint_inverse(self.grasps)
-
-    @property
-    def W(self) -> Array:
-        """Weights of residuals (N, 6)."""
-        return np.repeat(self.noise**-2.0, 3, axis=1)
 
     def punctual(self, least: float, stds: float) -> bool:
         """Return whether all clocks are within `least` [s] or `stds` standard deviations of their mean.
@@ -101,11 +89,9 @@ def fit_twists(data: TwistScatter, reference: int, names: tuple[str, ...], level
     spread[np.ix_(unknown, unknown)] = covariance
     blind = np.zeros((6 * data.count, lost.shape[1]))
     blind[unknown] = lost
-    turn = adjoint(grasps)
-    turn[:, 3:, :3] = 0.0
     delays, doubt, white = _delays(merged, grasps, noise, reference)
     late = np.sqrt(np.maximum(np.diag(doubt), 0) * _late_inflation(data, grasps, noise, white))
-    return TwistFit(grasps, noise, Spread(spread, blind, late, turn), delays, doubt, float(np.sqrt(gained)))
+    return TwistFit(grasps, noise, Spread(spread, blind, late, grasps), delays, doubt, float(np.sqrt(gained)))
 
 
 def fused_twist(twist: Array, seen: Mask, grasps: Pose, noise: Array) -> tuple[Array, Array]:

@@ -7,15 +7,14 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_rows import channel_at
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Pose
+from steelyard.team.adjoint import turns_between
 from steelyard.team.stacked import Stretch, bridged, rotation_at, stretches
-from steelyard.team.turns import turns_between
 
 # [s] of poses that make a twist, and the degree of the polynomial through them. As loud as a difference over 0.1 s, but
 # that takes 1.6 % of a twist at 1 Hz: beside robots that measure their twists, it moved grasps by eight of their bars.

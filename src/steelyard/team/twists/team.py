@@ -5,26 +5,26 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from typing import ClassVar
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
-from steelyard.logs.log import Mask
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.adjoint import adjoint_inverse
 from steelyard.team.changes.found import Edit, without_changes
-from steelyard.team.changes.slips import SlipAt, alone, clearest, noise_alone, slip_within
+from steelyard.team.changes.slips import Slip
+from steelyard.team.changes.slips_between import slip_between_twists
 from steelyard.team.clocks.errors import ClockErrors
-from steelyard.team.clocks.unsteady import Left, clock_errors
-from steelyard.team.level import Tilted, tilted
-from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, later
-from steelyard.team.payload.body_rows import BodyRows, balance_frame, from_twists
+from steelyard.team.clocks.unsteady import clock_errors
+from steelyard.team.motion_fit import CLOCK_ROUNDS, DOUBTED, LEVEL, PUNCTUAL, MotionFit, Tilted, later, tilted
+from steelyard.team.payload.body_rows import PayloadRows, balance_frame, from_twists
 from steelyard.team.split import Split, smoothed, split_of
+from steelyard.team.stacked import Stretch
 from steelyard.team.twists.fit import TwistFit, fit_twists, fused_twist
 from steelyard.team.twists.rows import TwistStretch, twist_stretches
-from steelyard.team.twists.slips_between import slip_between
 from steelyard.team.twists.statistic import TwistScatter, rates_of_change
 
 # Clocks that were moved are moved until the last step is below this share of what is moved for.
@@ -36,6 +36,8 @@ LOUD = 0.1
 @dataclass(frozen=True, eq=False)
 class TwistTeam(MotionFit):
     """The joint fit of twists; `reference` is the number of the robot in whose grasp the answer is given."""
+
+    ORDER: ClassVar[int] = 1
 
     parts: tuple[TwistStretch, ...]
     fit: TwistFit
@@ -55,7 +57,9 @@ class TwistTeam(MotionFit):
         """Return the fit of recordings after an edit."""
         late = dict.fromkeys(log.names, 0.0)
         for left in reversed(range(CLOCK_ROUNDS)):
-            parts = _changed(twist_stretches(log, late), edit)
+            raw = twist_stretches(log, late)
+            edited = edit(tuple(part.used for part in raw))
+            parts = tuple(part.changed(used) for part, used in zip(raw, edited, strict=True))
             fit = _joint_fit(parts, log)
             share = SETTLED if any(late.values()) else 1.0
             # What is told of clocks is what the rows and the fit were made with.
@@ -66,41 +70,24 @@ class TwistTeam(MotionFit):
 
     def clock_errors(self, log: TeamLog) -> ClockErrors:
         """Return what clocks seem to be off by in single recordings."""
-        left = []
-        for part in self.parts:
-            slope = -rates_of_change(part)
-            apart = self._left(part)[0] - slope * self.fit.delays[:, None]
-            left.append(Left(part.rows.time, part.seen, apart, slope))
-        return clock_errors(log, tuple(left), self.fit.J, self.fit.W)
+        slopes = [-rates_of_change(part) for part in self.parts]
+        late = [slope * self.fit.delays[:, None] for slope in slopes]
+        left = [(part, apart - more) for (part, apart), more in zip(self._left(), late, strict=True)]
+        return clock_errors(log, left, slopes, self.J, self.W)
 
-    def off(self, log: TeamLog) -> list[Array]:
-        """Return by how many times its noise each twist is off (T, N) what the others say, for every recording."""
-        noise = np.sqrt(np.einsum("nii->ni", noise_alone(self.fit.J, self.fit.W)))
-        raw = twist_stretches(log, self.late)
-        return [
-            np.sqrt(((self._left(was, now)[0] / noise) ** 2).mean(-1)) for was, now in zip(raw, self.parts, strict=True)
-        ]
+    def _left(self) -> list[tuple[Stretch, Array]]:
+        return [(part.used, self._apart(part)[0]) for part in self.parts]
 
-    def slip(self, log: TeamLog) -> SlipAt | None:
+    def _left_of_all(self, log: TeamLog) -> list[tuple[Stretch, Array]]:
+        every = zip(twist_stretches(log, self.late), self.parts, strict=True)
+        return [(raw.used, self._apart(raw, now)[0]) for raw, now in every]
+
+    def slip(self, log: TeamLog) -> Slip | None:
         """Return the clearest slip, within a recording or else between two; none where a hinge is the cause."""
-        if self.split is not None and self.split.sure:
-            return None
-        J, W = self.fit.J, self.fit.W
-        every = (np.cumsum(alone(self._left(part)[0], J, W), axis=0) / part.rows.rate for part in self.parts)
-        each, noise = enumerate(zip(self.parts, every, strict=True)), noise_alone(J, W)
-        within = clearest(slip_within(k, p.rows, apart, p.seen, noise, drifts=True) for k, (p, apart) in each)
-        if within is not None:
-            return within
-        return slip_between(self.parts, self.reference, lambda parts: _joint_fit(parts, log))
+        return None if self.split is not None and self.split.sure else super().slip(log)
 
-    def measured(self, log: TeamLog, found: SlipAt) -> SlipAt:
-        """Return the slip with its time and step renewed against the others' motion."""
-        if found.between:
-            return found
-        raw, robot = twist_stretches(log, self.late)[found.recording], found.slip.robot
-        noise = noise_alone(self.fit.J, self.fit.W)[robot]
-        apart = np.cumsum(self._left(raw, self.parts[found.recording])[0][:, robot], axis=0) / raw.rows.rate
-        return found.renewed(apart, raw.seen[:, robot], raw.rows, noise, drifts=True)
+    def _slip_between(self, log: TeamLog, parts: Sequence[Stretch], apart: Sequence[Array]) -> Slip | None:
+        return slip_between_twists(self.parts, self.reference, lambda some: _joint_fit(some, log))
 
     @cached_property
     def split(self) -> Split | None:
@@ -157,18 +144,18 @@ class TwistTeam(MotionFit):
         known = np.hypot(LEVEL, np.sqrt(2 * np.maximum(apart, 0)))
         return np.asarray(seen / np.maximum(np.linalg.norm(seen, axis=1) * known, 1e-300)[:, None])
 
-    def _left(self, part: TwistStretch, now: TwistStretch | None = None) -> tuple[Array, Array, Array]:
+    def _apart(self, part: TwistStretch, now: TwistStretch | None = None) -> tuple[Array, Array, Array]:
         """Return the residuals (T, N, 6) of a recording's twists, the fused twist (T, 6) and its covariance (6, 6).
 
         now  what is left of the recording, where it tells the motion from which `part`, as it was, differs
         """
         now = part if now is None else now
         fused, covariance = fused_twist(now.twist, now.seen, self.fit.grasps, self.fit.noise)
-        moved = np.einsum("nij,tj->tni", self.fit.J, fused)
+        moved = np.einsum("nij,tj->tni", self.J, fused)
         told = part.seen & now.seen.any(1, keepdims=True)
         return (part.twist - moved) * told[..., None], fused, covariance
 
-    def rows(self, highest_hz: float) -> tuple[list[tuple[BodyRows, Array]], Array]:
+    def rows(self, highest_hz: float) -> tuple[PayloadRows, Array]:
         """Return the rows of every recording beside the residuals (T, N, 6) of their twists, and a row's covariance.
 
         The covariance (6, 6) is that of the fused twist, in the balance frame's axes.
@@ -178,7 +165,7 @@ class TwistTeam(MotionFit):
         into = adjoint_inverse(frame)
         out = []
         for part in self.parts:
-            left, fused, covariance = self._left(part)
+            left, fused, covariance = self._apart(part)
             down, level = _down(part, frame.inverse() @ grasps)
             known = level & (part.seen.any(1) | (part.rows.kind == "still"))
             out.append((from_twists(part.rows, fused @ into.T, -down, known, highest_hz), left))
@@ -194,11 +181,6 @@ def _joint_fit(parts: Sequence[TwistStretch], log: TeamLog) -> TwistFit:
     """Return the joint fit of recordings."""
     reference = log.names.index(log.reference)
     return fit_twists(TwistScatter.of(tuple(parts)), reference, log.names, _level_pairs(parts, reference))
-
-
-def _changed(parts: tuple[TwistStretch, ...], edit: Edit) -> tuple[TwistStretch, ...]:
-    """Return recordings after an edit of their rows."""
-    return tuple(p.changed(used) for p, used in zip(parts, edit(tuple(p.used for p in parts)), strict=True))
 
 
 def _level_pairs(parts: Sequence[TwistStretch], reference: int) -> Array:

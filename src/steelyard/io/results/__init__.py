@@ -1,1 +1,0 @@
-"""What result files hold beside the ten numbers."""
