@@ -74,8 +74,13 @@ class Sights:
         Of many points and views a share of the points is enough.
         """
         step = max(1, -(-len(self.xyz) * len(self.images[0]) // _PAIRS))
-        H, g = _together(*self.images, self.xyz[::step], self.normal[::step], self.middle, self.window, self.noise)
-        return H * (step / _ALIKE), g * (step / _ALIKE)
+        points = self.xyz[::step], self.normal[::step]
+        g, own, mean_row = _together(*self.images, *points, self.middle, self.window, self.noise)
+        flat = mean_row.reshape(len(mean_row), -1)
+        H = -(flat.T @ flat).reshape(*g.shape, *g.shape)
+        each = np.arange(len(g))
+        H[each, :, each] += own
+        return H.reshape(g.size, g.size) * (step / _ALIKE), g.reshape(-1) * (step / _ALIKE)
 
 
 def moved(sights: Sights, errors: PoseErrors) -> Sights:
@@ -153,23 +158,28 @@ def _together(
     depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
     noise: float,
 ) -> Any:  # fmt: skip
-    """Return the Hessian (6 V, 6 V) and gradient (6 V,) of half the squared distances of the views from their mean."""
-    H, g = np.zeros((6 * len(R), 6 * len(R))), np.zeros(6 * len(R))
-    view, row, height, weight = np.empty(len(R), np.int64), np.empty((len(R), 6)), np.empty(len(R)), np.empty(len(R))
+    """Return what half the squared distances of the views from their mean change with their steps.
+
+    Gradient (V, 6), and the Hessian as its blocks (V, 6, 6) as if the mean stood still, less the square of a matrix
+    (N, V, 6): how the mean goes with the steps at each point.
+    """
+    g, own, mean_row = np.zeros((len(R), 6)), np.zeros((len(R), 6, 6)), np.zeros((len(xyz), len(R), 6))
+    row, over, weight = np.empty((len(R), 6)), np.empty(len(R)), np.empty(len(R))
     for i in range(len(xyz)):
-        n, total, mean = 0, 0.0, 0.0
+        total, mean = 0.0, 0.0
         for k in range(len(R)):
-            heard, over, sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row[n], middle, noise)
-            if not heard or abs(over) > window:
-                continue
-            view[n], height[n] = k, over
-            weight[n] = weight_of(over, sigma)
-            total += weight[n]
-            mean += weight[n] * over
-            n += 1
-        if n > 1:
-            _add(H, g, view[:n], row[:n], height[:n] - mean / total, weight[:n], total)
-    return H, g
+            heard, over[k], sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row[k], middle, noise)
+            weight[k] = weight_of(over[k], sigma) if heard and abs(over[k]) <= window else 0.0
+            total += weight[k]
+            mean += weight[k] * over[k]
+        for k in range(len(R)):
+            if weight[k] > 0:
+                for r in range(6):
+                    g[k, r] += weight[k] * row[k, r] * (over[k] - mean / total)
+                    mean_row[i, k, r] = weight[k] * row[k, r] / np.sqrt(total)
+                    for c in range(6):
+                        own[k, r, c] += weight[k] * row[k, r] * row[k, c]
+    return g, own, mean_row
 
 
 @numba.njit(cache=True, nogil=True)
@@ -215,16 +225,3 @@ def _faces_alike(
         return False
     x, y, z = turned(R, k, x, y)
     return bool(x * n[0] + y * n[1] + z * n[2] > _SAME_WAY * np.sqrt(x * x + y * y + z * z))
-
-
-@numba.njit(cache=True, nogil=True)
-def _add(H: Any, g: Any, view: Any, row: Any, apart: Any, weight: Any, total: float) -> None:
-    """Add what one point, `apart` [m] from the mean of the views that measure it, asks of their steps."""
-    for m in range(len(view)):
-        for r in range(6):
-            g[6 * view[m] + r] += weight[m] * row[m, r] * apart[m]
-        for n in range(len(view)):
-            share = weight[m] * ((m == n) - weight[n] / total)
-            for r in range(6):
-                for c in range(6):
-                    H[6 * view[m] + r, 6 * view[n] + c] += share * row[m, r] * row[n, c]
