@@ -172,7 +172,7 @@ def _left(_: Scene, first: Seen) -> Seen:
 
 
 def _fit_fine(scene: Scene, first: Seen) -> Seen:
-    return _fitted(scene, first, _FINE)
+    return _fitted(scene, first, _FINE, near=True)
 
 
 def _fit_far(scene: Scene, first: Seen) -> Seen:
@@ -208,13 +208,17 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
     return float(np.sqrt(((turn @ middle + shift) @ shown.T).var(0).sum() + by_turns))
 
 
-def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...]) -> Seen:
-    """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn."""
+def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = False) -> Seen:
+    """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn.
+
+    near  whether the reported poses are: of what views hardly show, poses far off tell less than they do
+    """
     errors = PoseErrors.unknown(scene.given.rotation.matrix, *_REPORTED)
     for window in windows:
         sights = _sights(scene, seen, window)
         errors = errors.seen(sights.off(), *sights.each_by_itself())
-        *_, scene.R, scene.p = (moved_together if window <= _TOGETHER else moved)(sights, errors).images
+        sights = moved(sights, errors) if window > _TOGETHER else moved_together(sights, errors if near else None)
+        *_, scene.R, scene.p = sights.images
         seen = replace(Seen.by(scene), errors=errors)
     return seen
 

@@ -25,6 +25,9 @@ from steelyard.spatial import Pose, Rotation
 _STEPS = 3  # of Gauss and Newton, per view
 _ALIKE = 50.0  # neighbours on the surface whose errors are one: an edge that blurs does so on its whole length
 _PAIRS = 90_000  # of a point and a view that are looked at, about: of many views a share of the points is enough
+_DAMPED = np.repeat(
+    [1 / np.radians(2.0) ** 2, 1 / 0.01**2], 3
+)  # precision of the last pose of a view [1/rad^2], [1/m^2]
 _BESIDE = 2  # pixels from one whose normal is taken to its neighbours
 _SAME_WAY = 0.7  # cosine of two normals of one surface
 _FLOOR = 1e-4  # of the surface: it is known no better [m]
@@ -96,23 +99,28 @@ def moved(sights: Sights, errors: PoseErrors) -> Sights:
     return sights
 
 
-def moved_together(sights: Sights, errors: PoseErrors) -> Sights:
-    """Return views that agree best, by what is believed of their poses."""
-    information = errors.information()
+def moved_together(sights: Sights, errors: PoseErrors | None) -> Sights:
+    """Return views that agree best, by what is believed of their poses; None where that tells less than the views do.
+
+    They then stay near their last poses instead, step by step.
+    """
+    count = len(sights.images[0])
+    information = np.eye(6 * count) * np.tile(_DAMPED, count) if errors is None else errors.information()
     for _ in range(_STEPS):
-        sights = sights.after(steps_together(sights, information))
+        off = np.zeros((count, 6)) if errors is None else sights.off()
+        sights = sights.after(steps_together(sights, information, off))
     return sights
 
 
-def steps_together(sights: Sights, information: Array) -> Array:
+def steps_together(sights: Sights, information: Array, off: Array) -> Array:
     """Return steps (V, 6), turns [rad] and shifts [m], after which the views agree best.
 
-    information  (6 V, 6 V) precision of their reported poses
+    information  (6 V, 6 V) precision of poses that they are `off` (V, 6)
     """
     H, g = sights.together()
     # All together are free to go anywhere: they stay.
     H[np.diag_indices(len(H))] += 1.0
-    steps = np.linalg.solve(H + information, -g - information @ sights.off().reshape(-1)).reshape(-1, 6)
+    steps = np.linalg.solve(H + information, -g - information @ off.reshape(-1)).reshape(-1, 6)
     return np.asarray(steps - steps.mean(0))
 
 
