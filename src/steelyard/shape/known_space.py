@@ -32,7 +32,7 @@ class SeenSpace:
     guess      share of a skin, middles (N, 3) and outward areas (N, 3) of its triangles, on which no view measured a
                surface; of what stands clear of the table and does not face it. None: not asked
     unseen     share of the object's surface that nobody saw
-    unsure_m3  standard deviation of the object's volume that the table leaves open [m^3]
+    unsure_m3  standard deviation of the object's volume that table and moved cameras leave open [m^3]
     """
 
     empty: Callable[[Array], Any]
