@@ -42,7 +42,7 @@ def _surroundings(xyz: Array, normal: Array) -> tuple[Array, Array]:
 
     What faces away, as the other side of a sheet does, is no surface of its side.
     """
-    away, rows = cKDTree(xyz).query(xyz, min(_NEIGHBOURS + 1, len(xyz)))
+    away, rows = cKDTree(xyz).query(xyz, np.arange(1, min(_NEIGHBOURS + 1, len(xyz)) + 1))
     cosine = np.einsum("nd,nkd->nk", normal, normal[rows])
     return np.pi * away[:, -1] ** 2 / (cosine > 0).sum(1), (cosine > _SMOOTH).all(1)
 

@@ -25,9 +25,8 @@ from steelyard.spatial import Pose, Rotation
 _STEPS = 3  # of Gauss and Newton, per view
 _ALIKE = 50.0  # neighbours on the surface whose errors are one: an edge that blurs does so on its whole length
 _PAIRS = 90_000  # of a point and a view that are looked at, about: of many views a share of the points is enough
-_DAMPED = np.repeat(
-    [1 / np.radians(2.0) ** 2, 1 / 0.01**2], 3
-)  # precision of the last pose of a view [1/rad^2], [1/m^2]
+# Precision of a view's last pose [1/rad^2], [1/m^2].
+_DAMPED = np.repeat([1 / np.radians(2.0) ** 2, 1 / 0.01**2], 3)
 _BESIDE = 2  # pixels from one whose normal is taken to its neighbours
 _SAME_WAY = 0.7  # cosine of two normals of one surface
 _FLOOR = 1e-4  # of the surface: it is known no better [m]
