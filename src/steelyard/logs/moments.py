@@ -179,7 +179,7 @@ def features(log: MotionLog) -> Array:
     return out.T
 
 
-def regressor(log: MotionLog) -> Array:
+def regressors(log: MotionLog) -> Array:
     """Return A (N, 6, 10), so that the wrench of row n without bias is A[n] phi."""
     return np.asarray(np.einsum("kij,nj->nik", basis(), features(log)[:, MOTION]))
 
