@@ -185,14 +185,10 @@ def _rows(given: Prepared) -> tuple[Array, Felt]:
 def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
     reach = min(_LONGEST_DELAY_S, 0.1 * float(time[-1] - time[0]))
-    ok = given.covered(time, given.known, reach if given.unknown else 0.0)
-    pick = np.flatnonzero(ok)
-    if len(pick) < _FEWEST_ROWS:
-        raise CannotAnswer(
-            f"the streams share only {counted(len(pick), 'row')} in time; record a longer stretch on all."
-        )
-    pick = pick[:: max(len(pick) // _FIT_ROWS, 1)]
-    question = Question(time[pick], felt.rows(pick), given.kinematics, given.imu, given.unknown, given.known, reach)
+    question = _question(given, time, felt, given.known, reach if given.unknown else 0.0)
+    if (shared := len(question.time)) < _FEWEST_ROWS:
+        raise CannotAnswer(f"the streams share only {counted(shared, 'row')} in time; record a longer stretch on all.")
+    question = question.rows(np.arange(0, shared, max(shared // _FIT_ROWS, 1)))
     clocks = refine(question, {**given.known, **scan(question)})
     clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
     late = given.unknown
@@ -209,19 +205,17 @@ def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str
         clocks = replace(again, delays_std_s={**clocks.delays_std_s, **{n: found[n] for n in late}})
 
 
-def _question(given: Prepared, time: Array, felt: Felt, delays: Mapping[str, float]) -> Question | None:
-    """Return what is asked of clocks that are not steady, by all rows that every stream covers; None of too few."""
-    ok = given.covered(time, delays)
-    if ok.sum() < _FEWEST_ROWS:
-        return None
-    return Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known)
+def _question(given: Prepared, time: Array, felt: Felt, delays: Mapping[str, float], reach: float = 0.0) -> Question:
+    """Return what is asked of clocks by the rows that every stream covers, be it late by up to `reach` [s] besides."""
+    ok = given.covered(time, delays, reach)
+    return Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known, reach)
 
 
 def _steadier(
-    given: Prepared, question: Question | None, clocks: Clocks, unsteady: int, jumped: tuple[Placed, ...]
+    given: Prepared, question: Question, clocks: Clocks, unsteady: int, jumped: tuple[Placed, ...]
 ) -> Aligned | None:
     """Return the log with clocks put right that jump or run fast; None where none does, or may be put right yet."""
-    if question is None or not unsteady:
+    if len(question.time) < _FEWEST_ROWS or not unsteady:
         return None
     if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
         recording, placed = _jumps_put_right(given, jumps, clocks.delays_s)
@@ -243,7 +237,7 @@ def _jumps_put_right(
         time, felt = _rows(again)
         calm = ~inside(time, _taps(again)) & _held_alone(again, time)
         question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
-        if question is None:
+        if len(question.time) < _FEWEST_ROWS:
             break
         more = clock_jumps.still_jumping(question, late, placed, wrench)
         recording = clock_jumps.moved(recording, more)
