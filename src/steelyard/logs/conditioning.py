@@ -34,14 +34,12 @@ class Signal:
     rate: float
 
     def at(self, time: Array) -> Array:
-        """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is
-        held."""
+        """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is held."""
         return np.asarray(self.spline(np.clip(time, self.start, self.end)))
 
 
 def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Signal:
-    """Return `values` (N, D) as a function of time, low-passed at `cutoff_hz` where that is below 0.4 of the
-    rate.
+    """Return `values` (N, D) as a function of time, low-passed at `cutoff_hz` where that is below 0.4 of the rate.
 
     Without a cut-off the samples themselves are met exactly. Linear where fewer than four samples are left.
     """

@@ -41,8 +41,7 @@ class Clocks:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Everything the fit needs: rows on the wrench clock and the other streams as functions of their own
-    time.
+    """Everything the fit needs: rows on the wrench clock and the other streams as functions of their own time.
 
     time (N,), felt (N,) the wrench on the object; unknown = streams whose delay is sought, up to `max_delay_s` [s];
     known = the other delays [s]

@@ -51,8 +51,7 @@ class Mounting:
     scale_std: float = 0.0
 
     def at_sensor(self, specific_force: Array, omega: Array, alpha: Array) -> Array:
-        """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning
-        of S."""
+        """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning of S."""
         turned = self.scale * self.rotation.apply(specific_force - self.bias)
         return np.asarray(turned - lever_acceleration(omega, alpha, self.position))
 
@@ -84,13 +83,11 @@ def unit_factor(specific_force: Array, gravity_size: float) -> float:
 
 
 def first_mount(specific_force: Array, gravity: Array | None, force: Array) -> Rotation:
-    """Return R_SI from directions: specific force (N, 3) in the accelerometer's axes, gravity and force (N,
-    3) in S.
+    """Return R_SI from directions: specific force (N, 3) in the accelerometer's axes, gravity and force (N, 3) in S.
 
-    Gravity alone decides while it visits two directions of S; else the force joins in (it is along a - g for
-    a load at rest). A constant bias of the accelerometer cancels, save for a small share that only breaks
-    ties.
-    One-axis turning leaves rank two, which handedness completes.
+    Gravity alone decides while it visits two directions of S; else the force joins in (it is along a - g for a load at
+    rest). A constant bias of the accelerometer cancels, save for a small share that only breaks ties. One-axis turning
+    leaves rank two, which handedness completes.
     """
     f = specific_force - specific_force.mean(0)
     if gravity is None:

@@ -113,10 +113,9 @@ class _Layout:
 def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     """Return the joint robust least-squares answer, started from `delays` [s].
 
-    Residuals: the wrench of a free body with a free bias, and, where an accelerometer and gravity are there,
-    what the accelerometer shows against gravity and the measured acceleration (or a free centre of
-    turning where none is measured). Scales come from the residuals; rows far off count less; standard
-    deviations from time blocks.
+    Residuals: the wrench of a free body with a free bias, and, where an accelerometer and gravity are there, what the
+    accelerometer shows against gravity and the measured acceleration (or a free centre of turning where none is
+    measured). Scales come from the residuals; rows far off count less; standard deviations from time blocks.
     """
     motion, wrench, force = question.seen(delays)
     mount = None

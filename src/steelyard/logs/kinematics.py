@@ -1,5 +1,4 @@
-"""Kinematics: gravity, rates and accelerations in S at any time, out of whatever motion channels there
-are."""
+"""Kinematics: gravity, rates and accelerations in S at any time, out of whatever motion channels there are."""
 
 from __future__ import annotations
 
@@ -189,9 +188,8 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
 
     gravity_world  (3,) [m/s^2] in W
 
-    Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the
-    acceleration must come from them, positions always. Raises BadDescription when W-frame channels come without a
-    rotation.
+    Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the acceleration
+    must come from them, positions always. Raises BadDescription when W-frame channels come without a rotation.
     """
     found: dict[str, tuple[Stream, Array]] = {}
     for stream in streams:

@@ -195,8 +195,7 @@ def _quintic(knots: Any, states: Any, variance: Any, times: Any, left: Any) -> A
 
 
 def _best_ratio(clock: Array, values: Array, order: int) -> tuple[float, int, float]:
-    """Return the least cost, the order, and the most likely ratio of process to measurement noise per
-    step."""
+    """Return the least cost, the order, and the most likely ratio of process to measurement noise per step."""
     from scipy.optimize import minimize_scalar
 
     pieces = _pieces(len(clock))

@@ -24,8 +24,7 @@ Found = Mapping[str, tuple[Stream, Array]]
 
 
 def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tuple[Finding, ...], str]:
-    """Return the log of streams without time, matched by row, the rotations, findings and the acceleration's
-    source.
+    """Return the log of streams without time, matched by row, the rotations, findings and the acceleration's source.
 
     A table of poses is at rest. Other rows keep the accelerations that were given; nothing is
     differentiated, and `clock-missing` says so.
@@ -59,8 +58,7 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
 
 
 def _gravity(gravity: Array, found: Found, rotation: Rotation | None, wrench: Array) -> Array:
-    """Return gravity in S (N, 3) from the rotation, else the gravity channel, else an accelerometer at
-    rest."""
+    """Return gravity in S (N, 3) from the rotation, else the gravity channel, else an accelerometer at rest."""
     if rotation is not None:
         return np.asarray(rotation.inverse().matrix @ gravity)
     if "gravity" in found:
