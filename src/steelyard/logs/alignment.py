@@ -15,7 +15,7 @@ from steelyard.logs import clock_jumps, clock_rates
 from steelyard.logs.bandwidth import rigid_up_to
 from steelyard.logs.clock import sampling_rate, stamps_of
 from steelyard.logs.clock_jumps import ClockJump, Placed
-from steelyard.logs.conditioning import noise_std, signal
+from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Mounting
@@ -28,7 +28,7 @@ from steelyard.logs.prepared import AlignOptions, Prepared, prepared
 from steelyard.logs.recording import Recording
 from steelyard.logs.steady import with_steady_stamps
 from steelyard.logs.stillness import pose_numbers, still_rows
-from steelyard.logs.tables import align_tables
+from steelyard.logs.tables import NO_GRAVITY, align_tables
 from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
@@ -274,16 +274,16 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
         arm = float(clocks.mounting.position @ clocks.mounting.position)
         variance, within = given.imu.noise_std**2 + arm * motion.alpha_variance, (within[0], 1.0)
     if gravity is None:
-        raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
+        raise BadDescription(NO_GRAVITY)
     bare = MotionLog(wrench, gravity, acceleration, motion.omega, motion.alpha)
     turning = motion.rotation is not None or "angular_velocity" in given.kinematics.channels
     still = still_rows(time, motion.omega, motion.velocity, wrench, turning)
     index = classes(still, motion.alpha_variance)
     residual = wrench - bare.predicted(clocks.body)
-    share = 1.0 if given.cutoff is None else min(1.0, 2 * given.cutoff / sampling_rate(given.clock))
     noise = levels(
         index, motion.alpha_variance, variance, residual - np.median(residual, 0), clocks.body,
-        noise_std(given.wrench(clocks.delays_s)) ** 2 * share, given.recording.noise, within,
+        noise_std(given.wrench(clocks.delays_s)) ** 2 * noise_left(given.cutoff, sampling_rate(given.clock)),
+        given.recording.noise, within,
     )  # fmt: skip
     log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
     log = replace(log, dead=np.array(felt.dead))

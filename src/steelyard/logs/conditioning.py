@@ -75,6 +75,11 @@ def lowpass_gain(frequency: Array, cutoff_hz: float) -> Array:
     return np.asarray(1 / (1 + (frequency / cutoff_hz) ** 8))
 
 
+def noise_left(cutoff_hz: float | None, rate_hz: float) -> float:
+    """Return the share of the variance of white noise that a low-pass leaves; all of it where there is none."""
+    return 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate_hz)
+
+
 def taken_by_filter(frequency: Array, late: float | Array) -> Array:
     """Return what a filter of first order that is `late` [s] takes at `frequency` [Hz], as a share of what it leaves.
 

@@ -10,7 +10,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.logs.clock import stamps_of
-from steelyard.logs.conditioning import Signal, noise_std, signal
+from steelyard.logs.conditioning import Signal, noise_left, noise_std, signal
 from steelyard.logs.recording import Stream
 from steelyard.logs.smoothing import Smooth, smooth, smooth_rotations, turning
 from steelyard.spatial import Rotation, lever_acceleration
@@ -219,5 +219,6 @@ def _channel(stream: Stream, values: Array, quantity: str, smoothed: bool, cutof
     if smoothed:
         return Channel(stream.name, smooth(time, values, cutoff_hz=cutoff_hz), world)
     curve = signal(time, values, cutoff_hz)
-    share = min(1.0, 2 * cutoff_hz / curve.rate) if cutoff_hz is not None else 1.0
-    return Channel(stream.name, curve, world, float((noise_std(values) ** 2).mean()) * share)
+    return Channel(
+        stream.name, curve, world, float((noise_std(values) ** 2).mean()) * noise_left(cutoff_hz, curve.rate)
+    )

@@ -9,6 +9,7 @@ import numpy as np
 from steelyard.check import Array, Integers, Mask
 from steelyard.inertia.regressor import motion_map
 from steelyard.logs.log import Noise
+from steelyard.logs.runs import stretches
 
 # What may be declared of the six variances of a motion and of a wrench.
 MOTION, WRENCH = ("angular_acceleration", "acceleration"), ("torque", "force")
@@ -31,7 +32,7 @@ def huber(scaled: Array) -> Array:
 
 def block_sums(scores: Array, blocks: int) -> Array:
     """Return the sums (blocks, P) of scores (N, P) over as many even stretches of rows."""
-    block = np.minimum(np.arange(len(scores)) * blocks // max(len(scores), 1), blocks - 1)
+    block = stretches(len(scores), blocks)
     return np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
 
 
