@@ -25,7 +25,6 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
-from steelyard.identify.masses.misdrawn import misdrawn
 from steelyard.identify.masses.models import (
     Masses,
     averaged_masses,
@@ -35,7 +34,7 @@ from steelyard.identify.masses.models import (
 )
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
 from steelyard.identify.masses.recentred import apart, followed, recentred
-from steelyard.identify.masses.shape_error import MEASURED, ShapeError
+from steelyard.identify.masses.shape_error import MEASURED, ShapeError, misdrawn
 from steelyard.identify.masses.uneven import Uneven, suspicious, uneven
 from steelyard.identify.problem import Problem
 from steelyard.identify.rest import without_noise_of_rest
