@@ -91,11 +91,7 @@ def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
     if log.noise is None:
         log = _with_classes(log)
     noise = tuple(
-        Noise(
-            as_declared(n.acceleration, declared, MOTION),
-            as_declared(np.zeros(6), declared, WRENCH),
-            n.taken,
-        )
+        Noise(as_declared(n.acceleration, declared, MOTION), as_declared(np.zeros(6), declared, WRENCH), n.taken)
         for n in log.noise or ()
     )
     return replace(log, noise=noise)

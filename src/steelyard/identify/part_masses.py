@@ -25,13 +25,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
-from steelyard.identify.masses.models import (
-    Masses,
-    averaged_masses,
-    free_masses,
-    free_mean,
-    material_masses,
-)
+from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, free_mean, material_masses
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
 from steelyard.identify.masses.recentred import apart, followed, recentred
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError, misdrawn
