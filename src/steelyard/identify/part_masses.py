@@ -25,7 +25,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
-from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, free_mean, material_masses
+from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
 from steelyard.identify.masses.recentred import apart, followed, recentred
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError, misdrawn
@@ -128,12 +128,10 @@ class PartMasses:
         the log says.
         """
         data = self._data(problem, linear, score)
-        body = InertialParameters(linear[:10])
-        for _ in range(RENEWALS - 1):  # weights hardly depend on how the whole is shared among parts
-            free = self.density == "free" and not self.materials
-            mean = free_mean(data, self.parts) if free else self._masses(data, body, listed=False).mean
-            body = with_mass(self.parts, mean, data)
-            data = self._data(problem, data.linear_at(body.vector), score)
+        # Weights hardly depend on how the whole is shared among parts.
+        masses = self._masses(data, InertialParameters(linear[:10]), listed=False)
+        body = with_mass(self.parts, masses.mean, data)
+        data = self._data(problem, data.linear_at(body.vector), score)
         there = self
         if self.shape_error.grasp_steps():
             there, data, body = self._where_seen(problem, data, body, score)

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
@@ -99,7 +99,7 @@ def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] 
     taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
-    alone = ~touched & _held_alone(given, time)
+    alone = ~touched & ~given.in_hands(time)
     straight = felt.rows(alone).turned_back(given.options.turn)
     clocks, delayed = _clocks(given, time[alone], straight)
     steadier = _steadier(given, _question(given, time[alone], straight, clocks.delays_s), clocks, unsteady, jumped)
@@ -144,11 +144,6 @@ def _taps(given: Prepared) -> Array:
             late = given.known.get(stream.name, 0.0)
             found.append(bursts(stamps_of(stream) - late, stream.channels["specific_force"], margin))
     return merged(*found)
-
-
-def _held_alone(given: Prepared, time: Array) -> Mask:
-    """Return which of `time` (N,) no hand is known to have touched."""
-    return ~inside(time, np.array(given.options.touched).reshape(-1, 2))
 
 
 def _rows(given: Prepared) -> tuple[Array, Felt]:
@@ -235,7 +230,7 @@ def _jumps_put_right(
     for _ in range(_JUMP_ROUNDS):
         again = prepared(recording, given.options)
         time, felt = _rows(again)
-        calm = ~inside(time, _taps(again)) & _held_alone(again, time)
+        calm = ~inside(time, _taps(again)) & ~again.in_hands(time)
         question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
         if len(question.time) < _FEWEST_ROWS:
             break

@@ -75,6 +75,10 @@ class Prepared:
             spans[self.imu.name] = (self.imu.signal.start, self.imu.signal.end)
         return spans
 
+    def in_hands(self, time: Array) -> Mask:
+        """Return at which times (N,) a hand is known to have touched the object."""
+        return inside(time, np.array(self.options.touched).reshape(-1, 2))
+
     def covered(self, time: Array, delays: Mapping[str, float], reach: float = 0.0) -> Mask:
         """Return which times (N,) all streams cover, be they late by up to `reach` [s] more or less."""
         ok = np.ones(len(time), bool)
