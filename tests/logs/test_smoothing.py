@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from steelyard.errors import BadValue
-from steelyard.logs.smoothing import passed, smooth, smooth_rotations
+from steelyard.logs.smoothing import passed, smooth, smooth_rotations, turning
 from steelyard.spatial import Rotation
 
 
@@ -73,8 +73,8 @@ def test_rotation_smoothing_does_not_care_about_frames():
     R = Rotation.exp(0.9 * wave(t)) @ Rotation.exp(1e-3 * rng.normal(size=(len(t), 3)))
     A, B = Rotation.exp([0.3, -2.0, 1.0]), Rotation.exp([2.5, 0.4, -0.2])
     at = np.linspace(0.5, 5.5, 200)
-    R1, w1, a1, v1 = smooth_rotations(t, R).at(at)
-    R2, w2, a2, v2 = smooth_rotations(t, A @ R @ B).at(at)
+    R1, w1, a1, v1 = turning(*smooth_rotations(t, R).at(at))
+    R2, w2, a2, v2 = turning(*smooth_rotations(t, A @ R @ B).at(at))
     assert np.allclose((A @ R1 @ B).matrix, R2.matrix, atol=1e-6)
     assert np.allclose(B.inverse().apply(w1), w2, atol=1e-5)
     assert np.allclose(B.inverse().apply(a1), a2, atol=1e-3)
@@ -86,7 +86,7 @@ def test_angular_rates_of_a_known_spin():
     spin = 0.8 * np.sin(1.5 * t)[:, None] * np.array([0.0, 1.0, 0.0])
     rng = np.random.default_rng(1)
     R = Rotation.exp(spin) @ Rotation.exp(1e-5 * rng.normal(size=(len(t), 3)))
-    _, omega, alpha, variance = smooth_rotations(t, R).at(t)
+    _, omega, alpha, variance = turning(*smooth_rotations(t, R).at(t))
     inner = slice(50, -50)
     assert np.allclose(omega[inner, 1], (1.2 * np.cos(1.5 * t))[inner], atol=2e-3)
     assert np.allclose(alpha[inner, 1], (-1.8 * np.sin(1.5 * t))[inner], atol=5 * np.sqrt(variance[:, 2].mean()))

@@ -6,6 +6,7 @@ strength is their gamma = alpha tr(A^T Sigma^-1 A). The prior adds no second par
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
 from typing import Literal
@@ -56,8 +57,12 @@ class Geodesic(Estimator):
         prior = _neutral(linear) if self.prior is None else forms.pseudo_inertia(self.prior.vector)
         gamma = 0.5 * self.alpha * float(np.trace(H[:10, :10]))
         x = np.concatenate([forms.from_pseudo_inertia(prior), linear[10:]])
+
+        def cost(at: Array) -> float:
+            return float(0.5 * at @ H @ at - g @ at + gamma * self._pull(at, prior)[0])
+
         for _ in range(ITERATIONS):
-            value, slope, metric = self._pull(x, prior)
+            _, slope, metric = self._pull(x, prior)
             gradient, hessian = H @ x - g, H.copy()
             gradient[:10] += gamma * slope
             hessian[:10, :10] += gamma * metric
@@ -65,28 +70,8 @@ class Geodesic(Estimator):
             decrement = -float(gradient @ step)
             if decrement < CONVERGED:
                 return Solution(x + step, np.eye(10), gamma * metric, weights)
-            x = self._shorten(x, step, decrement, 0.5 * x @ H @ x - g @ x + gamma * value, H, g, gamma, prior)
+            x = _shortened(cost, x, step, decrement)
         raise CannotAnswer(f"The geodesic fit did not settle in {ITERATIONS} steps; give a prior nearer to the object.")
-
-    def _shorten(
-        self,
-        x: Array,
-        step: Array,
-        decrement: float,
-        cost: float,
-        H: Array,
-        g: Array,
-        gamma: float,
-        prior: Array,
-    ) -> Array:
-        """Return the first of x + step, x + step/2, ... that is a body and lowers the cost."""
-        for halving in range(60):
-            trial = x + 0.5**halving * step
-            value = self._pull(trial, prior)[0]
-            now = 0.5 * trial @ H @ trial - g @ trial + gamma * value
-            if now <= cost - 1e-4 * 0.5**halving * decrement + 1e-12 * abs(cost):
-                return np.asarray(trial)
-        return np.asarray(x)
 
     def _pull(self, x: Array, prior: Array) -> tuple[float, Array, Array]:
         """Return the distance of phi = x[:10] from the prior, its gradient (10,) and metric (10, 10); inf outside."""
@@ -107,6 +92,16 @@ class Geodesic(Estimator):
         longest = float(np.abs(logs).max())
         bend = longest / np.tanh(longest) if longest > 1e-6 else 1.0
         return float((logs**2).sum()), slope, 2 * bend * metric
+
+
+def _shortened(cost: Callable[[Array], float], x: Array, step: Array, decrement: float) -> Array:
+    """Return the first of x + step, x + step/2, ... that is a body and lowers the cost."""
+    before = cost(x)
+    for share in 0.5 ** np.arange(60):
+        trial = x + share * step
+        if cost(trial) <= before - 1e-4 * share * decrement + 1e-12 * abs(before):
+            return np.asarray(trial)
+    return x
 
 
 @cache

@@ -71,7 +71,8 @@ def _total(problem: Problem) -> Array:
         data += np.einsum("pij,qij->pq", W @ T @ S, T)
         noise[:10, :10] += S[18, 18] * np.einsum("pij,qij->pq", (W @ T[:10, :, :6]) * Sa, T[:10, :, :6])
         noise[10, 10] += S[18, 18] * float(np.diag(W) @ Sw)
-    reduced = _project_out(data, 11)
+    corner = np.linalg.pinv(data[11:, 11:], hermitian=True)
+    reduced = data[:11, :11] - data[:11, 11:] @ corner @ data[11:, :11]
     # Columns that the log does not excite at all stay at zero.
     seen = np.diag(reduced) > UNSEEN * np.diag(data)[:11]
     scale = np.where(seen, 1 / np.sqrt(np.where(seen, np.diag(reduced), 1.0)), 0.0)
@@ -83,15 +84,4 @@ def _total(problem: Problem) -> Array:
     _, vectors = eigh(noise * np.outer(scale, scale), regular, check_finite=False)
     x = scale * vectors[:, -1]
     x = x / x[10]
-    if not problem.with_bias:
-        return np.asarray(x[:10])
-    rest = -np.linalg.pinv(data[11:, 11:], hermitian=True) @ data[11:, :11] @ x
-    return np.concatenate([x[:10], rest])
-
-
-def _project_out(matrix: Array, keep: int) -> Array:
-    """Return the Schur complement of the first `keep` rows and columns."""
-    if len(matrix) == keep:
-        return matrix
-    corner = np.linalg.pinv(matrix[keep:, keep:], hermitian=True)
-    return np.asarray(matrix[:keep, :keep] - matrix[:keep, keep:] @ corner @ matrix[keep:, :keep])
+    return np.concatenate([x[:10], -corner @ data[11:, :11] @ x])

@@ -14,7 +14,7 @@ from steelyard.identify.rest import RIPPLE, without_acceleration
 from steelyard.inertia.regressor import design
 from steelyard.logs.log import Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
-from steelyard.logs.noise import robust_std, rounding
+from steelyard.logs.noise import MOTION, WRENCH, as_declared, robust_std, rounding
 
 # Below this many rows the three axes share one level: noise that is slow leaves fewer independent rows than it seems,
 # and an axis that looks quiet by chance would be over-weighted.
@@ -91,11 +91,7 @@ def with_declared(log: MotionLog, declared: Mapping[str, float]) -> MotionLog:
     if log.noise is None:
         log = _with_classes(log)
     noise = tuple(
-        Noise(
-            _declared(n.acceleration, declared, ("angular_acceleration", "acceleration")),
-            _declared(np.zeros(6), declared, ("torque", "force")),
-            n.taken,
-        )
+        Noise(as_declared(n.acceleration, declared, MOTION), as_declared(np.zeros(6), declared, WRENCH), n.taken)
         for n in log.noise or ()
     )
     return replace(log, noise=noise)
@@ -106,15 +102,6 @@ def without_dead(log: MotionLog) -> MotionLog:
     if log.noise is None or not log.dead.any():
         return log
     return replace(log, noise=tuple(replace(n, wrench=np.where(log.dead, DEAF, n.wrench)) for n in log.noise))
-
-
-def _declared(variance: Array, declared: Mapping[str, float], names: tuple[str, str]) -> Array:
-    """Return variances (6,) with the triples that are declared replaced."""
-    out = np.array(variance)
-    for k, name in enumerate(names):
-        if name in declared:
-            out[3 * k : 3 * k + 3] = declared[name] ** 2
-    return out
 
 
 def _with_classes(log: MotionLog) -> MotionLog:

@@ -25,17 +25,10 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
-from steelyard.identify.masses.misdrawn import misdrawn
-from steelyard.identify.masses.models import (
-    Masses,
-    averaged_masses,
-    free_masses,
-    free_mean,
-    material_masses,
-)
+from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
 from steelyard.identify.masses.recentred import apart, followed, recentred
-from steelyard.identify.masses.shape_error import MEASURED, ShapeError
+from steelyard.identify.masses.shape_error import MEASURED, ShapeError, misdrawn
 from steelyard.identify.masses.uneven import Uneven, suspicious, uneven
 from steelyard.identify.problem import Problem
 from steelyard.identify.rest import without_noise_of_rest
@@ -114,11 +107,13 @@ class PartMasses:
         linear = problem.reweighted(2)
         if not linear[0] > 0:
             raise CannotAnswer("The log shows no weight: the mass comes out at zero or below. Check the wrench sign.")
-        return linear if self.tool is None else linear - np.pad(self.tool.parameters.vector, (0, len(linear) - 10))
+        return self._loaded(linear, times=-1.0)
 
-    def _loaded(self, linear: Array) -> Array:
-        """Return the linear parameters (p,) of the load, tool and object, from those with the object's."""
-        return linear if self.tool is None else linear + np.pad(self.tool.parameters.vector, (0, len(linear) - 10))
+    def _loaded(self, linear: Array, times: float = 1.0) -> Array:
+        """Return the linear parameters (p,) of the object with so many times those of the tool added."""
+        if self.tool is None:
+            return linear
+        return linear + times * np.pad(self.tool.parameters.vector, (0, len(linear) - 10))
 
     def _data(self, problem: Problem, linear: Array, score: Array | None) -> Effective:
         """Return what the log says of the object, with the weights at `linear` (p,): the object's phi and the bias."""
@@ -133,12 +128,10 @@ class PartMasses:
         the log says.
         """
         data = self._data(problem, linear, score)
-        body = InertialParameters(linear[:10])
-        for _ in range(RENEWALS - 1):  # weights hardly depend on how the whole is shared among parts
-            free = self.density == "free" and not self.materials
-            mean = free_mean(data, self.parts) if free else self._masses(data, body, listed=False).mean
-            body = with_mass(self.parts, mean, data)
-            data = self._data(problem, data.linear_at(body.vector), score)
+        # Weights hardly depend on how the whole is shared among parts.
+        masses = self._masses(data, InertialParameters(linear[:10]), listed=False)
+        body = with_mass(self.parts, masses.mean, data)
+        data = self._data(problem, data.linear_at(body.vector), score)
         there = self
         if self.shape_error.grasp_steps():
             there, data, body = self._where_seen(problem, data, body, score)
@@ -213,11 +206,7 @@ class PartMasses:
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""
         body = InertialParameters(found.vector)
-        if self.shape_error.movable:
-            return self._built(problem, data, found.masses, *self._placed(data, body, found.covariance))
-        error = self.shape_error.covariance(body)
-        follows = found.covariance @ data.left_by(error)
-        return self._built(problem, data, found.masses, body, found.covariance + error, follows)
+        return self._built(problem, data, found.masses, *self._placed(data, body, found.covariance, blurred=True))
 
     def _loosened(self, problem: Problem, data: Effective) -> Estimate:
         """Return the Estimate with the shape trusted less; raises NoMasses where that does not help."""
@@ -257,18 +246,20 @@ class PartMasses:
         spread = B @ masses.covariance @ B.T
         if self.shape_error.doubtful:
             masses = misdrawn(data, self.parts, masses, self.shape_error)
-        if self.shape_error.movable:
-            return self._built(problem, data, masses, *self._placed(data, body, spread))
-        return self._built(problem, data, masses, body, spread + self.shape_error.covariance(body), spread)
+        placed = self._placed(data, body, spread, blurred=self.shape_error.movable)
+        return self._built(problem, data, masses, *placed)
 
     def _placed(
-        self, data: Effective, body: InertialParameters, spread: Array
+        self, data: Effective, body: InertialParameters, spread: Array, blurred: bool
     ) -> tuple[InertialParameters, Array, Array]:
         """Return the body where shape, grasp and log together see it, its covariance, and how it follows the log.
 
-        spread  (10, 10) of the body by masses of the log as blurred by the error of shape and grasp
+        spread   (10, 10) of the body by its masses
+        blurred  whether these are by the log as blurred by the error of shape and grasp
         """
         error = self.shape_error.with_grasp(body)
+        if not self.shape_error.movable:
+            return body, spread + error, spread @ data.left_by(error) if blurred else spread
         placed = (followed if self.shape_error.doubtful else recentred)(data, body, error)
         covariance = placed.left_of(data, spread) + placed.error
         return placed.body, covariance, placed.following(data, spread @ data.left_by(error))

@@ -30,9 +30,7 @@ def at_rest(log: MotionLog, phi: Array, bias: Array) -> MotionLog:
     variance = np.stack([n.acceleration for n in log.noise])[log.noise_class]
     share = np.where(log.still[:, None], RIPPLE / np.maximum(RIPPLE + variance, 1e-300), 1.0)
     quiet = replace(
-        log,
-        angular_acceleration=share[:, :3] * log.angular_acceleration,
-        acceleration=share[:, 3:] * log.acceleration,
+        log, angular_acceleration=share[:, :3] * log.angular_acceleration, acceleration=share[:, 3:] * log.acceleration
     )
     wrench_variance = np.stack([n.wrench for n in log.noise])[log.noise_class]
     miss = log.wrench - bias - quiet.predicted(phi)

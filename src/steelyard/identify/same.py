@@ -46,9 +46,8 @@ def compare(
     """Compare two bodies given with their covariances (10, 10) of m, h, I about the origin.
 
     `known` (10,) says which of mass, com, inertia about the CoM both results identify. `any_grasp` compares only what
-    does not depend on how the object is held: mass and principal moments.
-    Raises CannotAnswer where nothing is left to compare, BadValue for a body of mass zero, which has no centre, and for
-    covariances with a negative variance.
+    does not depend on how the object is held: mass and principal moments. Raises CannotAnswer where nothing is left to
+    compare, BadValue for a body of mass zero, which has no centre, and for covariances with a negative variance.
     """
     first, first_cov, names = _quantities(one, one_covariance, any_grasp)
     second, second_cov, _ = _quantities(other, other_covariance, any_grasp)

@@ -84,8 +84,7 @@ def _own(rest: Estimate, of_load: Mask, of_tool: Mask) -> Estimate:
 def different_bias(p: float) -> Finding:
     """Return the finding that two runs do not share their bias."""
     return Finding.of(
-        "bias-drift",
-        f"The sensor's bias changed between the tool's run and this one (p = {p:.1g}); it was not shared.",
+        "bias-drift", f"The sensor's bias changed between the tool's run and this one (p = {p:.1g}); it was not shared."
     )
 
 

@@ -7,7 +7,7 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array
 from steelyard.errors import BadDescription, CannotAnswer
 from steelyard.findings import Finding, counted
 from steelyard.logs import alignment_findings as say
@@ -15,7 +15,7 @@ from steelyard.logs import clock_jumps, clock_rates
 from steelyard.logs.bandwidth import rigid_up_to
 from steelyard.logs.clock import sampling_rate, stamps_of
 from steelyard.logs.clock_jumps import ClockJump, Placed
-from steelyard.logs.conditioning import noise_std, signal
+from steelyard.logs.conditioning import noise_left, noise_std, signal
 from steelyard.logs.delays import Clocks, Question, scan
 from steelyard.logs.felt import Felt
 from steelyard.logs.imu import Mounting
@@ -28,7 +28,7 @@ from steelyard.logs.prepared import AlignOptions, Prepared, prepared
 from steelyard.logs.recording import Recording
 from steelyard.logs.steady import with_steady_stamps
 from steelyard.logs.stillness import pose_numbers, still_rows
-from steelyard.logs.tables import align_tables
+from steelyard.logs.tables import NO_GRAVITY, align_tables
 from steelyard.spatial import Rotation
 
 _FIT_ROWS = 6000
@@ -99,7 +99,7 @@ def _align_timed(given: Prepared, unsteady: int = 0, jumped: tuple[Placed, ...] 
     taps = _taps(given)
     time, felt = _rows(given)
     touched = inside(time, taps)
-    alone = ~touched & _held_alone(given, time)
+    alone = ~touched & ~given.in_hands(time)
     straight = felt.rows(alone).turned_back(given.options.turn)
     clocks, delayed = _clocks(given, time[alone], straight)
     steadier = _steadier(given, _question(given, time[alone], straight, clocks.delays_s), clocks, unsteady, jumped)
@@ -146,11 +146,6 @@ def _taps(given: Prepared) -> Array:
     return merged(*found)
 
 
-def _held_alone(given: Prepared, time: Array) -> Mask:
-    """Return which of `time` (N,) no hand is known to have touched."""
-    return ~inside(time, np.array(given.options.touched).reshape(-1, 2))
-
-
 def _rows(given: Prepared) -> tuple[Array, Felt]:
     """Return the common clock (M,) and the wrench there: low-passed, thinned to what passes."""
     every = 1
@@ -185,14 +180,10 @@ def _rows(given: Prepared) -> tuple[Array, Felt]:
 def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str, ...]]:
     """Return the joint fit and the streams that are late; a delay that is not significant is set to none."""
     reach = min(_LONGEST_DELAY_S, 0.1 * float(time[-1] - time[0]))
-    ok = given.covered(time, given.known, reach if given.unknown else 0.0)
-    pick = np.flatnonzero(ok)
-    if len(pick) < _FEWEST_ROWS:
-        raise CannotAnswer(
-            f"the streams share only {counted(len(pick), 'row')} in time; record a longer stretch on all."
-        )
-    pick = pick[:: max(len(pick) // _FIT_ROWS, 1)]
-    question = Question(time[pick], felt.rows(pick), given.kinematics, given.imu, given.unknown, given.known, reach)
+    question = _question(given, time, felt, given.known, reach if given.unknown else 0.0)
+    if (shared := len(question.time)) < _FEWEST_ROWS:
+        raise CannotAnswer(f"the streams share only {counted(shared, 'row')} in time; record a longer stretch on all.")
+    question = question.rows(np.arange(0, shared, max(shared // _FIT_ROWS, 1)))
     clocks = refine(question, {**given.known, **scan(question)})
     clocks = replace(clocks, delays_std_s=_with_interpolation(given, clocks.delays_std_s))
     late = given.unknown
@@ -209,19 +200,17 @@ def _clocks(given: Prepared, time: Array, felt: Felt) -> tuple[Clocks, tuple[str
         clocks = replace(again, delays_std_s={**clocks.delays_std_s, **{n: found[n] for n in late}})
 
 
-def _question(given: Prepared, time: Array, felt: Felt, delays: Mapping[str, float]) -> Question | None:
-    """Return what is asked of clocks that are not steady, by all rows that every stream covers; None of too few."""
-    ok = given.covered(time, delays)
-    if ok.sum() < _FEWEST_ROWS:
-        return None
-    return Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known)
+def _question(given: Prepared, time: Array, felt: Felt, delays: Mapping[str, float], reach: float = 0.0) -> Question:
+    """Return what is asked of clocks by the rows that every stream covers, be it late by up to `reach` [s] besides."""
+    ok = given.covered(time, delays, reach)
+    return Question(time[ok], felt.rows(ok), given.kinematics, given.imu, given.unknown, given.known, reach)
 
 
 def _steadier(
-    given: Prepared, question: Question | None, clocks: Clocks, unsteady: int, jumped: tuple[Placed, ...]
+    given: Prepared, question: Question, clocks: Clocks, unsteady: int, jumped: tuple[Placed, ...]
 ) -> Aligned | None:
     """Return the log with clocks put right that jump or run fast; None where none does, or may be put right yet."""
-    if question is None or not unsteady:
+    if len(question.time) < _FEWEST_ROWS or not unsteady:
         return None
     if jumps := clock_jumps.clock_jumps(question, clocks.delays_s):
         recording, placed = _jumps_put_right(given, jumps, clocks.delays_s)
@@ -241,9 +230,9 @@ def _jumps_put_right(
     for _ in range(_JUMP_ROUNDS):
         again = prepared(recording, given.options)
         time, felt = _rows(again)
-        calm = ~inside(time, _taps(again)) & _held_alone(again, time)
+        calm = ~inside(time, _taps(again)) & ~again.in_hands(time)
         question = _question(again, time[calm], felt.rows(calm).turned_back(given.options.turn), late)
-        if question is None:
+        if len(question.time) < _FEWEST_ROWS:
             break
         more = clock_jumps.still_jumping(question, late, placed, wrench)
         recording = clock_jumps.moved(recording, more)
@@ -280,16 +269,16 @@ def _log(given: Prepared, time: Array, felt: Felt, clocks: Clocks) -> tuple[Moti
         arm = float(clocks.mounting.position @ clocks.mounting.position)
         variance, within = given.imu.noise_std**2 + arm * motion.alpha_variance, (within[0], 1.0)
     if gravity is None:
-        raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
+        raise BadDescription(NO_GRAVITY)
     bare = MotionLog(wrench, gravity, acceleration, motion.omega, motion.alpha)
     turning = motion.rotation is not None or "angular_velocity" in given.kinematics.channels
     still = still_rows(time, motion.omega, motion.velocity, wrench, turning)
     index = classes(still, motion.alpha_variance)
     residual = wrench - bare.predicted(clocks.body)
-    share = 1.0 if given.cutoff is None else min(1.0, 2 * given.cutoff / sampling_rate(given.clock))
     noise = levels(
         index, motion.alpha_variance, variance, residual - np.median(residual, 0), clocks.body,
-        noise_std(given.wrench(clocks.delays_s)) ** 2 * share, given.recording.noise, within,
+        noise_std(given.wrench(clocks.delays_s)) ** 2 * noise_left(given.cutoff, sampling_rate(given.clock)),
+        given.recording.noise, within,
     )  # fmt: skip
     log = replace(bare, time=time, still=still, pose=pose_numbers(time, still), noise_class=index, noise=noise)
     log = replace(log, dead=np.array(felt.dead))

@@ -108,7 +108,7 @@ def mount_findings(imu: Imu | None, mounting: Mounting | None) -> tuple[Finding,
         message = f"The numbers of '{imu.name}' only fit gravity when multiplied by {imu.factor:.4g}; they were."
         out.append(Finding.of("gravity-in-g", message))
     angle = float(mounting.rotation.angle())
-    std = 0.0 if mounting.rotation_std is None else float(np.max(mounting.rotation_std))
+    std = float(np.max(mounting.rotation_std))
     if imu.rotation is None and angle > max(_TURNED, 3 * std):
         message = (
             f"The accelerometer of '{imu.name}' is turned by {np.degrees(angle):.1f} ± {np.degrees(std):.1f} "
@@ -162,15 +162,11 @@ def axes_in_words(rotation: Rotation) -> str:
 def notes(clocks: Clocks, acceleration_from: str) -> tuple[str, ...]:
     """Return in words what the motion could not tell."""
     out = []
-    mounting = clocks.mounting
-    if mounting is not None and mounting.position_std is not None:
-        loose = np.flatnonzero(mounting.position_std > _LOOSE_M)
-        if len(loose):
-            axes = ", ".join("xyz"[i] for i in loose)
+    if (mounting := clocks.mounting) is not None:
+        if axes := ", ".join("xyz"[i] for i in np.flatnonzero(mounting.position_std > _LOOSE_M)):
             out.append(f"the accelerometer's place along {axes} of S is not fixed by this motion")
-    turn_std = None if mounting is None else mounting.rotation_std
-    if turn_std is not None and float(np.max(turn_std)) > _LOOSE_RAD:
-        out.append("the accelerometer's mount rotation is not fixed about every axis by this motion")
+        if float(np.max(mounting.rotation_std)) > _LOOSE_RAD:
+            out.append("the accelerometer's mount rotation is not fixed about every axis by this motion")
     if acceleration_from == "none":
         out.append(
             "no stream measures the acceleration of S: it is taken as zero, with a spread that grows with turning"

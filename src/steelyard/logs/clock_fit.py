@@ -18,6 +18,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.delays import Question, features
 from steelyard.logs.noise import FAR, block_sums, huber, robust_std
+from steelyard.logs.runs import stretches
 
 # A clock is called from so many standard deviations, where it leaves at most this share of the squared residual that
 # one delay leaves.
@@ -125,7 +126,7 @@ def holding(
     question: Question, start: Mapping[str, Clock], found: Mapping[str, Clock], sure: Mapping[str, Clock]
 ) -> dict[str, Clock]:
     """Return those of the `sure` clocks whose `more` holds when each of some stretches is left out (jackknife)."""
-    stretch = np.arange(len(question.time)) * _STRETCHES // len(question.time)
+    stretch = stretches(len(question.time), _STRETCHES)
     without = [np.flatnonzero(stretch != k).astype(np.int64) for k in range(_STRETCHES)]
     told = [settled(question.rows(rows), start, found) for rows in without]
     loose = {n: np.sqrt(_STRETCHES - 1) * float(np.std([clocks[n].more for clocks in told])) for n in sure}

@@ -16,16 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap, stamps_of
-from steelyard.logs.clock_fit import (
-    ROWS,
-    SURE,
-    ClockCourse,
-    Linear,
-    holding,
-    seen,
-    settled,
-    share_left,
-)
+from steelyard.logs.clock_fit import ROWS, SURE, ClockCourse, Linear, holding, seen, settled, share_left
 from steelyard.logs.clock_rates import ClockRate
 from steelyard.logs.delays import Question
 from steelyard.logs.noise import huber

@@ -13,15 +13,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock_fit import (
-    LEFT,
-    ROWS,
-    SURE,
-    ClockCourse,
-    holding,
-    settled,
-    share_left,
-)
+from steelyard.logs.clock_fit import LEFT, ROWS, SURE, ClockCourse, holding, settled, share_left
 from steelyard.logs.delays import Question
 from steelyard.logs.recording import Recording
 from steelyard.logs.runs import picked

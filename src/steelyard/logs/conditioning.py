@@ -34,14 +34,12 @@ class Signal:
     rate: float
 
     def at(self, time: Array) -> Array:
-        """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is
-        held."""
+        """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is held."""
         return np.asarray(self.spline(np.clip(time, self.start, self.end)))
 
 
 def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Signal:
-    """Return `values` (N, D) as a function of time, low-passed at `cutoff_hz` where that is below 0.4 of the
-    rate.
+    """Return `values` (N, D) as a function of time, low-passed at `cutoff_hz` where that is below 0.4 of the rate.
 
     Without a cut-off the samples themselves are met exactly. Linear where fewer than four samples are left.
     """
@@ -75,6 +73,11 @@ def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> 
 def lowpass_gain(frequency: Array, cutoff_hz: float) -> Array:
     """Return the share (K,) of an amplitude that a fourth-order `lowpass` leaves at frequencies (K,) [Hz]."""
     return np.asarray(1 / (1 + (frequency / cutoff_hz) ** 8))
+
+
+def noise_left(cutoff_hz: float | None, rate_hz: float) -> float:
+    """Return the share of the variance of white noise that a low-pass leaves; all of it where there is none."""
+    return 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate_hz)
 
 
 def taken_by_filter(frequency: Array, late: float | Array) -> Array:

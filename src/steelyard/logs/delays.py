@@ -41,11 +41,10 @@ class Clocks:
 
 @dataclass(frozen=True, eq=False)
 class Question:
-    """Everything the fit needs: rows on the wrench clock and the other streams as functions of their own
-    time.
+    """Everything the fit needs: rows on the wrench clock and the other streams as functions of their own time.
 
-    time (N,), felt (N,) the wrench on the object; unknown = streams whose delay is sought; known = the other
-    delays [s]
+    time (N,), felt (N,) the wrench on the object; unknown = streams whose delay is sought, up to `max_delay_s` [s];
+    known = the other delays [s]
     """
 
     time: Array
@@ -54,7 +53,7 @@ class Question:
     imu: Imu | None
     unknown: tuple[str, ...]
     known: Mapping[str, float]
-    max_delay_s: float = 0.25
+    max_delay_s: float
     _cache: dict[tuple[float, ...], tuple[Motion, Array, Array | None]] = field(default_factory=dict, repr=False)
 
     @property

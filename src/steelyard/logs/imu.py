@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.logs.clock import sampling_rate, stamps_of
-from steelyard.logs.conditioning import Signal, noise_std, signal
+from steelyard.logs.clock import stamps_of
+from steelyard.logs.conditioning import Signal, noise_left, noise_std, signal
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -46,13 +46,12 @@ class Mounting:
     position: Array
     bias: Array
     scale: float = 1.0
-    rotation_std: Array | None = None
-    position_std: Array | None = None
+    rotation_std: Array = field(default_factory=lambda: np.zeros(3))
+    position_std: Array = field(default_factory=lambda: np.zeros(3))
     scale_std: float = 0.0
 
     def at_sensor(self, specific_force: Array, omega: Array, alpha: Array) -> Array:
-        """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning
-        of S."""
+        """Return a - g of the S origin in S (N, 3) from what the accelerometer shows (N, 3) and the turning of S."""
         turned = self.scale * self.rotation.apply(specific_force - self.bias)
         return np.asarray(turned - lever_acceleration(omega, alpha, self.position))
 
@@ -62,9 +61,7 @@ def imu(stream: Stream, gravity_size: float, cutoff_hz: float | None) -> Imu:
     values, time = stream.channels["specific_force"], stamps_of(stream)
     factor = unit_factor(values, gravity_size)
     curve = signal(time, values * factor, cutoff_hz)
-    rate = sampling_rate(time)
-    share = 1.0 if cutoff_hz is None else min(1.0, 2 * cutoff_hz / rate)
-    noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * share))
+    noise = float(np.sqrt((noise_std(values * factor) ** 2).mean() * noise_left(cutoff_hz, curve.rate)))
     return Imu(
         stream.name,
         curve,
@@ -84,13 +81,11 @@ def unit_factor(specific_force: Array, gravity_size: float) -> float:
 
 
 def first_mount(specific_force: Array, gravity: Array | None, force: Array) -> Rotation:
-    """Return R_SI from directions: specific force (N, 3) in the accelerometer's axes, gravity and force (N,
-    3) in S.
+    """Return R_SI from directions: specific force (N, 3) in the accelerometer's axes, gravity and force (N, 3) in S.
 
-    Gravity alone decides while it visits two directions of S; else the force joins in (it is along a - g for
-    a load at rest). A constant bias of the accelerometer cancels, save for a small share that only breaks
-    ties.
-    One-axis turning leaves rank two, which handedness completes.
+    Gravity alone decides while it visits two directions of S; else the force joins in (it is along a - g for a load at
+    rest). A constant bias of the accelerometer cancels, save for a small share that only breaks ties. One-axis turning
+    leaves rank two, which handedness completes.
     """
     f = specific_force - specific_force.mean(0)
     if gravity is None:

@@ -10,8 +10,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
+from steelyard.logs.kinematics import Motion
 from steelyard.logs.log import MotionLog
-from steelyard.logs.moments import regressor
+from steelyard.logs.moments import regressors
 from steelyard.logs.noise import block_sums, huber, robust_std
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -33,8 +34,9 @@ _LONGEST_MEMORY = 0.1  # of the rows: how far the correlation of residuals is fo
 
 @dataclass(frozen=True, eq=False)
 class _Layout:
-    """Where each unknown sits in the vector of the joint fit, with its starting value and prior width."""
+    """Where each unknown of a question sits in the vector theta (U,), with its starting value and prior width."""
 
+    question: Question
     slices: dict[str, slice]
     start: Array
     width: Array
@@ -65,7 +67,7 @@ class _Layout:
         add("wrench_bias", question.seen(delays)[1].mean(0), np.full(6, 1e3))
         ends = np.cumsum([k for _, k in names])
         slices = {name: slice(int(e) - k, int(e)) for (name, k), e in zip(names, ends, strict=True)}
-        return cls(slices, np.concatenate(start), np.concatenate(width), mount)
+        return cls(question, slices, np.concatenate(start), np.concatenate(width), mount)
 
     def held(self, *names: str) -> _Layout:
         """Return the layout with these blocks held where they start."""
@@ -74,11 +76,11 @@ class _Layout:
             width[self.slices[name]] = _HELD
         return replace(self, width=width)
 
-    def held_clocks(self, question: Question) -> _Layout:
+    def held_clocks(self) -> _Layout:
         """Return the layout with every delay but the accelerometer's held where it starts."""
-        width = self.width.copy()
-        for i, name in enumerate(question.unknown):
-            if question.imu is None or name != question.imu.name:
+        width, imu = self.width.copy(), self.question.imu
+        for i, name in enumerate(self.question.unknown):
+            if imu is None or name != imu.name:
                 width[self.slices["delay"].start + i] = _HELD
         return replace(self, width=width)
 
@@ -97,19 +99,23 @@ class _Layout:
         scale = float(self.get(theta, "scale", np.ones(1))[0])
         return Mounting(rotation, position, self.get(theta, "bias", np.zeros(3)), scale)
 
-    def delays(self, theta: Array, question: Question) -> dict[str, float]:
+    def delays(self, theta: Array) -> dict[str, float]:
         """Return all delays [s], given and those in theta (U,)."""
+        question = self.question
         sought = dict(zip(question.unknown, (float(v) for v in theta[self.slices["delay"]]), strict=True))
         return {**question.known, **sought}
+
+    def seen(self, theta: Array) -> tuple[Motion, Array, Array | None]:
+        """Return motion, wrench (N, 6) in S and raw specific force (N, 3) by the delays in theta (U,)."""
+        return self.question.seen(self.delays(theta))
 
 
 def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     """Return the joint robust least-squares answer, started from `delays` [s].
 
-    Residuals: the wrench of a free body with a free bias, and, where an accelerometer and gravity are there,
-    what the accelerometer shows against gravity and the measured acceleration (or a free centre of
-    turning where none is measured). Scales come from the residuals; rows far off count less; standard
-    deviations from time blocks.
+    Residuals: the wrench of a free body with a free bias, and, where an accelerometer and gravity are there, what the
+    accelerometer shows against gravity and the measured acceleration (or a free centre of turning where none is
+    measured). Scales come from the residuals; rows far off count less; standard deviations from time blocks.
     """
     motion, wrench, force = question.seen(delays)
     mount = None
@@ -117,17 +123,17 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
         mount = question.imu.rotation or first_mount(force, motion.gravity, wrench[:, 3:])
     free_centre = motion.gravity is not None and not motion.measured
     layout = _Layout.of(question, delays, mount, centre=free_centre)
-    layout = _mount_by_gravity(question, layout)
-    theta, weights = _rounds(question, layout)
-    if _mount_spoiled(question, layout, theta):
+    layout = _mount_by_gravity(layout)
+    theta, weights = _rounds(layout)
+    if _mount_spoiled(layout, theta):
         # A hand on the object: what accelerometer and gravity tell alone is kept out of the wrench's reach.
-        calm = scan_without_wrench(question, layout.delays(theta, question))
+        calm = scan_without_wrench(question, layout.delays(theta))
         layout = _Layout.of(question, calm, mount, centre=free_centre)
-        layout = _mount_by_gravity(question, layout).held("rotation", "bias").held_clocks(question)
-        theta, weights = _rounds(question, layout)
-    std = _block_std(question, layout, theta, weights)
-    residual = _residual(question, layout, theta)[:, :6]
-    found = layout.delays(theta, question)
+        layout = _mount_by_gravity(layout).held("rotation", "bias").held_clocks()
+        theta, weights = _rounds(layout)
+    std = _block_std(layout, theta, weights)
+    residual = _residual(layout, theta)[:, :6]
+    found = layout.delays(theta)
     spread = dict.fromkeys(found, 0.0)
     loose = np.where(layout.width[layout.slices["delay"]] < _HELD * 2, _GRAVITY_CLOCK, std[layout.slices["delay"]])
     spread.update(zip(question.unknown, (float(v) for v in loose), strict=True))
@@ -142,79 +148,77 @@ def refine(question: Question, delays: Mapping[str, float]) -> Clocks:
     return Clocks(found, spread, mounting, theta[layout.slices["body"]], residual)
 
 
-def _rows(question: Question, layout: _Layout, theta: Array) -> tuple[MotionLog, list[Array]]:
-    """Return the rows by the clocks and the mount in theta, and what the accelerometer leaves, (N, 3) if any."""
-    motion, wrench, raw = question.seen(layout.delays(theta, question))
-    zero = np.zeros_like(motion.omega)
-    gravity = motion.gravity
+def _residual(layout: _Layout, theta: Array) -> Array:
+    """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
+    return _rows(layout, theta)[1]
+
+
+def _rows(layout: _Layout, theta: Array) -> tuple[MotionLog, Array]:
+    """Return the rows by the clocks and the mount in theta, and their residuals."""
+    motion, wrench, raw = layout.seen(theta)
+    imu, gravity, zero = layout.question.imu, motion.gravity, np.zeros_like(motion.omega)
     pull = (gravity if gravity is not None else zero) - motion.acceleration
     extra: list[Array] = []
-    if question.imu is not None and raw is not None:
-        mounting = layout.mounting(theta, question.imu)
+    if imu is not None and raw is not None:
+        mounting = layout.mounting(theta, imu)
         own = mounting.at_sensor(raw, motion.omega, motion.alpha)
         if gravity is not None:
             # What a centre of turning away from S adds; absorbs the S acceleration that nothing measures.
             shift = lever_acceleration(motion.omega, motion.alpha, layout.get(theta, "centre", np.zeros(3)))
-            # Over the scale, so that it multiplies gravity and not the vibration (which would draw it below
-            # one).
+            # Over the scale, which so multiplies gravity and not the vibration (that would draw it below one).
             extra = [(own - shift + pull) / mounting.scale]
         pull = -own
-    return MotionLog(wrench, pull, zero, motion.omega, motion.alpha), extra
-
-
-def _residual(question: Question, layout: _Layout, theta: Array) -> Array:
-    """Return residuals (N, 6) of the wrench, or (N, 9) with those of the accelerometer."""
-    log, extra = _rows(question, layout, theta)
+    log = MotionLog(wrench, pull, zero, motion.omega, motion.alpha)
     body, bias = theta[layout.slices["body"]], theta[layout.slices["wrench_bias"]]
-    return np.concatenate([log.wrench - bias - log.predicted(body), *extra], 1)
+    return log, np.concatenate([wrench - bias - log.predicted(body), *extra], 1)
 
 
-def _jacobian(question: Question, layout: _Layout, theta: Array) -> tuple[Array, Array]:
+def _jacobian(layout: _Layout, theta: Array) -> tuple[Array, Array]:
     """Return residuals (N, k) and their derivative (N, k, P), forward differences where it is not linear."""
-    base = _residual(question, layout, theta)
+    log, base = _rows(layout, theta)
     out = np.zeros((*base.shape, len(theta)))
-    out[:, :6, layout.slices["body"]] = -regressor(_rows(question, layout, theta)[0])
+    out[:, :6, layout.slices["body"]] = -regressors(log)
     out[:, :6, layout.slices["wrench_bias"]] = -np.eye(6)
     for i in range(layout.slices["body"].start):
         moved = theta.copy()
         moved[i] += _STEP
-        out[..., i] = (_residual(question, layout, moved) - base) / _STEP
+        out[..., i] = (_residual(layout, moved) - base) / _STEP
     return base, out
 
 
-def _rounds(question: Question, layout: _Layout) -> tuple[Array, Array]:
+def _rounds(layout: _Layout) -> tuple[Array, Array]:
     """Return the fit and its row weights: scales from the residuals, far rows first counted less, then let go."""
-    theta, sigma = layout.start.copy(), _first_scales(question, layout)
+    theta, sigma = layout.start.copy(), _first_scales(layout)
     weights = np.zeros((0, 0))
     for k in range(_ROUNDS):
-        theta, weights, sigma = _descend(question, layout, theta, sigma, power=1 if k < _ROUNDS // 2 else 2)
+        theta, weights, sigma = _descend(layout, theta, sigma, power=1 if k < _ROUNDS // 2 else 2)
     return theta, weights
 
 
-def _mount_spoiled(question: Question, layout: _Layout, theta: Array) -> bool:
+def _mount_spoiled(layout: _Layout, theta: Array) -> bool:
     """Say whether the wrench has turned the mount away from what gravity shows (a hand on the object does)."""
     if "rotation" not in layout.slices:
         return False
     mounted = theta.copy()
     for name in ("rotation", "bias"):
         mounted[layout.slices[name]] = layout.start[layout.slices[name]]
-    sizes = [np.median(np.abs(_residual(question, layout, t)[:, 6:]).sum(1)) for t in (mounted, theta)]
+    sizes = [np.median(np.abs(_residual(layout, t)[:, 6:]).sum(1)) for t in (mounted, theta)]
     return bool(sizes[1] > _SPOILED * sizes[0])
 
 
-def _mount_by_gravity(question: Question, layout: _Layout) -> _Layout:
+def _mount_by_gravity(layout: _Layout) -> _Layout:
     """Return the layout started, and softly held, at the mount that gravity alone tells.
 
     A hand on the object spoils the wrench for seconds; it cannot spoil this. Held at three standard deviations,
     so that a clean wrench, which says it ten times better, has the last word.
     """
-    if "rotation" not in layout.slices or question.seen(layout.delays(layout.start, question))[0].gravity is None:
+    if "rotation" not in layout.slices or layout.seen(layout.start)[0].gravity is None:
         return layout
     alone = layout.held("delay")
-    sigma = _first_scales(question, layout)
+    sigma = _first_scales(layout)
     sigma[:6] = np.inf
-    theta, weights, _ = _descend(question, alone, layout.start, sigma)
-    std = _block_std(question, alone, theta, weights)
+    theta, weights, _ = _descend(alone, layout.start, sigma)
+    std = _block_std(alone, theta, weights)
     start, width = layout.start.copy(), layout.width.copy()
     for name, least in (("rotation", 0.01), ("bias", 0.02)):
         part = layout.slices[name]
@@ -222,13 +226,11 @@ def _mount_by_gravity(question: Question, layout: _Layout) -> _Layout:
     return replace(layout, start=start, width=width)
 
 
-def _descend(
-    question: Question, layout: _Layout, theta: Array, sigma: Array, power: int = 1
-) -> tuple[Array, Array, Array]:
+def _descend(layout: _Layout, theta: Array, sigma: Array, power: int = 1) -> tuple[Array, Array, Array]:
     """Take Gauss-Newton steps at fixed scales; return theta, row weights (N, k) and new scales (k,)."""
     pull = 1 / layout.width**2
     for _ in range(_STEPS):
-        r, J = _jacobian(question, layout, theta)
+        r, J = _jacobian(layout, theta)
         H, scores = _normal(J, _weights(r, sigma, power), r, pull)
         step = -np.linalg.solve(H, scores.sum(0) + pull * (theta - layout.start))
         biggest = float(np.abs(step[layout.slices["delay"]]).max(initial=0.0))
@@ -236,8 +238,8 @@ def _descend(
         theta = theta + step
         if np.abs(step * np.sqrt(np.diag(H))).max() < 0.01:
             break
-    r = _residual(question, layout, theta)
-    least = _first_scales(question, layout)
+    r = _residual(layout, theta)
+    least = _first_scales(layout)
     seen = np.clip(robust_std(r), 0.3 * least, 3 * least)
     seen[6:] *= np.sqrt(_memory(r[:, 6:]))
     seen[:6] = np.where(np.isfinite(sigma[:6]), seen[:6], np.inf)
@@ -264,9 +266,9 @@ def _memory(residual: Array) -> Array:
     return np.asarray(np.maximum(2 * (correlation * positive).sum(0) - 1, 1.0))
 
 
-def _first_scales(question: Question, layout: _Layout) -> Array:
+def _first_scales(layout: _Layout) -> Array:
     """Return starting scales (k,): what free linear fits of the channels leave over, infinite for dead channels."""
-    motion, wrench, force = question.seen(layout.delays(layout.start, question))
+    motion, wrench, force = layout.seen(layout.start)
     residual = free_residual(wrench, features(motion, force))
     scales = robust_std(residual)
     if force is not None and motion.gravity is not None:
@@ -276,7 +278,7 @@ def _first_scales(question: Question, layout: _Layout) -> Array:
     if len(scales) > 6 and force is not None:
         sizes = np.append(sizes, np.full(3, force.std()))
     scales = np.maximum(scales, _FINEST * sizes + 1e-12)
-    scales[:6][list(question.felt.dead)] = np.inf
+    scales[:6][list(layout.question.felt.dead)] = np.inf
     return np.asarray(scales)
 
 
@@ -293,9 +295,9 @@ def _weights(residual: Array, sigma: Array, power: int) -> Array:
     return out
 
 
-def _block_std(question: Question, layout: _Layout, theta: Array, weights: Array) -> Array:
+def _block_std(layout: _Layout, theta: Array, weights: Array) -> Array:
     """Return standard deviations (P,) by the sandwich over time blocks, which sees correlated residuals."""
-    r, J = _jacobian(question, layout, theta)
+    r, J = _jacobian(layout, theta)
     prior = np.diag(1 / layout.width**2)
     H, scores = _normal(J, weights, r, 1 / layout.width**2)
     sums = block_sums(scores, _BLOCKS)

@@ -1,5 +1,4 @@
-"""Kinematics: gravity, rates and accelerations in S at any time, out of whatever motion channels there
-are."""
+"""Kinematics: gravity, rates and accelerations in S at any time, out of whatever motion channels there are."""
 
 from __future__ import annotations
 
@@ -11,9 +10,9 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.logs.clock import stamps_of
-from steelyard.logs.conditioning import Signal, noise_std, signal
+from steelyard.logs.conditioning import Signal, noise_left, noise_std, signal
 from steelyard.logs.recording import Stream
-from steelyard.logs.smoothing import Smooth, SmoothRotation, smooth, smooth_rotations
+from steelyard.logs.smoothing import Smooth, smooth, smooth_rotations, turning
 from steelyard.spatial import Rotation, lever_acceleration
 
 # How late each stream's stamps are [s]: throughout, or at each of the times asked for.
@@ -52,12 +51,31 @@ class Motion:
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """One quantity of one stream, ready to be evaluated; `curve` is a Signal or a smoothed signal."""
+    """One quantity of one stream as a curve on its clock, smoothed or low-passed alone.
+
+    world     its vectors are in W
+    variance  of what is not smoothed
+    """
 
     stream: str
-    curve: Signal | Smooth | SmoothRotation
+    curve: Signal | Smooth
     world: bool
     variance: float = 0.0
+
+    def at(self, time: Array, delays: Delays) -> tuple[Array, Array]:
+        """Return values (M, k, D) and their variances (M, k): k = 3 with two derivatives where smoothed, else 1."""
+        stamps = time + delays.get(self.stream, 0.0)
+        if isinstance(self.curve, Smooth):
+            return self.curve.at(stamps)
+        return self.curve.at(stamps)[:, None], np.full((len(time), 1), self.variance)
+
+    def in_sensor(self, vectors: Array, turn: Rotation | None) -> Array:
+        """Return vectors (M, 3) of the channel in S; one without a rotation `turn` is in S."""
+        return turn.inverse().apply(vectors) if self.world and turn is not None else vectors
+
+    def passed(self, derivative: int) -> float:
+        """Return the share of noise in the variance of a derivative."""
+        return float(self.curve.passed[derivative]) if isinstance(self.curve, Smooth) else 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -96,21 +114,23 @@ class Kinematics:
 
         The rest is what a smoother took off the signal.
         """
-        alpha = _passed(self.channels, {"angular_acceleration": 0, "angular_velocity": 1, "rotation": 2})
-        return alpha, _passed(self.channels, {"linear_acceleration": 0, "linear_velocity": 1, "position": 2})
+        alpha = self._passed("angular_acceleration", "angular_velocity", "rotation")
+        return alpha, self._passed("linear_acceleration", "linear_velocity", "position")
+
+    def _passed(self, *quantities: str) -> float:
+        """Return the share of noise in what the first of these that there is tells, each by one derivative more."""
+        shares = (self.channels[q].passed(k) for k, q in enumerate(quantities) if q in self.channels)
+        return next(shares, 1.0)
 
     def at(self, time: Array, delays: Delays) -> Motion:
-        """Return the motion at `time` (M,) [s] of the common clock; delays [s] say how late each stream's
-        stamps are."""
+        """Return the motion at `time` (M,) [s] of the common clock, by how late [s] each stream's stamps are."""
         turn, omega, alpha, alpha_variance = self._turning(time, delays)
-        gravity = self._gravity(time, delays, turn)
-        velocity = self._vector("linear_velocity", time, delays, turn)
-        acceleration, variance = self._acceleration(time, delays, turn, omega)
-        if turn is not None and "position" in self.channels and (velocity is None or acceleration is None):
-            states, of_states = self._smooth("position", time, delays)
-            velocity = turn.inverse().apply(states[:, 1]) if velocity is None else velocity
-            if acceleration is None:
-                acceleration, variance = turn.inverse().apply(states[:, 2]), of_states[:, 2]
+        gravity, told = None, self.channels.get("gravity")
+        if turn is not None:
+            gravity = np.asarray(turn.inverse().matrix @ self.gravity_world)
+        elif told is not None:
+            gravity = told.at(time, delays)[0][:, 0]
+        velocity, acceleration, variance = self._moving(time, delays, turn, omega)
         measured = acceleration is not None
         if acceleration is None:
             acceleration = np.zeros_like(omega)
@@ -121,78 +141,46 @@ class Kinematics:
             variance = variance + float(self.place @ self.place) * alpha_variance
         return Motion(gravity, turn, omega, alpha, velocity, acceleration, alpha_variance, variance, measured)
 
-    def _smooth(self, quantity: str, time: Array, delays: Delays) -> tuple[Array, Array]:
-        channel = self.channels[quantity]
-        curve = channel.curve
-        if not isinstance(curve, Smooth):
-            raise BadDescription(f"{quantity} of '{channel.stream}' is not smoothed.")
-        return curve.at(time + delays.get(channel.stream, 0.0))
-
-    def _vector(self, quantity: str, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
-        """Return a channel's values in S, None where there is no such channel."""
-        channel = self.channels.get(quantity)
-        if channel is None:
-            return None
-        shifted = time + delays.get(channel.stream, 0.0)
-        curve = channel.curve
-        if isinstance(curve, Smooth):
-            values = curve.at(shifted)[0][:, 0]
-        elif isinstance(curve, Signal):
-            values = curve.at(shifted)
-        else:
-            raise BadDescription(f"{quantity} cannot be a rotation.")
-        return _into_sensor(values, channel, turn)
-
     def _turning(self, time: Array, delays: Delays) -> tuple[Rotation | None, Array, Array, Array]:
+        """Return rotation, angular velocity and acceleration (M, 3) in S, and the variance (M,) of the latter."""
         zero = np.zeros((len(time), 3))
         turn, omega, alpha, variance = None, zero, zero, np.zeros(len(time))
-        rotation = self.channels.get("rotation")
-        if rotation is not None and isinstance(rotation.curve, SmoothRotation):
-            turn, omega, alpha, v = rotation.curve.at(time + delays.get(rotation.stream, 0.0))
+        if (channel := self.channels.get("rotation")) is not None:
+            turn, omega, alpha, v = turning(*channel.at(time, delays))
             variance = v[:, 2]
-        given = self._vector("angular_velocity", time, delays, turn)
-        if given is not None:
-            omega = given
-            if isinstance(self.channels["angular_velocity"].curve, Smooth):
-                states, v = self._smooth("angular_velocity", time, delays)
+        if (channel := self.channels.get("angular_velocity")) is not None:
+            states, v = channel.at(time, delays)
+            omega = channel.in_sensor(states[:, 0], turn)
+            if states.shape[1] > 1:
                 # The derivative of body components is the body angular acceleration, in W or S alike.
-                alpha = _into_sensor(states[:, 1], self.channels["angular_velocity"], turn)
-                variance = v[:, 1]
-        given = self._vector("angular_acceleration", time, delays, turn)
-        if given is not None:
-            alpha, variance = given, np.full(len(time), self.channels["angular_acceleration"].variance)
+                alpha, variance = channel.in_sensor(states[:, 1], turn), v[:, 1]
+        if (channel := self.channels.get("angular_acceleration")) is not None:
+            states, v = channel.at(time, delays)
+            alpha, variance = channel.in_sensor(states[:, 0], turn), v[:, 0]
         return turn, omega, alpha, variance
 
-    def _gravity(self, time: Array, delays: Delays, turn: Rotation | None) -> Array | None:
-        if turn is not None:
-            return np.asarray(turn.inverse().matrix @ self.gravity_world)
-        return self._vector("gravity", time, delays, None)
-
-    def _acceleration(
+    def _moving(
         self, time: Array, delays: Delays, turn: Rotation | None, omega: Array
-    ) -> tuple[Array | None, Array]:
-        """Return the classical acceleration in S and its variance from the first channel but positions that has it."""
-        given = self._vector("linear_acceleration", time, delays, turn)
-        if given is not None:
-            return given, np.full(len(time), self.channels["linear_acceleration"].variance)
-        if "linear_velocity" in self.channels:
-            channel = self.channels["linear_velocity"]
-            states, variance = self._smooth("linear_velocity", time, delays)
-            derivative = _into_sensor(states[:, 1], channel, turn)
-            if not channel.world:
-                derivative = derivative + np.cross(omega, states[:, 0])
-            return derivative, variance[:, 1]
-        return None, np.zeros(len(time))
-
-
-def _passed(channels: Mapping[str, Channel], order: Mapping[str, int]) -> float:
-    """Return the share of noise in what the first of some quantities tells by its derivative of that order."""
-    for quantity, derivative in order.items():
-        curve = channels[quantity].curve if quantity in channels else None
-        curve = curve.quaternion if isinstance(curve, SmoothRotation) else curve
-        if curve is not None and (derivative == 0 or isinstance(curve, Smooth)):
-            return float(curve.passed[derivative]) if isinstance(curve, Smooth) else 1.0
-    return 1.0
+    ) -> tuple[Array | None, Array | None, Array]:
+        """Return velocity and classical acceleration (M, 3) in S, None where no channel tells it, and its variance."""
+        velocity, acceleration, variance = None, None, np.zeros(len(time))
+        if (channel := self.channels.get("linear_velocity")) is not None:
+            states, v = channel.at(time, delays)
+            velocity = channel.in_sensor(states[:, 0], turn)
+            if states.shape[1] > 1:
+                acceleration, variance = channel.in_sensor(states[:, 1], turn), v[:, 1]
+                if not channel.world:
+                    acceleration = acceleration + np.cross(omega, states[:, 0])
+        if (channel := self.channels.get("linear_acceleration")) is not None:
+            states, v = channel.at(time, delays)
+            acceleration, variance = channel.in_sensor(states[:, 0], turn), v[:, 0]
+        channel = self.channels.get("position")
+        if turn is not None and channel is not None and (velocity is None or acceleration is None):
+            states, v = channel.at(time, delays)
+            velocity = channel.in_sensor(states[:, 1], turn) if velocity is None else velocity
+            if acceleration is None:
+                acceleration, variance = channel.in_sensor(states[:, 2], turn), v[:, 2]
+        return velocity, acceleration, variance
 
 
 def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: float | None) -> Kinematics:
@@ -200,9 +188,8 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
 
     gravity_world  (3,) [m/s^2] in W
 
-    Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the
-    acceleration must come from them, positions always. Raises BadDescription when W-frame channels come without a
-    rotation.
+    Given accelerations are low-passed at `cutoff_hz` [Hz] only; given velocities are smoothed where the acceleration
+    must come from them, positions always. Raises BadDescription when W-frame channels come without a rotation.
     """
     found: dict[str, tuple[Stream, Array]] = {}
     for stream in streams:
@@ -219,17 +206,8 @@ def kinematics(streams: tuple[Stream, ...], gravity_world: Array, cutoff_hz: flo
     spans = {s.name: (float(s.time[0]), float(s.time[-1])) for s in streams if s.time is not None}
     for channel in channels.values():
         start, end = spans[channel.stream]
-        first, last = _ends(channel.curve, start, end)
-        spans[channel.stream] = (max(start, first), min(end, last))
+        spans[channel.stream] = (max(start, channel.curve.start), min(end, channel.curve.end))
     return Kinematics(channels, gravity_world, spans)
-
-
-def _ends(curve: Signal | Smooth | SmoothRotation, start: float, end: float) -> tuple[float, float]:
-    """Return the first and last time [s] that a curve tells; of a plain one those of its stream."""
-    smoothed = curve.quaternion if isinstance(curve, SmoothRotation) else curve
-    if not isinstance(smoothed, Smooth):
-        return start, end
-    return float(smoothed.time[0]), float(smoothed.time[-1])
 
 
 def _channel(stream: Stream, values: Array, quantity: str, smoothed: bool, cutoff_hz: float | None) -> Channel:
@@ -241,13 +219,6 @@ def _channel(stream: Stream, values: Array, quantity: str, smoothed: bool, cutof
     if smoothed:
         return Channel(stream.name, smooth(time, values, cutoff_hz=cutoff_hz), world)
     curve = signal(time, values, cutoff_hz)
-    share = min(1.0, 2 * cutoff_hz / curve.rate) if cutoff_hz is not None else 1.0
-    return Channel(stream.name, curve, world, float((noise_std(values) ** 2).mean()) * share)
-
-
-def _into_sensor(values: Array, channel: Channel, turn: Rotation | None) -> Array:
-    if not channel.world:
-        return values
-    if turn is None:
-        raise BadDescription(f"a channel of '{channel.stream}' is given in W, but there is no rotation of S in W.")
-    return turn.inverse().apply(values)
+    return Channel(
+        stream.name, curve, world, float((noise_std(values) ** 2).mean()) * noise_left(cutoff_hz, curve.rate)
+    )

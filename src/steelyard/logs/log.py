@@ -154,13 +154,7 @@ class MotionLog:
         zero = np.zeros((len(wrench), 3))
         rows = len(wrench)
         return cls(
-            wrench,
-            gravity,
-            zero,
-            zero,
-            zero,
-            still=np.ones(rows, np.bool_),
-            pose=np.arange(rows, dtype=np.int64),
+            wrench, gravity, zero, zero, zero, still=np.ones(rows, np.bool_), pose=np.arange(rows, dtype=np.int64)
         )
 
     def predicted(self, phi: Array) -> Array:

@@ -9,7 +9,7 @@ by scaling.
 from __future__ import annotations
 
 from collections.abc import Iterable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import numba
@@ -95,20 +95,18 @@ class Moments:
     def of_log(cls, log: MotionLog, by_block: bool = True) -> Moments:
         """Return the statistic of a log, grouped by noise class, stillness and (by default) block."""
         groups, label = _groups(log, by_block)
-        alpha, accel, gravity, omega, wrench = (
-            log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench,
-        )  # fmt: skip
+        columns = _columns(log)
         starts = np.concatenate([[0], np.flatnonzero(label[1:] != label[:-1]) + 1, [len(log)]])
         if len(starts) > len(log) / SHORTEST_RUN + 2:
             # Rows of many groups mixed: gather them first, so that products run over long stretches.
             # Sixteen bits are sorted by counting.
             order = np.argsort(label.astype(np.uint16) if len(groups) < 1 << 16 else label, kind="stable")
-            alpha, accel, gravity, omega, wrench = (_taken(v, order) for v in (alpha, accel, gravity, omega, wrench))
+            columns = tuple(_taken(v, order) for v in columns)  # type: ignore[assignment]
             label = label[order]
             starts = np.searchsorted(label, np.arange(len(groups) + 1))
         out = np.zeros((len(groups), SIZE, SIZE))
         if len(log):
-            _scatter_pass(alpha, accel, gravity, omega, wrench, starts.astype(np.int64), label[starts[:-1]], out)
+            _scatter_pass(*columns, starts.astype(np.int64), label[starts[:-1]], out)
         return cls(out, groups[:, 0], groups[:, 1], groups[:, 2].astype(np.bool_), log.noise)
 
     @classmethod
@@ -134,7 +132,7 @@ class Moments:
 
     def scaled(self, factor: float) -> Moments:
         """Return the statistic with every row weighted by `factor` (forgetting)."""
-        return Moments(self.scatter * factor, self.noise_class, self.block, self.still, self.noise)
+        return replace(self, scatter=self.scatter * factor)
 
     def where(self, keep: Mask) -> Moments:
         """Return the statistic of the groups where `keep` (G,) is true."""
@@ -166,20 +164,16 @@ def _taken(values: Array, rows: Integers) -> Array:
 def features(log: MotionLog) -> Array:
     """Return z (N, 19) of every row: for second passes; the statistic itself never stores them."""
     out = np.empty((SIZE, len(log)))
-    _features(
-        log.angular_acceleration,
-        log.acceleration,
-        log.gravity,
-        log.angular_velocity,
-        log.wrench,
-        0,
-        len(log),
-        out,
-    )
+    _features(*_columns(log), 0, len(log), out)
     return out.T
 
 
-def regressor(log: MotionLog) -> Array:
+def _columns(log: MotionLog) -> tuple[Array, Array, Array, Array, Array]:
+    """Return what the features of a row are made of."""
+    return log.angular_acceleration, log.acceleration, log.gravity, log.angular_velocity, log.wrench
+
+
+def regressors(log: MotionLog) -> Array:
     """Return A (N, 6, 10), so that the wrench of row n without bias is A[n] phi."""
     return np.asarray(np.einsum("kij,nj->nik", basis(), features(log)[:, MOTION]))
 
@@ -191,13 +185,7 @@ def _groups(log: MotionLog, by_block: bool) -> tuple[Integers, Integers]:
     block = log.pose if by_block else np.full(1, -1)
     blocks = int(block.max()) + 2
     key = (2 * log.noise_class + log.still) * blocks + (block + 1)
-    edges = np.flatnonzero(key[1:] != key[:-1])
-    if not len(edges):
-        present = key[:1]
-    elif len(edges) < len(key) // SHORTEST_RUN:
-        present = np.unique(key[np.append(edges, len(key) - 1)])
-    else:
-        present = np.flatnonzero(np.bincount(key))
+    present = np.flatnonzero(np.bincount(key))
     rank = np.zeros(int(present[-1]) + 1, np.int64)
     rank[present] = np.arange(len(present))
     kind, position = np.divmod(present, blocks)

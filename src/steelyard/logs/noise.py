@@ -7,10 +7,12 @@ from collections.abc import Mapping
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
-from steelyard.inertia import forms
+from steelyard.inertia.regressor import motion_map
 from steelyard.logs.log import Noise
-from steelyard.spatial import cross_matrix
+from steelyard.logs.runs import stretches
 
+# What may be declared of the six variances of a motion and of a wrench.
+MOTION, WRENCH = ("angular_acceleration", "acceleration"), ("torque", "force")
 _FEWEST_ROWS = 30
 # Standard deviations from which on a row counts less.
 FAR = 2.0
@@ -30,7 +32,7 @@ def huber(scaled: Array) -> Array:
 
 def block_sums(scores: Array, blocks: int) -> Array:
     """Return the sums (blocks, P) of scores (N, P) over as many even stretches of rows."""
-    block = np.minimum(np.arange(len(scores)) * blocks // max(len(scores), 1), blocks - 1)
+    block = stretches(len(scores), blocks)
     return np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
 
 
@@ -81,26 +83,21 @@ def levels(
     Declared standard deviations (force, torque, acceleration, angular_acceleration) win.
     within  shares of the two variances of the motion that are noise within it
     """
-    mass_matrix = _mass_matrix(body)
+    M = motion_map(body)[:, :6]
     out = []
     for k in range(int(index.max()) + 1):
         rows = index == k
         unsure = np.repeat([alpha_variance[rows].mean(), acceleration_variance[rows].mean()], 3)
-        motion = unsure * np.repeat(within, 3)
-        for name, part in (("angular_acceleration", slice(0, 3)), ("acceleration", slice(3, 6))):
-            if name in declared:
-                motion[part] = declared[name] ** 2
+        motion = as_declared(unsure * np.repeat(within, 3), declared, MOTION)
         seen = robust_std(residual[rows]) ** 2
-        explained = np.einsum("ij,j,ij->i", mass_matrix, motion, mass_matrix)
+        explained = np.einsum("ij,j,ij->i", M, motion, M)
         wrench = np.maximum(seen - explained, np.maximum(least, 0.01 * seen))
-        for name, part in (("torque", slice(0, 3)), ("force", slice(3, 6))):
-            if name in declared:
-                wrench[part] = declared[name] ** 2
-        out.append(Noise(motion, wrench, np.maximum(unsure - motion, 0.0)))
+        out.append(Noise(motion, as_declared(wrench, declared, WRENCH), np.maximum(unsure - motion, 0.0)))
     return tuple(out)
 
 
-def _mass_matrix(body: Array) -> Array:
-    """Return M = [[I, [h]x], [-[h]x, m 1]] that acts on [alpha; a - g]."""
-    h = cross_matrix(body[1:4])
-    return np.block([[forms.inertia_matrix(body), h], [-h, body[0] * np.eye(3)]])
+def as_declared(variance: Array, declared: Mapping[str, float], names: tuple[str, str]) -> Array:
+    """Return variances (6,), each triple by the standard deviation that is declared by its name where one is."""
+    stds = [declared.get(name, np.nan) for name in names]
+    given = np.repeat(np.square(stds), 3)
+    return np.where(np.isnan(given), variance, given)

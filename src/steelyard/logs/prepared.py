@@ -75,6 +75,10 @@ class Prepared:
             spans[self.imu.name] = (self.imu.signal.start, self.imu.signal.end)
         return spans
 
+    def in_hands(self, time: Array) -> Mask:
+        """Return at which times (N,) a hand is known to have touched the object."""
+        return inside(time, np.array(self.options.touched).reshape(-1, 2))
+
     def covered(self, time: Array, delays: Mapping[str, float], reach: float = 0.0) -> Mask:
         """Return which times (N,) all streams cover, be they late by up to `reach` [s] more or less."""
         ok = np.ones(len(time), bool)
@@ -97,15 +101,13 @@ def prepared(recording: Recording, options: AlignOptions) -> Prepared:
     sensor = None
     if feeling is not None and "linear_acceleration" not in moving.channels:
         sensor = imu(feeling, float(np.linalg.norm(recording.gravity)), cutoff)
-    used = {*moving.streams, *([sensor.name] if sensor is not None else [])}
-    seen = set(used)
-    if cutoff is None or source.delay is not None or "specific_force" in source.channels:
-        used -= {source.name}
-    known = {s.name: s.delay or 0.0 for s in streams if s.name in used}
-    late = [s.name for s in recording.streams if s.name in used and s.delay is None]
-    sought = late if options.estimate_delays else []
+    seen = {*moving.streams, *([sensor.name] if sensor is not None else [])}
+    one_clock = cutoff is None or source.delay is not None or "specific_force" in source.channels
+    clocks = [s for s in streams if s.name in (seen - {source.name} if one_clock else seen)]
+    given = {s.name: s.delay for s in recording.streams}
+    sought = [s.name for s in clocks if options.estimate_delays and given[s.name] is None]
+    known = {s.name: s.delay or 0.0 for s in clocks if s.name not in sought}
     felt = Felt.of(wrench_stream, recording.wrench_sign, recording.dead)
-    known = {n: d for n, d in known.items() if n not in sought}
     # A low-pass smears what a smoother makes of a hole over its surroundings.
     smeared = 0.0 if cutoff is None else SMEARED / cutoff
     wider = np.array([-smeared, smeared])

@@ -36,6 +36,11 @@ def distinct_rows(mask: Mask) -> tuple[Mask, Integers]:
     return found, first.ravel()[np.cumsum(changes) - 1]
 
 
+def stretches(rows: int, count: int) -> Integers:
+    """Return which of `count` even stretches each of so many rows (N,) is in."""
+    return np.arange(rows) * count // max(rows, 1)
+
+
 def picked(rows: int, most: int) -> Integers:
     """Return the numbers (k,) of at most `most` rows, spread evenly over all from the first to the last."""
     return np.unique(np.linspace(0, rows - 1, min(rows, most)).astype(np.int64))

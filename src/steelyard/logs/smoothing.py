@@ -50,10 +50,19 @@ class Smooth:
     noise_std: float
     passed: Array
 
+    @property
+    def start(self) -> float:
+        """The first time [s] that it tells."""
+        return float(self.time[0])
+
+    @property
+    def end(self) -> float:
+        """The last time [s] that it tells."""
+        return float(self.time[-1])
+
     def at(self, time: Array) -> tuple[Array, Array]:
-        """Return states (M, 3, D) and variances (M, 3) at other times [s] (quintic Hermite; ends are
-        held)."""
-        times = np.clip(time, self.time[0], self.time[-1])
+        """Return states (M, 3, D) and variances (M, 3) at other times [s] (quintic Hermite; ends are held)."""
+        times = np.clip(time, self.start, self.end)
         left = np.clip(np.searchsorted(self.time, times, "right") - 1, 0, len(self.time) - 2)
         return _quintic(self.time, self.states, self.variance, times, left)  # type: ignore[no-any-return]
 
@@ -128,33 +137,30 @@ def _below(whole: Smooth, cutoff_hz: float) -> Smooth:
     return replace(whole, time=even[inner], states=check.frozen(states[inner]), variance=check.frozen(variance[inner]))
 
 
-@dataclass(frozen=True, eq=False)
-class SmoothRotation:
-    """Smoothed rotations R_WS: quaternions (one Smooth of four channels) and the rates that follow from
-    them."""
+def smooth_rotations(time: Array, rotation: Rotation, cutoff_hz: float | None = None) -> Smooth:
+    """Smooth rotations R_WS (batch (N,)) sampled at rising `time` (N,) [s], low-passed at `cutoff_hz` [Hz] if given.
 
-    quaternion: Smooth
-
-    def at(self, time: Array) -> tuple[Rotation, Array, Array, Array]:
-        """Return rotation, angular velocity, angular acceleration (M, 3) in S, and variances (M, 3).
-
-        The variances are per axis of the angle [rad^2], rate [rad^2/s^2] and acceleration [rad^2/s^4].
-        """
-        states, variance = self.quaternion.at(time)
-        q, dq, ddq = states[:, 0], states[:, 1], states[:, 2]
-        square = (q * q).sum(1)[:, None]
-        growth = 2 * (q * dq).sum(1)[:, None] / square
-        omega = 2 * _conjugate_times(q, dq) / square
-        alpha = 2 * _conjugate_times(q, ddq) / square - omega * growth
-        return Rotation.from_quaternion_wxyz(q), omega, alpha, 4 * variance
-
-
-def smooth_rotations(time: Array, rotation: Rotation, cutoff_hz: float | None = None) -> SmoothRotation:
-    """Smooth rotations R_WS (batch (N,)) sampled at rising `time` (N,) [s], low-passed at `cutoff_hz` [Hz] if given."""
+    Their quaternions are smoothed, four channels of one noise level; `turning` tells what these say.
+    """
     q = rotation.quaternion_wxyz()
     flips = np.cumprod(np.where((q[1:] * q[:-1]).sum(1) < 0, -1.0, 1.0))
     q = q * np.concatenate([[1.0], flips])[:, None]
-    return SmoothRotation(smooth(time, q, 3, cutoff_hz))
+    return smooth(time, q, 3, cutoff_hz)
+
+
+def turning(states: Array, variance: Array) -> tuple[Rotation, Array, Array, Array]:
+    """Return rotation, angular velocity, angular acceleration (M, 3) in S, and variances (M, 3), of quaternions.
+
+    states (M, 3, 4), variance (M, 3)   of the quaternions with their derivatives, as `Smooth.at` has them
+
+    The variances are per axis of the angle [rad^2], rate [rad^2/s^2] and acceleration [rad^2/s^4].
+    """
+    q, dq, ddq = states[:, 0], states[:, 1], states[:, 2]
+    square = (q * q).sum(1)[:, None]
+    growth = 2 * (q * dq).sum(1)[:, None] / square
+    omega = 2 * _conjugate_times(q, dq) / square
+    alpha = 2 * _conjugate_times(q, ddq) / square - omega * growth
+    return Rotation.from_quaternion_wxyz(q), omega, alpha, 4 * variance
 
 
 def _conjugate_times(q: Array, p: Array) -> Array:
@@ -189,8 +195,7 @@ def _quintic(knots: Any, states: Any, variance: Any, times: Any, left: Any) -> A
 
 
 def _best_ratio(clock: Array, values: Array, order: int) -> tuple[float, int, float]:
-    """Return the least cost, the order, and the most likely ratio of process to measurement noise per
-    step."""
+    """Return the least cost, the order, and the most likely ratio of process to measurement noise per step."""
     from scipy.optimize import minimize_scalar
 
     pieces = _pieces(len(clock))
@@ -217,7 +222,7 @@ def _pieces(rows: int) -> list[slice]:
 
 
 def _likelihood(clock: Array, values: Array, order: int, scale: float) -> tuple[float, float, float]:
-    _, _, _, _, _, _, quad, log_det, count = _forward(clock, values, _model(order), scale, False)
+    *_, quad, log_det, count = _forward(clock, values, _model(order), scale, False)
     return float(quad) / values.shape[1], float(log_det), float(count)
 
 
@@ -236,8 +241,7 @@ def _model(order: int) -> tuple[Array, Array]:
 def _smooth_kernel(clock: Array, values: Array, order: int, density: float) -> tuple[Any, ...]:
     """Run both passes; return smoothed states, covariances, innovation energy, log-determinant and count."""
     forward = _forward(clock, values, _model(order), density, True)
-    states, cov = _backward(*forward[:6])
-    return states, cov, *forward[6:]
+    return *_backward(*forward[:5]), *forward[5:]
 
 
 @njit(cache=True)
@@ -281,7 +285,7 @@ def _forward(clock, values, model, density, keep):  # type: ignore[no-untyped-de
         _update(P, gain, room)
         if keep:
             filtered[k], P_filtered[k] = x, P
-    return filtered, P_filtered, predicted, P_predicted, transition, rows, quad, log_det, count
+    return filtered, P_filtered, predicted, P_predicted, transition, quad, log_det, count
 
 
 @njit(cache=True)
@@ -320,10 +324,10 @@ def _update(P, gain, room):  # type: ignore[no-untyped-def]  # pragma: no cover 
 
 
 @njit(cache=True)
-def _backward(filtered, P_filtered, predicted, P_predicted, transition, rows):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
+def _backward(filtered, P_filtered, predicted, P_predicted, transition):  # type: ignore[no-untyped-def]  # pragma: no cover - compiled
     """Rauch-Tung-Striebel pass."""
     states, cov = filtered.copy(), P_filtered.copy()
-    for k in range(rows - 2, -1, -1):
+    for k in range(len(filtered) - 2, -1, -1):
         gain = np.linalg.solve(P_predicted[k + 1], transition[k + 1] @ P_filtered[k]).T.copy()
         states[k] = filtered[k] + gain @ (states[k + 1] - predicted[k + 1])
         cov[k] = P_filtered[k] + gain @ (cov[k + 1] - P_predicted[k + 1]) @ gain.T

@@ -14,18 +14,19 @@ from steelyard.logs.felt import Felt
 from steelyard.logs.imu import first_mount
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
+from steelyard.logs.runs import stretches
 from steelyard.spatial import Rotation
 
 # Rows without a clock mostly stand in the order in which they were measured. Blocks of neighbours are left out in turn,
 # so that errors which last from row to row show in the bars; in another order they say what single rows say.
 BLOCKS = 20
+NO_GRAVITY = "no stream tells where gravity points: give rotation, gravity or specific_force."
 # Quantity -> the first stream that has it, and its values.
 Found = Mapping[str, tuple[Stream, Array]]
 
 
 def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tuple[Finding, ...], str]:
-    """Return the log of streams without time, matched by row, the rotations, findings and the acceleration's
-    source.
+    """Return the log of streams without time, matched by row, the rotations, findings and the acceleration's source.
 
     A table of poses is at rest. Other rows keep the accelerations that were given; nothing is
     differentiated, and `clock-missing` says so.
@@ -59,8 +60,7 @@ def align_tables(recording: Recording) -> tuple[MotionLog, Rotation | None, tupl
 
 
 def _gravity(gravity: Array, found: Found, rotation: Rotation | None, wrench: Array) -> Array:
-    """Return gravity in S (N, 3) from the rotation, else the gravity channel, else an accelerometer at
-    rest."""
+    """Return gravity in S (N, 3) from the rotation, else the gravity channel, else an accelerometer at rest."""
     if rotation is not None:
         return np.asarray(rotation.inverse().matrix @ gravity)
     if "gravity" in found:
@@ -69,7 +69,7 @@ def _gravity(gravity: Array, found: Found, rotation: Rotation | None, wrench: Ar
     if "specific_force" in found:
         stream, values = found["specific_force"]
         return -(stream.turn or first_mount(values, None, wrench[:, 3:])).apply(values)
-    raise BadDescription("no stream tells where gravity points: give rotation, gravity or specific_force.")
+    raise BadDescription(NO_GRAVITY)
 
 
 def _log_of_rows(found: Found, wrench: Array, gravity: Array, rotation: Rotation | None) -> MotionLog:
@@ -88,7 +88,7 @@ def _log_of_rows(found: Found, wrench: Array, gravity: Array, rotation: Rotation
         if rotation is not None and stream.turn is not None:
             motion["linear_acceleration"] = stream.turn.apply(values) + gravity
     still = np.full(len(wrench), not any(m is not zero for m in motion.values()))
-    blocks = np.arange(len(wrench)) * BLOCKS // len(wrench)
+    blocks = stretches(len(wrench), BLOCKS)
     return MotionLog(
         wrench, gravity, motion["linear_acceleration"], motion["angular_velocity"],
         motion["angular_acceleration"], still=still, pose=blocks

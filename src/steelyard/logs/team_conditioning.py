@@ -31,8 +31,7 @@ def condition(log: TeamLog, recording: TeamRecording, cutoff_hz: float | None = 
     Twists and their derivatives come from the poses where the base stands still and poses were measured, else from
     measured velocities and accelerations. Rows near gaps, which the filter fills, count as not measured; so do, of
     every difference, rows near the ends, where the filter goes on beyond the data. A robot without a track has no
-    measured row.
-    Raises BadValue for clocks too short to filter.
+    measured row. Raises BadValue for clocks too short to filter.
     """
     names = log.names
     time = common_time(recording, names)

@@ -53,11 +53,15 @@ class Effective:
 
     def blurred(self, error: Array) -> Effective:
         """Return what is said about a body that is known up to an error with covariance (10, 10): (F^-1 + G)^-1."""
+        information, rest = self._shrunk(error, self.pull)
+        return replace(self, information=information, pull=rest[:, 0].copy())
+
+    def _shrunk(self, error: Array, *columns: Array) -> tuple[Array, Array]:
+        """Return (F^-1 + G)^-1 (10, 10) of an error G (10, 10), and (1 + F G)^-1 times some columns (10, k)."""
         shrink: Array = self.information @ error
         shrink.flat[::11] += 1.0
-        found = np.asarray(np.linalg.solve(shrink, np.column_stack([self.information, self.pull])), np.float64)
-        information = 0.5 * (found[:, :10] + found[:, :10].T)
-        return replace(self, information=information, pull=found[:, 10].copy())
+        found = np.asarray(np.linalg.solve(shrink, np.column_stack([self.information, *columns])), np.float64)
+        return 0.5 * (found[:, :10] + found[:, :10].T), found[:, 10:]
 
     def cost_of(self, error: Array) -> float:
         """Return what the log evidence of `blurred(error)` lacks beside that of other errors, up to what all share.
@@ -72,15 +76,12 @@ class Effective:
 
         phi_hat - known is the rest's, with the error of both.
         """
-        shrink: Array = np.eye(10) + self.information @ covariance
-        columns = [self.information, self.pull - self.information @ known, self.score_weight]
-        found = np.asarray(np.linalg.solve(shrink, np.column_stack(columns)), np.float64)
-        information = 0.5 * (found[:, :10] + found[:, :10].T)
+        information, rest = self._shrunk(covariance, self.pull - self.information @ known, self.score_weight)
         return replace(
             self,
             information=information,
-            pull=found[:, 10].copy(),
-            score_weight=found[:, 11:].copy(),
+            pull=rest[:, 0].copy(),
+            score_weight=rest[:, 1:].copy(),
             bias_at=self.bias_at - self.bias_slope @ known,
         )
 

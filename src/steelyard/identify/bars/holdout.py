@@ -57,10 +57,7 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Arra
 
 
 def _without(
-    problem: Problem,
-    chosen: np.ndarray[Any, np.dtype[np.bool_]],
-    solution: Solution,
-    left: Callable[[Array], Array],
+    problem: Problem, chosen: np.ndarray[Any, np.dtype[np.bool_]], solution: Solution, left: Callable[[Array], Array]
 ) -> tuple[Array, Array]:
     """Return the refit without the chosen groups, and the squared residual (6,) it leaves in them.
 

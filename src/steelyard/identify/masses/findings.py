@@ -12,9 +12,8 @@ from steelyard.findings import Finding, counted
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.material_choice import Choices
-from steelyard.identify.masses.misdrawn import DRAWN
 from steelyard.identify.masses.placement import misplaced
-from steelyard.identify.masses.shape_error import ShapeError
+from steelyard.identify.masses.shape_error import DRAWN, ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.parts.material import Material
 from steelyard.parts.parts import Parts

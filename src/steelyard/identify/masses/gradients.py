@@ -18,17 +18,12 @@ from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.identify.masses import density_priors, tilting
 from steelyard.identify.masses.models import Masses
 from steelyard.identify.masses.profiles import FEATURES, Profile
-from steelyard.inertia import forms
 from steelyard.parts.parts import Parts
 
 # Standard deviations of the linear tilt; products of positions count half.
 LADDER = (0.1, 0.3, 1.0)
 MIDDLE, CONTENDER = 0.3, 7.0
 QUADRATIC = 0.5
-# The square of a coordinate in a box has this standard deviation, in units of its variance.
-BOX = 0.8**0.5
-# Parts that cannot raise the log evidence by this are not looked at.
-LEAST_GAIN = 1.0
 # How many parts of real tools are not homogeneous.
 COMMON = 0.1
 # Models this much less likely than the best do not count.
@@ -130,13 +125,10 @@ class Search:
     def worth(self, fits: list[Fit], base: tuple[int, ...] = ()) -> list[int]:
         """Return the rows of the parts that may explain what `fits` leave, by score: nothing is fitted.
 
-        The tilt of a part is taken as linear about zero. A part whose tilt of one standard deviation the data see with
-        chi-square A takes at most A X / 2 off the misfit X, so that most small parts need no points inside.
+        The tilt of a part is taken as linear about zero.
         """
         likely = _likely(fits)
-        masses = self._masses(likely[0])
-        bound = 0.5 * _seen_tilts(self.data, self.parts, masses) * self.data.misfit(likely[0].phi)
-        rows = [k for k in range(len(masses)) if k not in base and bound[k] > LEAST_GAIN]
+        rows = [k for k in range(len(self.parts)) if k not in base]
         if not rows:
             return []
         slopes = np.stack([self.profile(k).tilted(np.zeros(FEATURES))[1] for k in rows])
@@ -213,35 +205,6 @@ def _likely(fits: list[Fit]) -> list[Fit]:
     """Return the likelier ones of the fits, the best first."""
     ordered = sorted(fits, key=lambda fit: -fit.evidence)
     return [fit for fit in ordered if fit.evidence > ordered[0].evidence + UNLIKELY]
-
-
-def _seen_tilts(data: Effective, parts: Parts, masses: Array) -> Array:
-    """Return the chi-square (P,) by which the data see tilts of one standard deviation of each part, taken as a box."""
-    B = parts.per_mass.T
-    centre = B[:, 1:4]
-    second = forms.pseudo_inertia(B)[:, :3, :3]
-    values, axes = np.linalg.eigh(second - centre[:, :, None] * centre[:, None, :])
-    edges = np.sqrt(np.maximum(values, 0.0))[:, None, :] * axes
-    moved = np.zeros((len(B), FEATURES, 10))
-    for i in range(3):
-        e = edges[:, :, i]
-        moved[:, i, 1:4] = e
-        moved[:, i, 4:] = forms.upper(
-            _as_inertia(centre[:, :, None] * e[:, None, :] + e[:, :, None] * centre[:, None, :])
-        )
-    for n, (i, j) in enumerate(forms.UPPER):
-        e, f = edges[:, :, i], edges[:, :, j]
-        size = BOX if i == j else 2.0
-        moved[:, 3 + n, 4:] = forms.upper(
-            _as_inertia(0.5 * size * (e[:, :, None] * f[:, None, :] + f[:, :, None] * e[:, None, :]))
-        )
-    moved *= masses[:, None, None] * _widths(1.0)[None, :, None]
-    return np.asarray(np.einsum("pfi,ij,pfj->p", moved, data.information, moved))
-
-
-def _as_inertia(second: Array) -> Array:
-    """Return the inertia (P, 3, 3) of second moments."""
-    return np.asarray(np.trace(second, axis1=1, axis2=2)[:, None, None] * np.eye(3) - second)
 
 
 def total(fits: list[Fit]) -> float:

@@ -11,9 +11,8 @@ from steelyard.check import Array
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses.findings import misfit_limit
 from steelyard.identify.masses.models import Masses
-from steelyard.identify.masses.nearest_body import nearest_body
 from steelyard.identify.masses.placement import consistent, refused, with_mass
-from steelyard.identify.masses.recentred import strayed
+from steelyard.identify.masses.recentred import nearest_body, strayed
 from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts

@@ -32,11 +32,6 @@ def free_masses(data: Effective, parts: Parts) -> Masses:
     return Masses(mean, spread_about(A, b, mean))
 
 
-def free_mean(data: Effective, parts: Parts) -> Array:
-    """Return the masses (P,) of `free_masses` alone, without their covariance."""
-    return np.asarray(nonnegative_masses(*_in_masses(data, parts)))
-
-
 def averaged_masses(data: Effective, parts: Parts) -> Masses:
     """Return masses averaged by evidence over one common density and groups of equal density."""
     A, b = _in_masses(data, parts)

@@ -11,11 +11,11 @@ from __future__ import annotations
 from dataclasses import dataclass
 
 import numpy as np
+from scipy.linalg import eigh
 
 from steelyard.check import Array
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.cost.linear import inverse_scaled
-from steelyard.identify.masses.nearest_body import nearest_body
 from steelyard.identify.people import half_trace_com, parameter_jacobian, people_jacobian
 from steelyard.inertia import InertialParameters
 
@@ -24,6 +24,8 @@ from steelyard.inertia import InertialParameters
 ANY_INERTIA = 1.0
 # The log tells where the centre is along an axis that it sees better than the shape does.
 SEEN = 1.0
+# Of the shape's second moment in every direction at least this much stays.
+LEAST_SHARE = 0.3
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,3 +106,21 @@ def _of_log(data: Effective, body: InertialParameters) -> tuple[Array, Array]:
     said = np.hstack([np.eye(4), -np.linalg.solve(inner, seen[4:, :4]).T]) @ slopes.T
     known = said @ data.information @ slopes[:, :4]
     return said, 0.5 * (known + known.T)
+
+
+def nearest_body(inside: Array, target: Array) -> InertialParameters:
+    """Return the mass and centre of `target` (10,) with as much of its inertia as stays well inside the bodies.
+
+    Between the inertia of `inside` (10,), scaled to the mass, and that of `target` the farthest point counts where no
+    second moment, in any direction, falls below a share of the former's.
+    """
+    shape, aim = InertialParameters(inside), InertialParameters(target)
+    if not aim.mass > 0:
+        return shape
+    central = shape.inertia_com * (aim.mass / shape.mass)
+    least = InertialParameters.from_com(aim.mass, aim.com, central)
+    for step in np.linspace(1.0, 0.0, 21):
+        body = InertialParameters.from_com(aim.mass, aim.com, central + step * (aim.inertia_com - central))
+        if eigh(body.pseudo_inertia, least.pseudo_inertia, eigvals_only=True)[0] > LEAST_SHARE:
+            return body
+    return least

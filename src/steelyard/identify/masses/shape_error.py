@@ -8,14 +8,19 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue
+from steelyard.identify.bars.effective import Effective
+from steelyard.identify.masses.models import Masses
 from steelyard.identify.people import half_trace_com, parameter_jacobian
 from steelyard.inertia import InertialParameters, forms
+from steelyard.parts.parts import Parts
 from steelyard.spatial import Pose, Rotation
 
 # How far the centre of mass of a scan errs along an axis, over the stretch of its radius of gyration.
 LEAN = 0.2
 # What a hidden core may take from a second moment across a long body, as a share of it (one standard deviation).
 CORE = 0.15
+# A scan puts the centroids of its parts off by so much, one standard deviation per axis [m].
+DRAWN = 1e-3
 # Masses of a scan's parts need not sum to the whole closer than this share: a sum that is known a thousand times better
 # than its parts makes a valley too narrow and bent for Newton's method. The whole then goes where the log sees it.
 LOOSE = 1e-3
@@ -135,6 +140,21 @@ class ShapeError:
         """Return what a displacement does to phi (10,) in first and in second order."""
         there, back = body.in_frame(X).vector, body.in_frame(X.inverse()).vector
         return (there - back) / 2, (there + back) / 2 - body.vector
+
+
+def misdrawn(data: Effective, parts: Parts, masses: Masses, error: ShapeError) -> Masses:
+    """Return the masses of parts with what borders that a scan drew a little off add to their covariance.
+
+    error  of the shape as a whole, by which the log was blurred for the masses
+
+    To first order: a part k that is shifted by d misses m_k dB_k of phi, and C B^T F m_k dB_k of it goes to the
+    masses. The whole does not feel it: the log alone holds that.
+    """
+    blurred = data.blurred(error.with_grasp(parts.whole(masses.mean)))
+    gain = masses.covariance @ parts.per_mass.T @ blurred.information
+    shifted = (parts.in_frame(Pose(Rotation.identity(), DRAWN * axis)).per_mass for axis in np.eye(3))
+    steps = [gain @ ((moved - parts.per_mass) * masses.mean) for moved in shifted]
+    return replace(masses, covariance=masses.covariance + sum(step @ step.T for step in steps))
 
 
 def _second_moments(inertia: Array) -> Array:
