@@ -191,15 +191,15 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
            chance, and count as little as they show
     """
     sights = _sights(scene, seen, window)
-    *_, R, p = moved(sights, PoseErrors.unknown(scene.given.rotation.matrix, *_ANYWHERE)).images
+    after = moved(sights, PoseErrors.unknown(scene.given.rotation.matrix, *_ANYWHERE)).images
     xyz, normal = sights.xyz, sights.normal
     high = xyz[:, 2] > _STANDS_OUT * scene.sigma
     xyz, normal = (xyz[high], normal[high]) if high.any() else (xyz, normal)
     shares, axes = np.linalg.eigh(normal.T @ normal / len(normal))
     # All of a move where normals point everywhere.
     shown = np.eye(3) if wrong else (axes * np.sqrt(np.minimum(3 * shares.clip(0), 1))).T
-    turn = R @ np.swapaxes(scene.R, 1, 2)
-    shift = p - np.einsum("vij,vj->vi", turn, scene.p)
+    turn = after.R @ np.swapaxes(scene.R, 1, 2)
+    shift = after.p - np.einsum("vij,vj->vi", turn, scene.p)
     middle = xyz.mean(0)
     # Over all points: the mean of squares is that of the middle and of what turns about it do.
     about = (xyz - middle).T @ (xyz - middle) / len(xyz)
@@ -218,7 +218,7 @@ def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = F
         sights = _sights(scene, seen, window)
         errors = errors.seen(sights.off(), *sights.each_by_itself())
         sights = moved(sights, errors) if window > _TOGETHER else moved_together(sights, errors if near else None)
-        *_, scene.R, scene.p = sights.images
+        scene.R, scene.p = sights.images.R, sights.images.p
         seen = replace(Seen.by(scene), errors=errors)
     return seen
 
@@ -226,7 +226,7 @@ def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = F
 def _sights(scene: Scene, seen: Seen, window: float) -> Sights:
     """Return the views and the surface that they give together, which may be off by a window [m]."""
     xyz, normal = _model(scene, seen.patches, window)
-    return Sights(scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, scene.given, xyz.mean(0))
+    return Sights(scene.images, xyz, normal, window + 4 * scene.sigma, scene.noise, scene.given, xyz.mean(0))
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:
