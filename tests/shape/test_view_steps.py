@@ -7,10 +7,10 @@ import pytest
 from views_apart import apart
 
 from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.depth_images import Images
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.registration import Seen, agreed
 from steelyard.shape.scans.scene import scene_of
-from steelyard.shape.scans.depth_images import Images
 from steelyard.shape.scans.view_steps import Sights, steps_together
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation

@@ -15,8 +15,12 @@ _STEEP = 3.0  # slope between neighbouring pixels that still counts as one surfa
 
 
 class Images(NamedTuple):
-    """What every pass needs: depth (V, H, W), 0 where nothing was measured, one step of it [m], the lens fx, fy, cx, cy,
-    and the cameras' axes R (V, 3, 3) and places p (V, 3) [m]."""
+    """What every pass needs.
+
+    depth  (V, H, W) in steps of `unit` [m], 0 where nothing was measured
+    lens   fx, fy, cx, cy [pixels]
+    R, p   axes (V, 3, 3) and places (V, 3) [m] of the cameras
+    """
 
     depth: Any
     unit: float
@@ -80,9 +84,7 @@ def height_map(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _line_of_points(
-    images: Images, k: int, first: int, v: int, stride: int, low: Any, pitch: float, line: Any
-) -> None:
+def _line_of_points(images: Images, k: int, first: int, v: int, stride: int, low: Any, pitch: float, line: Any) -> None:
     """Turn the depths in line (3, M) of the pixels of one row into their cell of the grid and height [m].
 
     A pixel without depth has cell -1.
@@ -123,7 +125,7 @@ def held(images: Images, points: Any) -> Any:
 def normal_of(
     images: Images, k: int, u: int, v: int, a: float, b: float, z: float, step: int, noise: float
 ) -> tuple[bool, float, float, float]:
-    """Return whether the surface at pixel (u, v) of view k faces the camera enough to be asked, and its normal (x, y, z).
+    """Return whether the surface at pixel (u, v) of view k faces the camera enough to be asked, and its normal.
 
     a, b  slopes of the pixel's ray
     z     its depth [m]

@@ -70,9 +70,7 @@ def _incidence(cameras: Any, x: Any, n: Any, cosine: Any) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _looked(
-    images: Images, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any, at: Any
-) -> None:
+def _looked(images: Images, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any, at: Any) -> None:
     """Write what every view measures near one point x (3,) with normal n (3,).
 
     work (8, V): what the view says, height of the measured point over the tangent plane [m], cosine of incidence, depth

@@ -200,9 +200,7 @@ def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, nois
 
 
 @numba.njit(cache=True, nogil=True)
-def _faces_alike(
-    images: Images, k: int, u: int, v: int, a: float, b: float, m: float, n: Any, noise: float
-) -> bool:
+def _faces_alike(images: Images, k: int, u: int, v: int, a: float, b: float, m: float, n: Any, noise: float) -> bool:
     """Whether the surface at pixel (u, v), of depth m [m], faces about as n (3,) does.
 
     What stands before a point is nearer, but may be no farther off its plane than the window.
