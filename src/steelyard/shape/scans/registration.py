@@ -136,10 +136,12 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
         return first
     given, tries = (scene.R, scene.p), []
     near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < (_NEARBY if off else _UNTOLD)
-    for fit in (_left, _fit_fine) if near else (_left, _fit_far, _fit_slid) if off else (_left, _fit_far):
+    fits = [lambda: first, lambda: _fitted(scene, first, _FINE if near else _FAR, near=near)]
+    fits += [lambda: _fit_slid(scene)] if off and not near else []
+    for fit in fits:
         scene.R, scene.p = given
         with suppress(CannotAnswer):
-            tries.append(_Try.of(scene, _no_wrinkle(fit(scene, first), first)))
+            tries.append(_Try.of(scene, _no_wrinkle(fit(), first)))
     if not tries:
         raise no_surface()
     # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
@@ -167,19 +169,7 @@ def left_open(scene: Scene, seen: Seen, xyz: Array, normal: Array) -> float:
     return unsure_volume(_sights(scene, seen, _FINE[-1]), seen.errors, xyz, normal)
 
 
-def _left(_: Scene, first: Seen) -> Seen:
-    return first
-
-
-def _fit_fine(scene: Scene, first: Seen) -> Seen:
-    return _fitted(scene, first, _FINE, near=True)
-
-
-def _fit_far(scene: Scene, first: Seen) -> Seen:
-    return _fitted(scene, first, _FAR)
-
-
-def _fit_slid(scene: Scene, _: Seen) -> Seen:
+def _fit_slid(scene: Scene) -> Seen:
     slid(scene)
     return _fitted(scene, Seen.by(scene), _WINDOWS)
 
