@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -136,8 +137,9 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
         return first
     given, tries = (scene.R, scene.p), []
     near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < (_NEARBY if off else _UNTOLD)
-    fits = [lambda: first, lambda: _fitted(scene, first, _FINE if near else _FAR, near=near)]
-    fits += [lambda: _fit_slid(scene)] if off and not near else []
+    fits: list[Callable[[], Seen]] = [lambda: first, lambda: _fitted(scene, first, _FINE if near else _FAR, near=near)]
+    if off and not near:
+        fits.append(lambda: _fit_slid(scene))
     for fit in fits:
         scene.R, scene.p = given
         with suppress(CannotAnswer):
