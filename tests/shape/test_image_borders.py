@@ -11,7 +11,9 @@ import pytest
 from steelyard.shape.carving import carved
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.scan import Scan, fuse
-from steelyard.shape.scans import depth_images, sight_lines
+from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans.depth_images import Images
+from steelyard.shape.scans.depth_images import held as held_by
 from steelyard.shape.views import Intrinsics
 from steelyard.shape.volume import enclose
 from steelyard.simulate.scanning import scan_mesh
@@ -69,7 +71,7 @@ def looks() -> tuple[np.ndarray, np.ndarray, np.ndarray]:
 
 def test_images_hold_the_points_that_fall_on_their_pixels_as_densely_as_areas_shrink() -> None:
     R, p, points = looks()
-    held = depth_images.held(WIDE.vector, R, p, WIDE.height, WIDE.width, points)
+    held = held_by(Images(np.zeros((len(R), WIDE.height, WIDE.width), np.uint16), 0.001, WIDE.vector, R, p), points)
     edge = 1e-5
     counts, density = np.zeros(len(points)), np.zeros(len(points))
     for turn, eye in zip(R, p, strict=True):
@@ -90,5 +92,5 @@ def test_a_wall_is_measured_at_its_spots_and_seen_past_before_them() -> None:
     lens, noise = WIDE, 0.001
     wall = np.full((1, lens.height, lens.width), 1000, np.uint16)
     spots = np.array([[0, 0, 1.0], [0.1, 0.1, 0.999], [0, 0, 0.9], [0, 0, 1.1], [5, 0, 1], [0, 0, -1]])
-    found = sight_lines.sights(wall, 0.001, lens.vector, np.eye(3)[None], np.zeros((1, 3)), spots, noise)
+    found = sight_lines.sights(Images(wall, 0.001, lens.vector, np.eye(3)[None], np.zeros((1, 3))), spots, noise)
     assert found.tolist() == [[0, 1], [0, 1], [1, 0], [0, 0], [0, 0], [0, 0]]

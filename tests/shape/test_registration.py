@@ -16,7 +16,7 @@ from steelyard.shape.scans import registration
 from steelyard.shape.scans.common_table import levelled
 from steelyard.shape.scans.region import object_on_table
 from steelyard.shape.scans.registration import Seen, agreed
-from steelyard.shape.scans.scene import scene_of
+from steelyard.shape.scans.scene import Scene, scene_of
 from steelyard.shape.views import Views
 from steelyard.shape.volume import enclose
 from steelyard.simulate.camera import disturbed
@@ -97,13 +97,16 @@ def test_a_try_that_loses_the_object_is_none(monkeypatch: pytest.MonkeyPatch) ->
     off, first = levelled(scene), Seen.by(scene)
     R = scene.R
 
-    def lost(*_: object) -> Seen:
-        raise CannotAnswer("no object was found.")
+    def lost(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = False) -> Seen:
+        if windows in given:
+            raise CannotAnswer("no object was found.")
+        return fitted(scene, seen, windows, near)
 
-    monkeypatch.setattr(registration, "_fit_far", lost)
+    fitted, given = registration._fitted, [registration._FAR]
+    monkeypatch.setattr(registration, "_fitted", lost)
     agreed(scene, first, off)
     assert scene.R is not R  # brought by the other try
-    monkeypatch.setattr(registration, "_fit_slid", lost)
+    given.append(registration._WINDOWS)
     scene.R = R
     assert agreed(scene, first, off) is first
     assert scene.R is R

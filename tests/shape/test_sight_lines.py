@@ -11,7 +11,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.points.medians import middle_mean, quantile
 from steelyard.shape.scans import sight_lines
-from steelyard.shape.scans.depth_images import pixel_of
+from steelyard.shape.scans.depth_images import Images, pixel_of
 from steelyard.shape.scans.table_plane import table_planes
 from steelyard.shape.volume import enclose
 
@@ -34,7 +34,7 @@ def looking_down(count: int, rng: np.random.Generator) -> tuple[np.ndarray, np.n
 
 
 def pixels(depth: np.ndarray, R: np.ndarray, p: np.ndarray, point: np.ndarray) -> list[tuple[int, float, int, int]]:
-    found = [(k, *pixel_of(CAMERA, R, p, k, *point)) for k in range(len(depth))]
+    found = [(k, *pixel_of(Images(depth, UNIT, CAMERA, R, p), k, point)) for k in range(len(depth))]
     return [(k, z, u, v) for k, z, u, v in found if 0 <= u < depth.shape[2] and 0 <= v < depth.shape[1]]
 
 
@@ -48,7 +48,7 @@ def test_how_many_views_saw_past_a_point_is_what_each_of_them_says(count: int) -
         for point in points
     ]
     for enough in (1, 3):
-        found = sight_lines.seen_past(depth, UNIT, CAMERA, R, p, points, 0.0, NOISE, enough)
+        found = sight_lines.seen_past(Images(depth, UNIT, CAMERA, R, p), points, 0.0, NOISE, enough)
         assert np.array_equal(found, np.minimum(said, enough))
 
 
@@ -66,12 +66,12 @@ def test_points_settle_on_the_middle_of_what_their_views_measure(count: int) -> 
             if cosine >= sight_lines.FACING and measured > 0 and over <= limit:
                 past += over < -limit
                 heights += [over] if over >= -limit else []
-        support = sight_lines.settled(depth, UNIT, CAMERA, R, p, moved := point.copy(), up, 0.002, NOISE, 0)
+        support = sight_lines.settled(Images(depth, UNIT, CAMERA, R, p), moved := point.copy(), up, 0.002, NOISE, 0)
         assert np.array_equal(moved, point)
         assert support[0, :2].tolist() == [len(heights), past]
         if heights:
             assert support[0, 2] == pytest.approx(np.sqrt(np.mean(np.square(heights))))
-            sight_lines.settled(depth, UNIT, CAMERA, R, p, moved, up, 0.002, NOISE, 1)
+            sight_lines.settled(Images(depth, UNIT, CAMERA, R, p), moved, up, 0.002, NOISE, 1)
             low = len(heights) // 4
             middle = np.sort(heights)[low : len(heights) - low]
             assert moved[0] == pytest.approx(point[0] + [0, 0, middle.mean()], abs=1e-12)

@@ -7,6 +7,7 @@ import pytest
 from views_apart import apart
 
 from steelyard.shape.scans.common_table import levelled
+from steelyard.shape.scans.depth_images import Images
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.registration import Seen, agreed
 from steelyard.shape.scans.scene import scene_of
@@ -38,7 +39,7 @@ def test_views_that_agree_stay_and_two_that_do_not_meet_in_the_middle() -> None:
     for apart_m in (0.0, 0.002):
         p = np.array([[0.0, 0.0, 0.5], [0.0, 0.0, 0.5 + apart_m]])
         given = Pose(Rotation.nearest(down), p)
-        sights = Sights((depth, 1e-3, lens, down, p), xyz, normal, 0.01, 1e-3, given, xyz.mean(0))
+        sights = Sights(Images(depth, 1e-3, lens, down, p), xyz, normal, 0.01, 1e-3, given, xyz.mean(0))
         steps = steps_together(sights, PoseErrors.unknown(down, 0.03, 0.01).information(), sights.off())
         assert steps[:, 5] == pytest.approx([apart_m / 2, -apart_m / 2], abs=5e-5)
         assert np.abs(np.delete(steps, 5, axis=1)).max() < 1e-4

@@ -134,13 +134,15 @@ def _answer(shape: Shape, X_SW: Pose, log: MotionLog) -> Estimate:
 
 def _unseen(scanned: Scanned, bounds: Any) -> float:
     """Return the volume [m^3] over the table that the views leave unseen, by exact depth at the true poses."""
+    from steelyard.shape.scans.depth_images import Images
     from steelyard.shape.scans.sight_lines import seen_past
 
     views = scanned.exact
     points = np.random.default_rng(0).uniform(bounds[0], bounds[1], (_SAMPLES, 3))
     R, p = views.X_WC.rotation.matrix.copy(), views.X_WC.position.copy()
     lens = views.intrinsics.vector
-    past = seen_past(views.depth, views.depth_unit, lens, R, p, points, views.depth_unit, 0.0, 1)
+    images = Images(views.depth, views.depth_unit, lens, R, p)
+    past = seen_past(images, points, views.depth_unit, 0.0, 1)
     return float((past == 0).mean() * np.prod(bounds[1] - bounds[0]))
 
 

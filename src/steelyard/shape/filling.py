@@ -10,16 +10,13 @@ from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.cells.cells import votes_of
 from steelyard.shape.cells.islands import without_islands
-from steelyard.shape.orient import DEPTH, Oriented, on_sheets, signed_links
+from steelyard.shape.orient import DEPTH, Oriented, on_sheets, ties_between
 from steelyard.shape.sides.discs import Discs
-from steelyard.shape.sides.sheets import stacked
-from steelyard.shape.sides.ties import Ties
 from steelyard.shape.tets import TetMesh
 
 CLEAR = 0.2  # doubt below which no sheets need be looked at
 _JUMP = 0.01  # of a spacing: height over which the jump through a disc is spread
 _LEFT = 0.5  # of the volume, at least, or it was not the walls' thickness that was found
-_SPAN = 8.0  # spacings that a cell may span if it hangs free: longer ones bridge a gap
 # Share of the points that sheets turned above which the solid without them is looked at, and the share of its blur that
 # it leaves, at most, where sheets were seen that are none.
 _UPSET, _NO_SHEETS = 0.02, 0.8
@@ -34,7 +31,7 @@ class Filled:
     inside  (T,) whether each is, without free groups
     solid   those that are
     blur    how little their winding numbers look like a solid (see `_blur`)
-    doubt   the same, with what contradicts them (see `_contradictions`) where it is not clear
+    doubt   the same, where it is not clear with the share of ties between points that are not kept
     """
 
     mesh: TetMesh
@@ -64,9 +61,9 @@ def _filled(surface: Oriented) -> Filled | None:
     score = found - 0.5 + votes
     if not (score > 0).any():
         return None
-    inside = without_islands(mesh, score > 0, _SPAN * sites.spacing * sites.diagonal)
+    inside = without_islands(mesh, score > 0)
     blur = _blur(mesh.volumes, found, votes)
-    doubt = blur + _contradictions(surface) if blur > CLEAR else blur
+    doubt = blur + (ties_between(sites, surface.normals, surface.layers).torn if blur > CLEAR else 0.0)
     return Filled(mesh, score, inside, mesh.chosen(inside), blur, doubt)
 
 
@@ -81,7 +78,7 @@ def clearer_alone(surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
     alone = surface.alone if surface.layers is None else None
     if alone is None or float(((alone * surface.normals).sum(1) < 0).mean()) < _UPSET:
         return surface, found
-    without = outward(Oriented.by(surface.sites, alone))
+    without = outward(Oriented(surface.sites, alone))
     again = _filled(without)
     if again is None or again.blur >= min(CLEAR, _NO_SHEETS * found.blur):
         return surface, found
@@ -96,7 +93,7 @@ def _clearer_thick(surface: Oriented, found: Filled) -> tuple[Oriented, Filled]:
     sites, alone = surface.sites, surface.alone
     if alone is None or surface.layers is None or not surface.layers.part:
         return surface, found
-    thick = outward(Oriented.by(sites, on_sheets(sites, alone), alone))
+    thick = outward(Oriented(sites, on_sheets(sites, alone), alone))
     again = _filled(thick)
     return (surface, found) if again is None or found.blur < again.blur else (thick, again)
 
@@ -139,12 +136,3 @@ def _blur(volumes: Array, found: Array, votes: Array) -> float:
     """
     inside = volumes * (found - 0.5 + votes > 0)
     return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
-
-
-def _contradictions(surface: Oriented) -> float:
-    """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
-    sites, normals, index = surface.sites, surface.normals, surface.sites.near.index
-    plane, link = sites.sheets(surface.layers)
-    link = signed_links(link, plane, normals, index)
-    ties = Ties.of(sites.xyz, normals, index, link, sites.delaunay, sites.spacing)
-    return stacked(sites.xyz, normals, index, link) + ties.torn

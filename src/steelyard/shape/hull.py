@@ -1,10 +1,10 @@
 """Volume of the convex hull of points: a compiled quickhull for inner loops, and SciPy's Qhull.
 
 A point is added where it lies more than a tolerance above a face; which faces it sees is then decided by the exact sign
-of a determinant: in double precision with an error bound, in double-double where that cannot tell, and last without any
-rounding. So the surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points
-within the tolerance of the hull are left out. Its topology is checked all the same: a fault is reported, never a wrong
-volume, and Qhull's hull stands in for it (`stand_ins`).
+of a determinant: in double precision with an error bound, and without any rounding where that cannot tell. So the
+surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points within the
+tolerance of the hull are left out. Its topology is checked all the same: a fault is reported, never a wrong volume, and
+Qhull's hull stands in for it (`stand_ins`).
 
 Source: Barber, Dobkin, Huhdanpaa 1996, "The Quickhull algorithm for convex hulls" (outside sets, farthest point first);
 Shewchuk 1997, "Adaptive precision floating-point arithmetic" (error bounds, exact differences and products).

@@ -7,6 +7,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.mesh import Integers, TriangleMesh
+from steelyard.spatial import cross
 
 
 def inside(mesh: TriangleMesh, count: int) -> tuple[Array, Array]:
@@ -14,7 +15,9 @@ def inside(mesh: TriangleMesh, count: int) -> tuple[Array, Array]:
 
     Lines on a lattice run along the thinnest side of the box; each stretch inside is filled at the lattice's pitch.
     """
-    low, high, volume = _extent(mesh.vertices, mesh.triangles)
+    low, high = mesh.bounds
+    a, b, c = np.moveaxis(mesh.corners - low, 1, 0)
+    volume = float((a * cross(b, c)).sum()) / 6
     axis = int(np.argmin(high - low))
     across = [k for k in range(3) if k != axis]
     pitch = (volume / count) ** (1 / 3)
@@ -33,27 +36,6 @@ def inside(mesh: TriangleMesh, count: int) -> tuple[Array, Array]:
     pieces = np.repeat((end - start) / steps, steps)
     points[:, axis] = np.repeat(start, steps) + (which + 0.5) * pieces
     return points, pieces * pitch**2
-
-
-@numba.njit(cache=True, nogil=True)
-def _extent(vertices: Array, triangles: Integers) -> tuple[Array, Array, float]:
-    """Return the lower and upper corner (3,) of the box around the triangles (F, 3) and the volume they enclose."""
-    low, high, total = np.full(3, np.inf), np.full(3, -np.inf), 0.0
-    x, y, z = np.empty(3), np.empty(3), np.empty(3)
-    o = triangles[0, 0]
-    for f in range(len(triangles)):
-        for i in range(3):
-            v = triangles[f, i]
-            x[i], y[i], z[i] = (
-                vertices[v, 0] - vertices[o, 0],
-                vertices[v, 1] - vertices[o, 1],
-                vertices[v, 2] - vertices[o, 2],
-            )
-            for k in range(3):
-                low[k], high[k] = min(low[k], vertices[v, k]), max(high[k], vertices[v, k])
-        total += x[0] * (y[1] * z[2] - z[1] * y[2]) + x[1] * (y[2] * z[0] - z[2] * y[0])
-        total += x[2] * (y[0] * z[1] - z[0] * y[1])
-    return low, high, total / 6
 
 
 @numba.njit(cache=True, nogil=True)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -39,21 +40,19 @@ class Oriented:
 
     sites    the points
     normals  (N, 3) unit vectors that leave the solid
-    area     (N,) of surface that each point stands for
     alone    (N, 3) the normals before any sheet was looked at; None where the cloud brought its own
     layers   of its walls, where these are thinner than the spacing
     """
 
     sites: Sites
     normals: Array
-    area: Array
     alone: Array | None = None
     layers: Layers | None = None
 
-    @classmethod
-    def by(cls, sites: Sites, normals: Array, alone: Array | None = None, layers: Layers | None = None) -> Oriented:
-        """Return the elements whose normals are these; what else is known of them as in the fields."""
-        return cls(sites, normals, areas(sites.near, normals), alone, layers)
+    @cached_property
+    def area(self) -> Array:
+        """Surface (N,) that each point stands for."""
+        return areas(self.sites.near, self.normals)
 
     def walled(self) -> Oriented | None:
         """Return the surface with its sides anew from the thickness of its walls; None where they have no one."""
@@ -61,7 +60,7 @@ class Oriented:
         wall = Wall.of(sites.xyz, self.normals, *sites.sheets(layers), sites.delaunay, sites.spacing)
         if wall is None:
             return None
-        return Oriented.by(sites, on_sheets(sites, self.normals, wall, layers), self.alone, layers)
+        return Oriented(sites, on_sheets(sites, self.normals, wall, layers), self.alone, layers)
 
 
 def oriented(cloud: Cloud, sites: Sites | None = None) -> Oriented:
@@ -71,10 +70,10 @@ def oriented(cloud: Cloud, sites: Sites | None = None) -> Oriented:
     """
     sites = sites or Sites.of(cloud)
     if cloud.normals is not None:
-        return Oriented.by(sites, cloud.normals)
+        return Oriented(sites, cloud.normals)
     alone = consistent(sites.sight, sites.spacing)
     layers = Layers.of(sites.xyz, sites.near.index, sites.spacing)
-    return Oriented.by(sites, on_sheets(sites, alone, None, layers), alone, layers)
+    return Oriented(sites, on_sheets(sites, alone, None, layers), alone, layers)
 
 
 def consistent(sight: Sight, spacing: float) -> Array:
@@ -119,7 +118,7 @@ def on_sheets(sites: Sites, first: Array, wall: Wall | None = None, layers: Laye
             sign = np.clip(2 * sign, -1, 1)
     flat = (np.abs(link).sum(1) > (_WALLED if wall else _LINKED)) & (np.abs(sign) > _CERTAIN)
     normals = np.where(flat[:, None], np.sign(sign)[:, None] * plane, first)
-    ties = Ties.of(xyz, normals, near.index, signed_links(link, plane, normals, near.index), sites.delaunay, spacing)
+    ties = ties_between(sites, normals, layers)
     if wall:
         ties = ties.told(wall.outward(normals))
     normals *= ties.settled(_LAST_SWEEPS, _LAST_KEPT)[:, None]
@@ -145,10 +144,11 @@ def _off_sheets(normals: Array, flat: Any, area: Array, sight: Sight, width: flo
     return np.where(flat[:, None], normals, tree.back(_units(dipoles)).T)
 
 
-def signed_links(link: Array, plane: Array, normals: Array, index: Any) -> Array:
-    """Return links (N, K) between planes (N, 3) as those between normals (N, 3): negative where these disagree."""
-    sign = np.sign((plane * normals).sum(1))
-    return np.asarray(link * sign[:, None] * sign[index])
+def ties_between(sites: Sites, normals: Array, layers: Layers | None) -> Ties:
+    """Return what points say of one another's sides once their normals (N, 3) are known; layers as in `Oriented`."""
+    plane, link = sites.sheets(layers)
+    index, sign = sites.near.index, np.sign((plane * normals).sum(1))
+    return Ties.of(sites.xyz, normals, index, link * sign[:, None] * sign[index], sites.delaunay, sites.spacing)
 
 
 def _length(push: Any, moved: Any) -> np.float32:

@@ -202,7 +202,7 @@ def _guessed(scene: Scene) -> Callable[[Array, Array], float]:
         clear = at[:, 2] > _OFF_TABLE * scene.sigma
         clear &= back.rotation.apply(areas)[:, 2] > DOWNWARD * size
         at, size = at[clear], size[clear]
-        bare = sight_lines.sights(*scene.images(), at, scene.noise)[:, 1] < 1
+        bare = sight_lines.sights(scene.images, at, scene.noise)[:, 1] < 1
         return float(size[bare].sum() / size.sum()) if len(at) else 0.0
 
     return guessed

@@ -6,14 +6,13 @@ from dataclasses import dataclass, field
 from functools import cached_property
 from typing import Any
 
-import numba
 import numpy as np
 
 from steelyard import check
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import Integers, tetrahedra_moments
-from steelyard.spatial import Pose
+from steelyard.spatial import Pose, cross
 
 # The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
@@ -126,18 +125,10 @@ class TetMesh:
         return TetMesh(X_AB.apply(self.vertices), self.tets)
 
 
-@numba.njit(cache=True, nogil=True)
 def _turned(vertices: Array, tets: Integers) -> Array:
     """Return the volume (T,) of every cell; of one that is negative two corners are exchanged."""
-    out = np.empty(len(tets))
-    for t in range(len(tets)):
-        a, b, c, d = tets[t]
-        ax, ay, az = vertices[a, 0], vertices[a, 1], vertices[a, 2]
-        ux, uy, uz = vertices[b, 0] - ax, vertices[b, 1] - ay, vertices[b, 2] - az
-        vx, vy, vz = vertices[c, 0] - ax, vertices[c, 1] - ay, vertices[c, 2] - az
-        x, y, z = uy * vz - uz * vy, uz * vx - ux * vz, ux * vy - uy * vx
-        six = x * (vertices[d, 0] - ax) + y * (vertices[d, 1] - ay) + z * (vertices[d, 2] - az)
-        out[t] = abs(six) / 6
-        if six < 0:
-            tets[t, 2], tets[t, 3] = d, c
-    return out
+    a, b, c, d = np.moveaxis(vertices[tets], 1, 0)
+    six = (cross(b - a, c - a) * (d - a)).sum(1)
+    negative = six < 0
+    tets[negative, 2:] = tets[negative, :1:-1]
+    return np.asarray(np.abs(six) / 6)

@@ -12,8 +12,6 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.shape.hulls.borrowed import integer
 
-# Rounding of the double-double determinant, of the sum of its terms: 2^-98 holds its dozen roundings of 2^-102.
-_ROUNDING = 2.0**-98
 _SPLIT = 134217729.0  # 2^27 + 1, halves the digits of a double
 
 
@@ -39,56 +37,8 @@ def _difference(a: float, b: float) -> tuple[float, float]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _times(a: float, a2: float, b: float, b2: float) -> tuple[float, float]:
-    p, e = _product(a, b)
-    e += a * b2 + a2 * b
-    s = p + e
-    return s, e - (s - p)
-
-
-@numba.njit(cache=True, nogil=True)
-def _minus(a: float, a2: float, b: float, b2: float) -> tuple[float, float]:
-    s, e = _difference(a, b)
-    t, f = _difference(a2, b2)
-    e += t
-    u = s + e
-    f += e - (u - s)
-    v = u + f
-    return v, f - (v - u)
-
-
-@numba.njit(cache=True, nogil=True)
 def determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
-    """Return (b - a) x (c - a) . (p - a) of four rows, with its true sign."""
-    bx, bx2 = _difference(xyz[b, 0], xyz[a, 0])
-    by, by2 = _difference(xyz[b, 1], xyz[a, 1])
-    bz, bz2 = _difference(xyz[b, 2], xyz[a, 2])
-    cx, cx2 = _difference(xyz[c, 0], xyz[a, 0])
-    cy, cy2 = _difference(xyz[c, 1], xyz[a, 1])
-    cz, cz2 = _difference(xyz[c, 2], xyz[a, 2])
-    total, rest, terms = 0.0, 0.0, 0.0
-    for k in range(3):
-        if k == 0:
-            u, u2, v, v2, w, w2, z, z2 = by, by2, cz, cz2, bz, bz2, cy, cy2
-        elif k == 1:
-            u, u2, v, v2, w, w2, z, z2 = bz, bz2, cx, cx2, bx, bx2, cz, cz2
-        else:
-            u, u2, v, v2, w, w2, z, z2 = bx, bx2, cy, cy2, by, by2, cx, cx2
-        m, m2 = _times(u, u2, v, v2)
-        n, n2 = _times(w, w2, z, z2)
-        d, d2 = _difference(xyz[p, k], xyz[a, k])
-        terms += (abs(m) + abs(n)) * abs(d)
-        m, m2 = _minus(m, m2, n, n2)
-        m, m2 = _times(m, m2, d, d2)
-        total, rest = _minus(total, rest, -m, -m2)
-    if abs(total + rest) > _ROUNDING * terms:
-        return float(total + rest)
-    return _exact_determinant(xyz, a, b, c, p)
-
-
-@numba.njit(cache=True, nogil=True)
-def _exact_determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
-    """Return the same from a sum without rounding: for four points nearly, or truly, on one line or plane."""
+    """Return (b - a) x (c - a) . (p - a) of four rows with its true sign, from a sum without rounding."""
     sides = np.empty((3, 3, 2))
     for k in range(3):
         sides[0, k, 0], sides[0, k, 1] = _difference(xyz[b, k], xyz[a, k])

@@ -172,17 +172,14 @@ def _turns(moved: Array) -> Array:
     return np.asarray(Rotation.exp(moved[:, 2:] * np.array([0.0, 0.0, 1.0])).matrix)
 
 
-@numba.njit(cache=True, nogil=True)
-def _mapped(points: Any, half: float, pitch: float) -> Any:
+def _mapped(points: Array, half: float, pitch: float) -> Array:
     """Return the number of points (N, 3) in every cell of the table, and the sum of their heights: (2, I, I)."""
     size = int(2 * half / pitch) + 1
-    out = np.zeros((2, size, size))
-    for n in range(len(points)):
-        i, j = int((points[n, 0] + half) / pitch), int((points[n, 1] + half) / pitch)
-        if 0 <= i < size and 0 <= j < size:
-            out[0, i, j] += 1
-            out[1, i, j] += points[n, 2]
-    return out
+    cell = ((points[:, :2] + half) / pitch).astype(int)
+    within = ((cell >= 0) & (cell < size)).all(1)
+    place = cell[within] @ [size, 1]
+    maps = [np.bincount(place, weights, size * size) for weights in (None, points[within, 2])]
+    return np.asarray(maps, float).reshape(2, size, size)
 
 
 @numba.njit(cache=True, nogil=True)

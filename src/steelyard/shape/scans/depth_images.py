@@ -5,7 +5,7 @@ All poses here are of the camera (optical axes) in one frame whose z is the heig
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -14,15 +14,30 @@ FACING = 0.3  # cosine of incidence below which a view's word about a surface is
 _STEEP = 3.0  # slope between neighbouring pixels that still counts as one surface (72 degrees)
 
 
+class Images(NamedTuple):
+    """What every pass needs.
+
+    depth  (V, H, W) in steps of `unit` [m], 0 where nothing was measured
+    lens   fx, fy, cx, cy [pixels]
+    R, p   axes (V, 3, 3) and places (V, 3) [m] of the cameras
+    """
+
+    depth: Any
+    unit: float
+    lens: Any
+    R: Any
+    p: Any
+
+
 def stride_of(depth: Any, pixels: int) -> int:
     """Return the stride with which about so many pixels of images (V, H, W) are looked at."""
     return max(1, int(np.sqrt(depth.size / pixels)))
 
 
 @numba.njit(cache=True, nogil=True)
-def sampled(depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int) -> Any:
+def sampled(images: Images, stride: int) -> Any:
     """Return points (N, 5) of every stride-th pixel: x, y, z in the poses' frame, depth [m] and number of the view."""
-    fx, fy, cx, cy = camera
+    depth, unit, (fx, fy, cx, cy), R, p = images
     count, height, width = depth.shape
     out = np.empty((count * (height // stride + 1) * (width // stride + 1), 5))
     n = 0
@@ -41,15 +56,15 @@ def sampled(depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int) -
 
 @numba.njit(cache=True, nogil=True)
 def height_map(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int, low: Any, pitch: float, floor: float, cap: float,
-    rows: int, columns: int,
-) -> Any:  # fmt: skip
+    images: Images, stride: int, low: Any, pitch: float, floor: float, cap: float, rows: int, columns: int
+) -> Any:
     """Return sums (rows, columns, 3) over a grid on the table: pixels, their heights, highest height.
 
     low    (2,) corner of the grid [m]
     pitch  [m]
     floor, cap  heights beyond which all count alike [m]
     """
+    depth = images.depth
     out = np.zeros((rows, columns, 3))
     first, count = stride // 2, (depth.shape[2] - stride // 2 + stride - 1) // stride
     line = np.empty((3, count))
@@ -57,7 +72,7 @@ def height_map(
         for v in range(first, depth.shape[1], stride):
             for m in range(count):
                 line[0, m] = depth[k, v, first + m * stride]
-            _line_of_points(unit, camera, R[k], p[k], first, v, stride, low, pitch, line)
+            _line_of_points(images, k, first, v, stride, low, pitch, line)
             for m in range(count):
                 i, j, h = line[0, m], line[1, m], line[2, m]
                 if 0 <= i < rows and 0 <= j < columns:
@@ -69,14 +84,12 @@ def height_map(
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _line_of_points(
-    unit: float, camera: Any, R: Any, p: Any, first: int, v: int, stride: int, low: Any, pitch: float, line: Any
-) -> None:
+def _line_of_points(images: Images, k: int, first: int, v: int, stride: int, low: Any, pitch: float, line: Any) -> None:
     """Turn the depths in line (3, M) of the pixels of one row into their cell of the grid and height [m].
 
     A pixel without depth has cell -1.
     """
-    fx, fy, cx, cy = camera
+    unit, (fx, fy, cx, cy), R, p = images.unit, images.lens, images.R[k], images.p[k]
     b = (v - cy) / fy
     r00, r10, r20 = R[0, 0], R[1, 0], R[2, 0]
     x0, y0, z0 = R[0, 1] * b + R[0, 2], R[1, 1] * b + R[1, 2], R[2, 1] * b + R[2, 2]
@@ -92,46 +105,62 @@ def _line_of_points(
 
 
 @numba.njit(cache=True, nogil=True)
-def held(camera: Any, R: Any, p: Any, height: int, width: int, points: Any) -> Any:
+def held(images: Images, points: Any) -> Any:
     """Return how many images hold each point (N, 3), and how densely their pixels lie on a level surface there: (N, 2).
 
     The density is of all those images together [1/m^2], as if nothing stood before the point.
     """
     out = np.zeros((len(points), 2))
+    _, height, width = images.depth.shape
     for i in range(len(points)):
-        for k in range(len(R)):
-            z, u, v = pixel_of(camera, R, p, k, points[i, 0], points[i, 1], points[i, 2])
+        for k in range(len(images.p)):
+            z, u, v = pixel_of(images, k, points[i])
             if 0 <= u < width and 0 <= v < height:
                 out[i, 0] += 1
-                out[i, 1] += camera[0] * camera[1] * abs(p[k, 2] - points[i, 2]) / z**3
+                out[i, 1] += images.lens[0] * images.lens[1] * abs(images.p[k, 2] - points[i, 2]) / z**3
     return out
 
 
 @numba.njit(cache=True, nogil=True)
 def normal_of(
-    image: Any, unit: float, fx: float, fy: float, a: float, b: float, z: float, u: int, v: int, step: int, noise: float
-) -> tuple[bool, float, float]:  # fmt: skip
-    """Return whether the neighbours of pixel (u, v) give a normal toward the camera, and its x and y there, z being -1.
+    images: Images, k: int, u: int, v: int, a: float, b: float, z: float, step: int, noise: float
+) -> tuple[bool, float, float, float]:
+    """Return whether the surface at pixel (u, v) of view k faces the camera enough to be asked, and its normal.
 
-    a, b  direction of the pixel's ray at depth 1
+    a, b  slopes of the pixel's ray
     z     its depth [m]
+
+    The normal is 1 long along the optical axis, not unit: slopes then average without a pull toward the camera,
+    whatever their noise.
     """
-    left, right = image[v, u - step] * unit, image[v, u + step] * unit
-    up, down = image[v - step, u] * unit, image[v + step, u] * unit
+    image, unit, (fx, fy, _, _), R = images.depth[k], images.unit, images.lens, images.R[k]
     most = _STEEP * step * z / fx + 4 * noise * z * z
-    left, west = _beside(left, z, most, -step / fx)
-    right, east = _beside(right, z, most, step / fx)
-    up, north = _beside(up, z, most, -step / fy)
-    down, south = _beside(down, z, most, step / fy)
+    left, west = _beside(image[v, u - step] * unit, z, most, -step / fx)
+    right, east = _beside(image[v, u + step] * unit, z, most, step / fx)
+    up, north = _beside(image[v - step, u] * unit, z, most, -step / fy)
+    down, south = _beside(image[v + step, u] * unit, z, most, step / fy)
     if west == east or north == south:
-        return False, 0.0, 0.0
-    return _facing(a, b, left, right, up, down, west, east, north, south)
+        return False, 0.0, 0.0, 0.0
+    # tangents along the image's rows and columns
+    dx, dy, dz = a * (right - left) + east * right - west * left, b * (right - left), right - left
+    ex, ey, ez = a * (down - up), b * (down - up) + south * down - north * up, down - up
+    x, y, away = ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx
+    if away >= 0:
+        return False, 0.0, 0.0, 0.0
+    x, y = -x / away, -y / away
+    faces = (1 - x * a - y * b) ** 2 >= 0.25 * FACING**2 * (1 + x * x + y * y) * (1 + a * a + b * b)
+    return (
+        faces,
+        R[0, 0] * x + R[0, 1] * y - R[0, 2],
+        R[1, 0] * x + R[1, 1] * y - R[1, 2],
+        R[2, 0] * x + R[2, 1] * y - R[2, 2],
+    )
 
 
 @numba.njit(cache=True, nogil=True)
 def surfels(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, stride: int, step: int, mask: Any, low: Any, pitch: float,
-    cell: float, floor: float, layers: int, noise: float,
+    images: Images, stride: int, step: int, mask: Any, low: Any, pitch: float, cell: float, floor: float, layers: int,
+    noise: float,
 ) -> Any:  # fmt: skip
     """Return patches (N, 8) of surface: mean point, unit normal toward the cameras, pixels and views that saw it.
 
@@ -141,7 +170,7 @@ def surfels(
     floor   lowest height looked at [m], `layers` cubes up from it
     noise   standard deviation of depth at 1 m; it grows with the square
     """
-    fx, fy, cx, cy = camera
+    depth, unit, (fx, fy, cx, cy), R, p = images
     count, height, width = depth.shape
     box = _box_of(mask, low, pitch, floor, layers * cell)
     # Cubes are counted from the corner of the table; the index holds those over the mask, with one to spare.
@@ -152,7 +181,7 @@ def surfels(
     sums, last = np.zeros((size, 8)), np.full(size, -1, np.int32)
     n = 0
     for k in range(count):
-        window = _window_of(box, camera, R, p, k, width, height)
+        window = _window_of(box, images, k)
         for v in range(_first(window[2], step, stride), min(height - step, window[3] + 1), stride):
             b = (v - cy) / fy
             for u in range(_first(window[0], step, stride), min(width - step, window[1] + 1), stride):
@@ -169,10 +198,9 @@ def surfels(
                 layer = int(np.floor((h - floor) / cell))
                 if layer < 0 or layer >= layers:
                     continue
-                faces, nx, ny = normal_of(depth[k], unit, fx, fy, a, b, z, u, v, step, noise)
+                faces, nx, ny, nz = normal_of(images, k, u, v, a, b, z, step, noise)
                 if not faces:
                     continue
-                nx, ny, nz = turned(R, k, nx, ny)
                 main = _main_direction(nx, ny, nz)
                 i, j = int((x - low[0]) / cell) - i0, int((y - low[1]) / cell) - j0
                 row = index[main, layer, i, j]
@@ -199,39 +227,6 @@ def _beside(near: float, z: float, most: float, away: float) -> tuple[float, flo
     away  how far its ray is from the pixel's, in slope
     """
     return (near, away) if near > 0 and abs(near - z) <= most else (z, 0.0)
-
-
-@numba.njit(cache=True, nogil=True, forceinline=True)
-def _facing(
-    a: float, b: float, left: float, right: float, up: float, down: float, west: float, east: float, north: float,
-    south: float,
-) -> tuple[bool, float, float]:  # fmt: skip
-    """Return whether a surface faces the camera enough to be asked, and its normal (x, y, -1) in the camera's axes.
-
-    a, b            slopes of the pixel's ray
-    left .. down    depths of the neighbours [m]
-    west .. south   how far their rays are from the pixel's, in slope
-    """
-    # tangents along the image's rows and columns
-    dx, dy, dz = a * (right - left) + east * right - west * left, b * (right - left), right - left
-    ex, ey, ez = a * (down - up), b * (down - up) + south * down - north * up, down - up
-    x, y, z = ey * dz - ez * dy, ez * dx - ex * dz, ex * dy - ey * dx
-    # Not made unit: slopes then average without a pull toward the camera, whatever their noise.
-    if z >= 0:
-        return False, 0.0, 0.0
-    x, y = -x / z, -y / z
-    asked = (1 - x * a - y * b) ** 2 >= 0.25 * FACING**2 * (1 + x * x + y * y) * (1 + a * a + b * b)
-    return asked, x, y
-
-
-@numba.njit(cache=True, nogil=True, forceinline=True)
-def turned(R: Any, k: int, x: float, y: float) -> tuple[float, float, float]:
-    """Return a normal (x, y, -1) in the axes of camera k in those of the table."""
-    return (
-        R[k, 0, 0] * x + R[k, 0, 1] * y - R[k, 0, 2],
-        R[k, 1, 0] * x + R[k, 1, 1] * y - R[k, 1, 2],
-        R[k, 2, 0] * x + R[k, 2, 1] * y - R[k, 2, 2],
-    )
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
@@ -270,14 +265,15 @@ def _box_of(mask: Any, low: Any, pitch: float, floor: float, tall: float) -> Any
 
 
 @numba.njit(cache=True, nogil=True)
-def _window_of(box: Any, camera: Any, R: Any, p: Any, k: int, width: int, height: int) -> tuple[int, int, int, int]:
+def _window_of(box: Any, images: Images, k: int) -> tuple[int, int, int, int]:
     """Return the first and last column and row of the pixels that may fall into a box (2, 3) seen by camera k.
 
     A box's picture lies within those of its corners, where all of them are before the camera.
     """
+    _, height, width = images.depth.shape
     left, right, upper, lower = width, -1, height, -1
     for corner in range(8):
-        z, u, v = pixel_of(camera, R, p, k, box[corner & 1, 0], box[(corner >> 1) & 1, 1], box[corner >> 2, 2])
+        z, u, v = pixel_of(images, k, (box[corner & 1, 0], box[(corner >> 1) & 1, 1], box[corner >> 2, 2]))
         if z <= 0:
             return 0, width - 1, 0, height - 1
         left, right = min(left, u - 1), max(right, u + 1)
@@ -300,9 +296,10 @@ def _longer(sums: Any, last: Any) -> Any:
 
 
 @numba.njit(cache=True, nogil=True, inline="always")
-def pixel_of(camera: Any, R: Any, p: Any, k: int, x: float, y: float, h: float) -> Any:
-    """Return depth [m] and the nearest pixel (u, v) of a point seen by camera k of those at (R, p)."""
-    x, y, h = x - p[k, 0], y - p[k, 1], h - p[k, 2]
+def pixel_of(images: Images, k: int, point: Any) -> Any:
+    """Return depth [m] and the nearest pixel (u, v) of a point (3,) seen by camera k."""
+    camera, R, p = images.lens, images.R, images.p
+    x, y, h = point[0] - p[k, 0], point[1] - p[k, 1], point[2] - p[k, 2]
     z = R[k, 0, 2] * x + R[k, 1, 2] * y + R[k, 2, 2] * h
     if z <= 1e-6:
         return 0.0, -1, -1

@@ -46,7 +46,7 @@ def _open(scene: Scene, xyz: Array, ends: Array, normal: Array) -> Array:
     spots = _around(ends, normal, way)
     found = spots[..., 2] > 3 * scene.sigma
     found[found] = tree.query(spots[found])[0] > _COVERED * way
-    past, on = sight_lines.sights(*scene.images(), spots[found], scene.noise).T
+    past, on = sight_lines.sights(scene.images, spots[found], scene.noise).T
     held, least = scene.held(spots[found])[:, 0], scene.enough
     found[found] = (past < least) & ((on > past) | (held < least))
     return np.asarray(found.any(1))

@@ -29,7 +29,7 @@ def surfels(scene: Scene, region: Region) -> Array:
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else STRIDE
     where = region.mask, region.grid.low, region.grid.pitch
-    found = images.surfels(*scene.images(), stride, _NORMAL_STEP, *where, cell, floor, layers, scene.noise)
+    found = images.surfels(scene.images, stride, _NORMAL_STEP, *where, cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= scene.enough])
     if not len(found):
         raise no_surface()
@@ -59,7 +59,7 @@ def settled(scene: Scene, xyz: Array, normal: Array, window: float, rounds: int)
     """Move points (N, 3) along their normals to what the views measure; return support (N, 3) as there."""
     order = in_cubes(xyz, _CUBE * scene.pixel)
     moved, support = xyz[order], np.empty((len(xyz), 3))
-    support[order] = sight_lines.settled(*scene.images(), moved, normal[order], window, scene.noise, rounds)
+    support[order] = sight_lines.settled(scene.images, moved, normal[order], window, scene.noise, rounds)
     xyz[order] = moved
     return support
 

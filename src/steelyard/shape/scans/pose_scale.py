@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.depth_images import Images, sampled, stride_of
 from steelyard.shape.scans.table_plane import NEAR, largest_plane
 from steelyard.shape.views import Views
 
@@ -40,8 +40,8 @@ def pose_scale(views: Views) -> float | None:
 def _plane(views: Views, k: int) -> Array | None:
     """Return the normal of the plane that most of a view lies on, in the camera's axes, and its distance [m]."""
     depth, eye = views.depth[k : k + 1], np.zeros((1, 3))
-    stride = images.stride_of(depth, _SAMPLES)
-    points = images.sampled(depth, views.depth_unit, views.intrinsics.vector, np.eye(3)[None], eye, stride)
+    images = Images(depth, views.depth_unit, views.intrinsics.vector, np.eye(3)[None], eye)
+    points = sampled(images, stride_of(depth, _SAMPLES))
     if len(points) < _FEW:
         return None
     with suppress(CannotAnswer):

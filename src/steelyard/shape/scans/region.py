@@ -85,7 +85,7 @@ def _object_within(scene: Scene, reach: float, stride: int) -> Region:
     grid = Grid.about_origin(half, pitch)
     cap = max(6 * scene.sigma, _CAP * scene.distance)
     floor = 0.0 if scene.raised else -cap
-    sums = images.height_map(*scene.images(), stride, grid.low, pitch, floor, cap, *grid.shape)
+    sums = images.height_map(scene.images, stride, grid.low, pitch, floor, cap, *grid.shape)
     middle = (slice(half - near, half + near),) * 2
     well, watched = _watched(scene, grid, sums[..., 0], middle)
     mean = sums[..., 1] / np.maximum(sums[..., 0], 1)
@@ -135,7 +135,7 @@ def heights(scene: Scene) -> tuple[Grid, Array]:
     """
     pitch = 2 * scene.pixel
     grid, far = Grid.about_origin(int(REACHES[0] * scene.distance / pitch), pitch), scene.distance
-    sums = images.height_map(*scene.images(), STRIDE, grid.low, pitch, -far, far, *grid.shape)
+    sums = images.height_map(scene.images, STRIDE, grid.low, pitch, -far, far, *grid.shape)
     enough = sums[..., 0] >= _WATCHED * np.median(sums[..., 0][sums[..., 0] > 0])
     return grid, np.where(enough, sums[..., 1] / np.maximum(sums[..., 0], 1), 0.0)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
@@ -136,10 +137,13 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
         return first
     given, tries = (scene.R, scene.p), []
     near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < (_NEARBY if off else _UNTOLD)
-    for fit in (_left, _fit_fine) if near else (_left, _fit_far, _fit_slid) if off else (_left, _fit_far):
+    fits: list[Callable[[], Seen]] = [lambda: first, lambda: _fitted(scene, first, _FINE if near else _FAR, near=near)]
+    if off and not near:
+        fits.append(lambda: _fit_slid(scene))
+    for fit in fits:
         scene.R, scene.p = given
         with suppress(CannotAnswer):
-            tries.append(_Try.of(scene, _no_wrinkle(fit(scene, first), first)))
+            tries.append(_Try.of(scene, _no_wrinkle(fit(), first)))
     if not tries:
         raise no_surface()
     # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
@@ -167,19 +171,7 @@ def left_open(scene: Scene, seen: Seen, xyz: Array, normal: Array) -> float:
     return unsure_volume(_sights(scene, seen, _FINE[-1]), seen.errors, xyz, normal)
 
 
-def _left(_: Scene, first: Seen) -> Seen:
-    return first
-
-
-def _fit_fine(scene: Scene, first: Seen) -> Seen:
-    return _fitted(scene, first, _FINE, near=True)
-
-
-def _fit_far(scene: Scene, first: Seen) -> Seen:
-    return _fitted(scene, first, _FAR)
-
-
-def _fit_slid(scene: Scene, _: Seen) -> Seen:
+def _fit_slid(scene: Scene) -> Seen:
     slid(scene)
     return _fitted(scene, Seen.by(scene), _WINDOWS)
 
@@ -191,15 +183,15 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
            chance, and count as little as they show
     """
     sights = _sights(scene, seen, window)
-    *_, R, p = moved(sights, PoseErrors.unknown(scene.given.rotation.matrix, *_ANYWHERE)).images
+    after = moved(sights, PoseErrors.unknown(scene.given.rotation.matrix, *_ANYWHERE)).images
     xyz, normal = sights.xyz, sights.normal
     high = xyz[:, 2] > _STANDS_OUT * scene.sigma
     xyz, normal = (xyz[high], normal[high]) if high.any() else (xyz, normal)
     shares, axes = np.linalg.eigh(normal.T @ normal / len(normal))
     # All of a move where normals point everywhere.
     shown = np.eye(3) if wrong else (axes * np.sqrt(np.minimum(3 * shares.clip(0), 1))).T
-    turn = R @ np.swapaxes(scene.R, 1, 2)
-    shift = p - np.einsum("vij,vj->vi", turn, scene.p)
+    turn = after.R @ np.swapaxes(scene.R, 1, 2)
+    shift = after.p - np.einsum("vij,vj->vi", turn, scene.p)
     middle = xyz.mean(0)
     # Over all points: the mean of squares is that of the middle and of what turns about it do.
     about = (xyz - middle).T @ (xyz - middle) / len(xyz)
@@ -218,7 +210,7 @@ def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = F
         sights = _sights(scene, seen, window)
         errors = errors.seen(sights.off(), *sights.each_by_itself())
         sights = moved(sights, errors) if window > _TOGETHER else moved_together(sights, errors if near else None)
-        *_, scene.R, scene.p = sights.images
+        scene.R, scene.p = sights.images.R, sights.images.p
         seen = replace(Seen.by(scene), errors=errors)
     return seen
 
@@ -226,7 +218,7 @@ def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = F
 def _sights(scene: Scene, seen: Seen, window: float) -> Sights:
     """Return the views and the surface that they give together, which may be off by a window [m]."""
     xyz, normal = _model(scene, seen.patches, window)
-    return Sights(scene.images(), xyz, normal, window + 4 * scene.sigma, scene.noise, scene.given, xyz.mean(0))
+    return Sights(scene.images, xyz, normal, window + 4 * scene.sigma, scene.noise, scene.given, xyz.mean(0))
 
 
 def _model(scene: Scene, patches: Array, window: float) -> tuple[Array, Array]:

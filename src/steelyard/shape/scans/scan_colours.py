@@ -25,7 +25,7 @@ def colours_of(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any,
     shown, rgb = np.zeros(len(xyz), bool), np.zeros((len(xyz), 3), np.uint8)
     clear, enough = _CLEAR * scene.sigma, scene.enough
     rgb[:seen], shown[:seen] = sight_lines.colours(
-        images_rgb, *scene.images(), xyz[:seen], normal[:seen], WINDOW, scene.noise, clear, enough
+        images_rgb, scene.images, xyz[:seen], normal[:seen], WINDOW, scene.noise, clear, enough
     )
     # What lies as low as the table and looks like it may be its fringe.
     shown &= (xyz[:, 2] > 2 * clear) | ~_like_table(scene, clear, rgb)

@@ -9,8 +9,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
-from steelyard.shape.scans import depth_images as images
 from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans.depth_images import Images, held, sampled, stride_of
 from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_noise, table_of
 from steelyard.shape.scans.view_mistakes import advice
 from steelyard.shape.views import TablePlane, Views
@@ -66,9 +66,10 @@ class Scene:
         """Standard deviation of depth at the object [m]."""
         return self.noise * self.distance**2
 
-    def images(self) -> tuple[Any, float, Array, Array, Array]:
-        """Return what every pass over the images needs: depth, its unit, the camera and its poses."""
-        return self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p
+    @property
+    def images(self) -> Images:
+        """The images with the cameras where they now are."""
+        return Images(self.views.depth, self.views.depth_unit, self.views.intrinsics.vector, self.R, self.p)
 
     @property
     def enough(self) -> int:
@@ -77,22 +78,21 @@ class Scene:
 
     def sampled(self, pixels: int) -> Array:
         """Return about so many even pixels as points (N, 5): x, y, z in T, depth [m] and number of the view."""
-        return np.asarray(images.sampled(*self.images(), images.stride_of(self.views.depth, pixels)))
+        return np.asarray(sampled(self.images, stride_of(self.views.depth, pixels)))
 
     def sampled_rgb(self, pixels: int) -> Array:
         """Return the colours (N, 3) of those pixels, 0..255, of views that have colour."""
-        stride = images.stride_of(self.views.depth, pixels)
+        stride = stride_of(self.views.depth, pixels)
         every = (slice(None), slice(stride // 2, None, stride), slice(stride // 2, None, stride))
         return np.asarray(self.views.rgb)[every][self.views.depth[every] > 0].astype(float)
 
     def seen_empty(self, points: Array) -> Any:
         """Return past which of points (N, 3) enough views see."""
-        return sight_lines.seen_past(*self.images(), points, 0.0, self.noise, LEAST_VIEWS) >= self.enough
+        return sight_lines.seen_past(self.images, points, 0.0, self.noise, LEAST_VIEWS) >= self.enough
 
     def held(self, points: Array) -> Array:
         """Return how many images hold each of points (N, 3), and how densely their pixels lie there [1/m^2]: (N, 2)."""
-        lens = self.views.intrinsics
-        return np.asarray(images.held(lens.vector, self.R, self.p, lens.height, lens.width, points))
+        return np.asarray(held(self.images, points))
 
     def keep(self, rows: Any) -> None:
         """Leave out all views but those of `rows`."""
@@ -103,19 +103,19 @@ class Scene:
 def scene_of(views: Views) -> Scene:
     """Return the images in the table's frame."""
     R, p = views.X_WC.rotation.matrix, views.X_WC.position
-    stride = images.stride_of(views.depth, _SAMPLES)
-    sampled = images.sampled(views.depth, views.depth_unit, views.intrinsics.vector, R, p, stride)
+    images = Images(views.depth, views.depth_unit, views.intrinsics.vector, R, p)
+    points = sampled(images, stride_of(views.depth, _SAMPLES))
     looks = looked_at(R, p)
     distance = float(np.median(np.linalg.norm(p - looks, axis=1)))
     try:
-        table = table_of(sampled[:, :3], p, distance, views.table)
+        table = table_of(points[:, :3], p, distance, views.table)
     except CannotAnswer as error:
         raise CannotAnswer(f"{error} {advice(views)}") from None
     stated, step = None if views.table is None else table, np.inf
     if stated is not None:
-        table, step = leveller(sampled[:, :3], p, distance, stated)
+        table, step = leveller(points[:, :3], p, distance, stated)
     X_WT = table_frame(table, looks)
-    noise = table_noise(sampled, X_WT.inverse().apply(sampled[:, :3]), distance, views.depth_unit, len(views))
+    noise = table_noise(points, X_WT.inverse().apply(points[:, :3]), distance, views.depth_unit, len(views))
     X_TC = X_WT.inverse() @ views.X_WC
     R, p = np.ascontiguousarray(X_TC.rotation.matrix), np.ascontiguousarray(X_TC.position)
     return Scene(views, X_WT, R.copy(), p.copy(), distance, noise, stated, floor=-step / 2)

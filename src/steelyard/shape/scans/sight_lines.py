@@ -13,15 +13,16 @@ import numba
 import numpy as np
 
 from steelyard.shape.points.medians import middle_mean, quantile
-from steelyard.shape.scans.depth_images import FACING, pixel_of
+from steelyard.shape.scans.depth_images import FACING, Images, pixel_of
 
 UPWARD = 0.7  # least upward component of the normal of a surface that faces up
 _NOTHING, _SURFACE, _PAST = 0.0, 1.0, 2.0  # what a view says of a point
 
 
 @numba.njit(cache=True, nogil=True)
-def _laid_out(R: Any, p: Any) -> Any:
-    """Return rotations (V, 3, 3) and positions (V, 3) as (12, V): R row by row, then p."""
+def _laid_out(images: Images) -> Any:
+    """Return the axes and places of the cameras as (12, V): R row by row, then p."""
+    R, p = images.R, images.p
     out = np.empty((12, len(R)))
     for k in range(len(R)):
         for i in range(3):
@@ -38,12 +39,12 @@ def _room(views: int) -> tuple[Any, Any]:
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _projected(camera: Any, cameras: Any, height: int, width: int, x: Any, place: Any, at: Any) -> None:
+def _projected(images: Images, cameras: Any, x: Any, place: Any, at: Any) -> None:
     """Write depth [m], pixel column and row of a point x (3,) in every view, and where the pixel lies in them all.
 
     A view that the point does not fall into has depth -1 and place 0.
     """
-    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+    (fx, fy, cx, cy), (_, height, width) = images.lens, images.depth.shape
     r00, r01, r02, r10, r11, r12 = cameras[0], cameras[1], cameras[2], cameras[3], cameras[4], cameras[5]
     r20, r21, r22, px, py, pz = cameras[6], cameras[7], cameras[8], cameras[9], cameras[10], cameras[11]
     depth, column, row = place[0], place[1], place[2]
@@ -69,9 +70,7 @@ def _incidence(cameras: Any, x: Any, n: Any, cosine: Any) -> None:
 
 
 @numba.njit(cache=True, nogil=True)
-def _looked(
-    depth: Any, unit: float, camera: Any, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any, at: Any
-) -> None:
+def _looked(images: Images, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any, at: Any) -> None:
     """Write what every view measures near one point x (3,) with normal n (3,).
 
     work (8, V): what the view says, height of the measured point over the tangent plane [m], cosine of incidence, depth
@@ -80,18 +79,18 @@ def _looked(
     blocked, says nothing.
     window  heights looked at, in metres, beside 4 standard deviations of the depth noise
     """
-    pixels, measured = depth.reshape(-1), work[6]
+    pixels, measured = images.depth.reshape(-1), work[6]
     _incidence(cameras, x, n, work[2])
-    _projected(camera, cameras, depth.shape[1], depth.shape[2], x, work[3:6], at)
+    _projected(images, cameras, x, work[3:6], at)
     for k in range(len(at)):
         measured[k] = pixels[at[k]]
-    _said(unit, camera, cameras, x, n, window, noise, work)
+    _said(images.unit, images.lens, cameras, x, n, window, noise, work)
 
 
 @numba.njit(cache=True, nogil=True, error_model="numpy")
-def _said(unit: float, camera: Any, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any) -> None:
+def _said(unit: float, lens: Any, cameras: Any, x: Any, n: Any, window: float, noise: float, work: Any) -> None:
     """Write what every view says and how high over the tangent plane it measures; `_looked` without the pixels."""
-    fx, fy, cx, cy = camera[0], camera[1], camera[2], camera[3]
+    fx, fy, cx, cy = lens
     r00, r01, r02, r10, r11, r12 = cameras[0], cameras[1], cameras[2], cameras[3], cameras[4], cameras[5]
     r20, r21, r22, px, py, pz = cameras[6], cameras[7], cameras[8], cameras[9], cameras[10], cameras[11]
     says, over, cosine, depth, column, row, measured = work[0], work[1], work[2], work[3], work[4], work[5], work[6]
@@ -109,21 +108,18 @@ def _said(unit: float, camera: Any, cameras: Any, x: Any, n: Any, window: float,
 
 
 @numba.njit(cache=True, nogil=True)
-def settled(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float,
-    rounds: int,
-) -> Any:  # fmt: skip
+def settled(images: Images, xyz: Any, normal: Any, window: float, noise: float, rounds: int) -> Any:
     """Move points (N, 3) along their normals to the middle of what the views measure; return support (N, 3).
 
     support  views that measure the surface, views that saw past it, and the rms of what is left [m]
     """
-    cameras = _laid_out(R, p)
-    work, at = _room(len(depth))
+    cameras = _laid_out(images)
+    work, at = _room(len(images.p))
     says, over, heights = work[0], work[1], work[7]
     support = np.zeros((len(xyz), 3))
     for i in range(len(xyz)):
         for turn in range(rounds + 1):
-            _looked(depth, unit, camera, cameras, xyz[i], normal[i], window, noise, work, at)
+            _looked(images, cameras, xyz[i], normal[i], window, noise, work, at)
             on, past, square = 0, 0, 0.0
             for k in range(len(at)):
                 heights[on] = over[k]
@@ -144,20 +140,20 @@ def settled(
 
 @numba.njit(cache=True, nogil=True)
 def colours(
-    rgb: Any, depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, window: float, noise: float,
-    clear: float, enough: int,
-) -> Any:  # fmt: skip
+    rgb: Any, images: Images, xyz: Any, normal: Any, window: float, noise: float, clear: float, enough: int
+) -> Any:
     """Return the median colour (N, 3) of the views that see each point, and which points `enough` of them saw (N,).
 
     clear  height over the table [m] below which a pixel may show the table; it counts only for a surface that faces up,
            which nothing but the table's own noise comes as near to
     """
-    cameras = _laid_out(R, p)
+    depth, unit, camera, R, p = images
+    cameras = _laid_out(images)
     work, at = _room(len(depth))
     values, pixels, heights = np.empty((3, len(depth))), rgb.reshape(-1, 3), depth.reshape(-1)
     out, seen = np.zeros((len(xyz), 3), np.uint8), np.zeros(len(xyz), np.bool_)
     for i in range(len(xyz)):
-        _looked(depth, unit, camera, cameras, xyz[i], normal[i], window, noise, work, at)
+        _looked(images, cameras, xyz[i], normal[i], window, noise, work, at)
         on = 0
         for k in range(len(at)):
             if work[0, k] != _SURFACE:
@@ -179,33 +175,31 @@ def colours(
 
 
 @numba.njit(cache=True, nogil=True)
-def seen_past(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, points: Any, margin: float, noise: float, enough: int
-) -> Any:
+def seen_past(images: Images, points: Any, margin: float, noise: float, enough: int) -> Any:
     """Return how many views (N,), up to `enough`, measured something behind each point (N, 3): there it is empty.
 
     margin  by how much farther, beside 3 standard deviations of the depth noise [m]
 
     Views that saw past the point before are asked first: that changes how soon there are enough and nothing else.
     """
-    cameras = _laid_out(R, p)
-    work, at = _room(len(depth))
+    cameras = _laid_out(images)
+    work, at = _room(len(images.p))
     last, known = np.empty(enough, np.int64), 0
-    pixels, beyond = depth.reshape(-1), work[6]
+    pixels, beyond = images.depth.reshape(-1), work[6]
     out = np.zeros(len(points), np.int64)
     for i in range(len(points)):
         again = known == enough
         for m in range(enough if again else 0):
-            again = _past(depth, unit, camera, R, p, last[m], points[i], margin, noise)
+            again = _past(images, last[m], points[i], margin, noise)
             if not again:
                 break
         if again:
             out[i] = enough
             continue
-        _projected(camera, cameras, depth.shape[1], depth.shape[2], points[i], work[3:6], at)
+        _projected(images, cameras, points[i], work[3:6], at)
         for k in range(len(at)):
             beyond[k] = pixels[at[k]]
-        known = _behind(work, unit, margin, noise)
+        known = _behind(work, images.unit, margin, noise)
         if known >= enough:
             known = 0
             for k in range(len(at)):
@@ -217,20 +211,20 @@ def seen_past(
 
 
 @numba.njit(cache=True, nogil=True)
-def sights(depth: Any, unit: float, camera: Any, R: Any, p: Any, points: Any, noise: float) -> Any:
+def sights(images: Images, points: Any, noise: float) -> Any:
     """Return how many views see past each point (N, 3), and how many measure something there: (N, 2).
 
     Within 3 standard deviations of the depth noise, and three pixel widths before it for a surface seen flat.
     """
-    out = np.zeros((len(points), 2))
+    out, depth = np.zeros((len(points), 2)), images.depth
     for i in range(len(points)):
         for k in range(len(depth)):
-            z, u, v = pixel_of(camera, R, p, k, points[i, 0], points[i, 1], points[i, 2])
+            z, u, v = pixel_of(images, k, points[i])
             if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
                 continue
-            behind, error = depth[k, v, u] * unit - z, 3 * noise * z * z
+            behind, error = depth[k, v, u] * images.unit - z, 3 * noise * z * z
             out[i, 0] += behind > error
-            out[i, 1] += -error - 3 * z / camera[0] <= behind <= error
+            out[i, 1] += -error - 3 * z / images.lens[0] <= behind <= error
     return out
 
 
@@ -247,18 +241,17 @@ def _behind(work: Any, unit: float, margin: float, noise: float) -> int:
 
 
 @numba.njit(cache=True, nogil=True)
-def _past(depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, x: Any, margin: float, noise: float) -> bool:
+def _past(images: Images, k: int, x: Any, margin: float, noise: float) -> bool:
     """Return whether view k measured something behind a point x (3,)."""
-    z, u, v = pixel_of(camera, R, p, k, x[0], x[1], x[2])
+    depth = images.depth
+    z, u, v = pixel_of(images, k, x)
     if u < 0 or v < 0 or u >= depth.shape[2] or v >= depth.shape[1]:
         return False
-    return bool(depth[k, v, u] * unit > z + margin + 3 * noise * z * z)
+    return bool(depth[k, v, u] * images.unit > z + margin + 3 * noise * z * z)
 
 
 @numba.njit(cache=True, nogil=True)
-def feet(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, step: float, levels: int, noise: float
-) -> Any:
+def feet(images: Images, xyz: Any, normal: Any, step: float, levels: int, noise: float) -> Any:
     """Return how high above the table (z = 0) walls end (N,) [m]: 0 where they reach it.
 
     xyz     (N, 3) points of walls; normal (N, 3) level unit vectors out of them
@@ -266,14 +259,14 @@ def feet(
     Down the wall, sight lines that still end on it are told from those that pass under it and end on the table, by
     least squares over all views that face it.
     """
-    cameras = _laid_out(R, p)
-    work, at = _room(len(depth))
+    cameras, p = _laid_out(images), images.p
+    work, at = _room(len(p))
     out = np.zeros(len(xyz))
     x = np.empty(3)
     for i in range(len(xyz)):
         for level in range(1, levels + 1):
             x[0], x[1], x[2] = xyz[i, 0], xyz[i, 1], level * step
-            _looked(depth, unit, camera, cameras, x, normal[i], 2 * step, noise, work, at)
+            _looked(images, cameras, x, normal[i], 2 * step, noise, work, at)
             product, square, error = 0.0, 0.0, 0.0
             for k in range(len(at)):
                 if work[0, k] == _NOTHING:

@@ -78,7 +78,7 @@ def closed_below(scene: Scene, xyz: Array, normal: Array, pitch: float) -> Under
     high = np.isfinite(top)
     foot = grid.spots(high)
     up = np.tile([0.0, 0.0, 1.0], (len(foot), 1))
-    support = sight_lines.settled(*scene.images(), settled := foot.copy(), up, WINDOW, scene.noise, 2)
+    support = sight_lines.settled(scene.images, settled := foot.copy(), up, WINDOW, scene.noise, 2)
     table = np.zeros(grid.shape, bool)
     table[high] = (support[:, 0] + support[:, 1] >= scene.enough) & (settled[:, 2] < 0.3 * scene.sigma)
     empty_to = np.full(grid.shape, np.inf)
@@ -102,7 +102,7 @@ def _raise_to_feet(scene: Scene, xyz: Array, normal: Array, grid: Grid, empty_to
     i, j, nearest = i[has], j[has], nearest[has]
     level = unit_vectors(normal[wall][nearest] * [1.0, 1.0, 0.0])
     foot = sight_lines.feet(
-        *scene.images(), xyz[wall][nearest].copy(), level, _FOOT, int(_HIGHEST_FOOT / _FOOT), scene.noise
+        scene.images, xyz[wall][nearest].copy(), level, _FOOT, int(_HIGHEST_FOOT / _FOOT), scene.noise
     )
     empty_to[i, j] = np.maximum(empty_to[i, j], np.minimum(foot, top[i, j] - 1e-6))
 

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from steelyard.check import Array
+from steelyard.shape.scans.depth_images import Images
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.view_steps import Sights, measured, weight_of
 
@@ -29,7 +30,7 @@ def unsure_volume(sights: Sights, errors: PoseErrors, xyz: Array, normal: Array)
     What ties views across an edge counts for nothing: normals there are of both its sides, and no view measures those.
     """
     area, _ = _surroundings(xyz, normal)
-    slope = _slopes(*sights.images, xyz, normal, area, sights.middle, sights.window, sights.noise)
+    slope = _slopes(sights.images, xyz, normal, area, sights.middle, sights.window, sights.noise)
     slope = (slope - slope.mean(0)).reshape(-1)  # the table goes along with all of them
     _, smooth = _surroundings(sights.xyz, sights.normal)
     H, _ = replace(sights, xyz=sights.xyz[smooth], normal=sights.normal[smooth]).together()
@@ -48,21 +49,19 @@ def _surroundings(xyz: Array, normal: Array) -> tuple[Array, Array]:
 
 
 @numba.njit(cache=True, nogil=True)
-def _slopes(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, area: Any, middle: Any, window: float,
-    noise: float,
-) -> Any:  # fmt: skip
+def _slopes(images: Images, xyz: Any, normal: Any, area: Any, middle: Any, window: float, noise: float) -> Any:
     """Return how the volume under points that stand for areas (N,) changes with the steps (V, 6) of the views."""
-    out, row, weight, heard = np.zeros((len(R), 6)), np.empty((len(R), 6)), np.empty(len(R)), np.empty(len(R), np.bool_)
+    views = len(images.R)
+    out, row, weight, heard = np.zeros((views, 6)), np.empty((views, 6)), np.empty(views), np.empty(views, np.bool_)
     for i in range(len(xyz)):
         total = 0.0
-        for k in range(len(R)):
-            heard[k], over, sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row[k], middle, noise)
+        for k in range(views):
+            heard[k], over, sigma = measured(images, k, xyz[i], normal[i], row[k], middle, noise)
             heard[k] = heard[k] and abs(over) <= window
             if heard[k]:
                 weight[k] = weight_of(over, sigma)
                 total += weight[k]
-        for k in range(len(R)):
+        for k in range(views):
             if heard[k]:
                 for r in range(6):
                     out[k, r] += area[i] * weight[k] / total * row[k, r]

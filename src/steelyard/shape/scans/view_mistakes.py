@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.errors import CannotAnswer
-from steelyard.shape.scans import depth_images as images
+from steelyard.shape.scans.depth_images import Images, sampled, stride_of
 from steelyard.shape.scans.pose_scale import pose_scale
 from steelyard.shape.scans.table_plane import NEAR, largest_plane, looked_at
 from steelyard.shape.views import FARTHEST, NEAREST, Intrinsics, Views
@@ -142,15 +142,15 @@ def advice(views: Views) -> str:
 def table_share(views: Views, given: _Given) -> float:
     """Return the share of the measured points on the plane that has most, all cameras above it; 0 without one."""
     R, p = given.X_WC.rotation.matrix, given.X_WC.position
-    stride = images.stride_of(views.depth, _SAMPLES)
-    sampled = images.sampled(views.depth, given.unit, given.intrinsics.vector, R, p, stride)
-    away = float(np.median(sampled[:, 3])) if len(sampled) else 0.0
+    images = Images(views.depth, given.unit, given.intrinsics.vector, R, p)
+    points = sampled(images, stride_of(views.depth, _SAMPLES))
+    away = float(np.median(points[:, 3])) if len(points) else 0.0
     if not NEAREST <= away <= FARTHEST:
         return 0.0
     looks = looked_at(R, p)
     near = NEAR * min(away, float(np.median(np.linalg.norm(p - looks, axis=1))))
     try:
-        plane = largest_plane(sampled[:, :3], p, near)
+        plane = largest_plane(points[:, :3], p, near)
     except CannotAnswer:
         return 0.0
-    return float((np.abs(plane.height(sampled[:, :3])) < near).mean())
+    return float((np.abs(plane.height(points[:, :3])) < near).mean())

@@ -18,7 +18,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array
-from steelyard.shape.scans.depth_images import FACING, normal_of, pixel_of, turned
+from steelyard.shape.scans.depth_images import FACING, Images, normal_of, pixel_of
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.spatial import Pose, Rotation
 
@@ -36,7 +36,7 @@ _FLOOR = 1e-4  # of the surface: it is known no better [m]
 class Sights:
     """Views and the surface that they are fitted to.
 
-    images  depth (V, H, W), its unit, the camera and its poses R (V, 3, 3), p (V, 3)
+    images  with the poses that the cameras now have
     xyz     (N, 3) points of the surface with normals (N, 3)
     window  distances from it beyond which something else was measured [m]
     noise   standard deviation of depth at 1 m
@@ -44,7 +44,7 @@ class Sights:
     middle  (3,) point about which views turn
     """
 
-    images: tuple[Any, float, Array, Array, Array]
+    images: Images
     xyz: Array
     normal: Array
     window: float
@@ -54,20 +54,18 @@ class Sights:
 
     def off(self) -> Array:
         """Return turns and shifts (V, 6) by which the views have left their reported poses."""
-        _, _, _, R, p = self.images
-        move = Pose(Rotation.nearest(R), p) @ self.given.inverse()
+        move = Pose(Rotation.nearest(self.images.R), self.images.p) @ self.given.inverse()
         return np.concatenate([move.rotation.log(), move.apply(self.middle) - self.middle], axis=1)
 
     def after(self, steps: Array) -> Sights:
         """Return the views after steps (V, 6), turns [rad] and shifts [m]."""
-        depth, unit, camera, R, p = self.images
         turn = np.asarray(Rotation.exp(steps[:, :3]).matrix)
-        p = self.middle + np.einsum("vij,vj->vi", turn, p - self.middle) + steps[:, 3:]
-        return replace(self, images=(depth, unit, camera, turn @ R, p))
+        p = self.middle + np.einsum("vij,vj->vi", turn, self.images.p - self.middle) + steps[:, 3:]
+        return replace(self, images=self.images._replace(R=turn @ self.images.R, p=p))
 
     def each_by_itself(self) -> tuple[Array, Array]:
         """Return Hessians (V, 6, 6) and gradients (V, 6) of half the squared distances from the surface."""
-        H, g = _of_views(*self.images, self.xyz, self.normal, self.middle, self.window, self.noise)
+        H, g = _of_views(self.images, self.xyz, self.normal, self.middle, self.window, self.noise)
         return H / _ALIKE, g / _ALIKE
 
     def together(self) -> tuple[Array, Array]:
@@ -75,9 +73,9 @@ class Sights:
 
         Of many points and views a share of the points is enough.
         """
-        step = max(1, -(-len(self.xyz) * len(self.images[0]) // _PAIRS))
+        step = max(1, -(-len(self.xyz) * len(self.images.R) // _PAIRS))
         points = self.xyz[::step], self.normal[::step]
-        g, own, mean_row = _together(*self.images, *points, self.middle, self.window, self.noise)
+        g, own, mean_row = _together(self.images, *points, self.middle, self.window, self.noise)
         flat = mean_row.reshape(len(mean_row), -1)
         H = -(flat.T @ flat).reshape(*g.shape, *g.shape)
         each = np.arange(len(g))
@@ -103,7 +101,7 @@ def moved_together(sights: Sights, errors: PoseErrors | None) -> Sights:
 
     They then stay near their last poses instead, step by step.
     """
-    count = len(sights.images[0])
+    count = len(sights.images.R)
     information = np.eye(6 * count) * np.tile(_DAMPED, count) if errors is None else errors.information()
     for _ in range(_STEPS):
         off = np.zeros((count, 6)) if errors is None else sights.off()
@@ -124,33 +122,19 @@ def steps_together(sights: Sights, information: Array, off: Array) -> Array:
 
 
 @numba.njit(cache=True, nogil=True)
-def _of_views(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
-    noise: float,
-) -> Any:  # fmt: skip
-    """Return the Hessian (V, 6, 6) and gradient (V, 6) of each view, see `_of_view`."""
-    H, g = np.empty((len(R), 6, 6)), np.empty((len(R), 6))
-    for k in range(len(R)):
-        H[k], g[k] = _of_view(depth, unit, camera, R, p, k, xyz, normal, middle, window, noise)
-    return H, g
-
-
-@numba.njit(cache=True, nogil=True)
-def _of_view(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, xyz: Any, normal: Any, middle: Any, window: float,
-    noise: float,
-) -> Any:  # fmt: skip
-    """Return the Hessian (6, 6) and gradient (6,) of half the squared distances, in standard deviations of depth."""
-    H, g, row = np.zeros((6, 6)), np.zeros(6), np.empty(6)
-    for i in range(len(xyz)):
-        heard, over, sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row, middle, noise)
-        if not heard or abs(over) > window:
-            continue
-        weight = weight_of(over, sigma)
-        for r in range(6):
-            g[r] += weight * row[r] * over
-            for c in range(6):
-                H[r, c] += weight * row[r] * row[c]
+def _of_views(images: Images, xyz: Any, normal: Any, middle: Any, window: float, noise: float) -> Any:
+    """Return Hessian (V, 6, 6) and gradient (V, 6) of half the squared distances of each view, in stds of depth."""
+    H, g, row = np.zeros((len(images.R), 6, 6)), np.zeros((len(images.R), 6)), np.empty(6)
+    for k in range(len(images.R)):
+        for i in range(len(xyz)):
+            heard, over, sigma = measured(images, k, xyz[i], normal[i], row, middle, noise)
+            if not heard or abs(over) > window:
+                continue
+            weight = weight_of(over, sigma)
+            for r in range(6):
+                g[k, r] += weight * row[r] * over
+                for c in range(6):
+                    H[k, r, c] += weight * row[r] * row[c]
     return H, g
 
 
@@ -161,25 +145,23 @@ def weight_of(over: float, sigma: float) -> float:
 
 
 @numba.njit(cache=True, nogil=True)
-def _together(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, xyz: Any, normal: Any, middle: Any, window: float,
-    noise: float,
-) -> Any:  # fmt: skip
+def _together(images: Images, xyz: Any, normal: Any, middle: Any, window: float, noise: float) -> Any:
     """Return what half the squared distances of the views from their mean change with their steps.
 
     Gradient (V, 6), and the Hessian as its blocks (V, 6, 6) as if the mean stood still, less the square of a matrix
     (N, V, 6): how the mean goes with the steps at each point.
     """
-    g, own, mean_row = np.zeros((len(R), 6)), np.zeros((len(R), 6, 6)), np.zeros((len(xyz), len(R), 6))
-    row, over, weight = np.empty((len(R), 6)), np.empty(len(R)), np.empty(len(R))
+    views = len(images.R)
+    g, own, mean_row = np.zeros((views, 6)), np.zeros((views, 6, 6)), np.zeros((len(xyz), views, 6))
+    row, over, weight = np.empty((views, 6)), np.empty(views), np.empty(views)
     for i in range(len(xyz)):
         total, mean = 0.0, 0.0
-        for k in range(len(R)):
-            heard, over[k], sigma = measured(depth, unit, camera, R, p, k, xyz[i], normal[i], row[k], middle, noise)
+        for k in range(views):
+            heard, over[k], sigma = measured(images, k, xyz[i], normal[i], row[k], middle, noise)
             weight[k] = weight_of(over[k], sigma) if heard and abs(over[k]) <= window else 0.0
             total += weight[k]
             mean += weight[k] * over[k]
-        for k in range(len(R)):
+        for k in range(views):
             if weight[k] > 0:
                 for r in range(6):
                     g[k, r] += weight[k] * row[k, r] * (over[k] - mean / total)
@@ -190,21 +172,20 @@ def _together(
 
 
 @numba.njit(cache=True, nogil=True)
-def measured(
-    depth: Any, unit: float, camera: Any, R: Any, p: Any, k: int, x: Any, n: Any, row: Any, middle: Any, noise: float
-) -> Any:
+def measured(images: Images, k: int, x: Any, n: Any, row: Any, middle: Any, noise: float) -> Any:
     """Return whether view k faces a point x (3,) with normal n (3,), how high over it it measures and how surely [m].
 
     row  (6,) is filled with how that height changes with the step of the view
     """
+    depth, unit, (fx, fy, cx, cy), R, p = images
     dx, dy, dz = x[0] - p[k, 0], x[1] - p[k, 1], x[2] - p[k, 2]
     cosine = -(dx * n[0] + dy * n[1] + dz * n[2]) / np.sqrt(dx * dx + dy * dy + dz * dz)
-    z, u, v = pixel_of(camera, R, p, k, x[0], x[1], x[2])
+    z, u, v = pixel_of(images, k, x)
     if cosine < FACING or u < _BESIDE or v < _BESIDE or u >= depth.shape[2] - _BESIDE or v >= depth.shape[1] - _BESIDE:
         return False, 0.0, 1.0
     m = depth[k, v, u] * unit
-    a, b = (u - camera[2]) / camera[0], (v - camera[3]) / camera[1]
-    if m == 0 or not _faces_alike(depth[k], unit, camera, R, k, u, v, a, b, m, n, noise):
+    a, b = (u - cx) / fx, (v - cy) / fy
+    if m == 0 or not _faces_alike(images, k, u, v, a, b, m, n, noise):
         return False, 0.0, 1.0
     a, b = m * a, m * b
     over = 0.0
@@ -219,16 +200,10 @@ def measured(
 
 
 @numba.njit(cache=True, nogil=True)
-def _faces_alike(
-    image: Any, unit: float, camera: Any, R: Any, k: int, u: int, v: int, a: float, b: float, m: float, n: Any,
-    noise: float,
-) -> bool:  # fmt: skip
+def _faces_alike(images: Images, k: int, u: int, v: int, a: float, b: float, m: float, n: Any, noise: float) -> bool:
     """Whether the surface at pixel (u, v), of depth m [m], faces about as n (3,) does.
 
     What stands before a point is nearer, but may be no farther off its plane than the window.
     """
-    faces, x, y = normal_of(image, unit, camera[0], camera[1], a, b, m, u, v, _BESIDE, noise)
-    if not faces:
-        return False
-    x, y, z = turned(R, k, x, y)
-    return bool(x * n[0] + y * n[1] + z * n[2] > _SAME_WAY * np.sqrt(x * x + y * y + z * z))
+    faces, x, y, z = normal_of(images, k, u, v, a, b, m, _BESIDE, noise)
+    return bool(faces and x * n[0] + y * n[1] + z * n[2] > _SAME_WAY * np.sqrt(x * x + y * y + z * z))

@@ -15,7 +15,7 @@ import numpy as np
 
 from steelyard.shape.mesh import Integers
 from steelyard.shape.sides.tree import Tree, single, sums
-from steelyard.shape.sides.winding import FOUR_PI, ONE, Numbers, Sight, seen
+from steelyard.shape.sides.winding import FOUR_PI, ONE, Sight, View, gathered, seen_of
 
 Array = Any  # single precision here, double at the border
 
@@ -53,7 +53,7 @@ class Discs:
     def response(self, sight: Sight) -> Response:
         """Return how the winding number at the targets depends on what each disc counts."""
         size = np.diff(sight.targets.blocks)
-        close, beyond = np.diff(sight.near[0]), np.diff(sight.far[0])
+        close, beyond = np.diff(sight.view.first), np.diff(sight.view.begin)
         at = np.concatenate([np.zeros((1, 2), np.int64), np.cumsum(np.stack([size * close, 3 * size * beyond], 1), 0)])
         near, far = (np.empty(room, np.float32) for room in at[-1].tolist())
         self._turns(sight, near, far, at, np.empty(sight.targets.points.shape[1], np.float32))
@@ -62,8 +62,7 @@ class Discs:
     def _turns(self, sight: Sight, near: Array, far: Array, at: Integers, out: Array) -> None:
         own = np.concatenate([self.normal, self.area[None], self.depth[None]])
         elements = sight.elements(own, self.normal * self.area)
-        points, blocks = sight.targets.points, sight.targets.blocks
-        _turns(*elements, points, blocks, np.float32(self.soft**2), sight.most, near, far, at, out)
+        _turns(*elements, sight.targets.points, np.float32(self.soft**2), near, far, at, out)
 
 
 @dataclass(frozen=True, eq=False)
@@ -90,31 +89,31 @@ class Response:
         share = single(share)
         dipole = sums(discs.normal * (discs.area * share), discs.tree.start)
         out = np.zeros(sight.targets.points.shape[1], np.float32)
-        where = *sight.near, *sight.far, sight.targets.blocks, self.at
-        _apply(self.near, self.far, *where, every, sight.most, share, dipole, out)
+        _apply(self.near, self.far, sight.view, self.at, every, share, dipole, out)
         return out
 
     def adjoint(self, weights: Array) -> Array:
         """Return the sum (N,) over targets of weight times what each disc adds to the target's winding number."""
         discs, sight = self.discs, self.sight
         out, field = np.zeros(len(discs.area), np.float32), np.zeros((3, 2 * len(discs.tree.start) - 2), np.float32)
-        where = discs.tree.start, *sight.near, *sight.far, sight.targets.blocks, self.at
-        _transposed(self.near, self.far, *where, sight.most, single(weights), discs.normal, discs.area, field, out)
+        turned = single(weights), discs.normal, discs.area
+        _transposed(self.near, self.far, sight.view, self.at, discs.tree.start, *turned, field, out)
         return out
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _turns(
-    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
-    points: Array, blocks: Integers, soft: Any, most: int, close_out: Array, far_out: Array, at: Integers, out: Array,
+    own: Array, node: Array, view: View, points: Array, soft: Any, close_out: Array, far_out: Array, at: Integers,
+    out: Array,
 ) -> None:  # fmt: skip
     """Write the winding number (M,), and, where there is room, by how much each disc and node turns it."""
+    most, blocks = view.most, view.blocks
     all_seen, inverse, turn = np.empty((8, most), np.float32), np.empty(most, np.float32), np.empty(most, np.float32)
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
     area, depth = all_seen[6], all_seen[7]
     kept, filled = len(at) > 1, 0
     for b in range(len(blocks) - 1):
-        close, count = seen(own, node, first, near, begin, far, b, all_seen)
+        close, count = gathered(own, node, view, b, all_seen)
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(close):
@@ -149,12 +148,11 @@ def _turns(
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _apply(
-    near_turn: Array, far_field: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
-    blocks: Integers, at: Integers, every: int, most: int, share: Array, dipole: Array, out: Array,
-) -> None:  # fmt: skip
-    ours, theirs = np.empty(most, np.float32), np.empty(3 * most, np.float32)
+    near_turn: Array, far_field: Array, view: View, at: Integers, every: int, share: Array, dipole: Array, out: Array
+) -> None:
+    blocks, ours, theirs = view.blocks, np.empty(view.most, np.float32), np.empty(3 * view.most, np.float32)
     for b in range(0, len(blocks) - 1, every):
-        points, nodes = near[first[b] : first[b + 1]], far[begin[b] : begin[b + 1]]
+        points, nodes = seen_of(view, b)
         close, beyond, filled = len(points), len(nodes), at[b, 1]
         for m in range(close):
             ours[m] = share[points[m]]
@@ -174,14 +172,13 @@ def _apply(
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
 def _transposed(
-    near_turn: Array, far_field: Array, start: Integers, first: Integers, near: Integers, begin: Integers,
-    far: Integers, blocks: Integers, at: Integers, most: int, weights: Array, normal: Array, area: Array, field: Array,
-    out: Array,
+    near_turn: Array, far_field: Array, view: View, at: Integers, start: Integers, weights: Array, normal: Array,
+    area: Array, field: Array, out: Array,
 ) -> None:  # fmt: skip
-    ours, theirs = np.empty(most, np.float32), np.empty(3 * most, np.float32)
+    blocks, ours, theirs = view.blocks, np.empty(view.most, np.float32), np.empty(3 * view.most, np.float32)
     filled = 0
     for b in range(len(blocks) - 1):
-        points, nodes = near[first[b] : first[b + 1]], far[begin[b] : begin[b + 1]]
+        points, nodes = seen_of(view, b)
         close, beyond = len(points), len(nodes)
         ours[:close] = 0
         theirs[: 3 * beyond] = 0

@@ -10,8 +10,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
-from functools import cached_property
-from typing import Any
+from typing import Any, NamedTuple
 
 import numba
 import numpy as np
@@ -27,58 +26,64 @@ FOUR_PI = np.float32(1 / (4 * math.pi))
 ONE, THREE = np.float32(1), np.float32(3)
 
 
+class View(NamedTuple):
+    """What blocks of targets see of the points and nodes of another tree.
+
+    first, near  numbers of the points that block b sees one by one: near[first[b]:first[b + 1]]
+    begin, far   the same of the nodes that it sees as one
+    blocks       (B + 1,) first target of each block
+    most         points and nodes that any block sees, at most
+    """
+
+    first: Integers
+    near: Numbers
+    begin: Integers
+    far: Numbers
+    blocks: Integers
+    most: int
+
+
 @dataclass(frozen=True, eq=False)
 class Sight:
-    """How blocks of the points of one tree see the nodes of another.
-
-    targets, sources  the trees
-    near  numbers of the points that block b sees one by one: near[1][near[0][b]:near[0][b + 1]]
-    far   the same of the nodes that it sees as one
-    """
+    """How the points of one tree see those of another, and its nodes."""
 
     targets: Tree
     sources: Tree
-    near: tuple[Integers, Numbers]
-    far: tuple[Integers, Numbers]
+    view: View
 
     @classmethod
     def of(cls, targets: Tree, sources: Tree) -> Sight:
         """Return which leaves must be summed point by point."""
-        blocks = len(targets.blocks) - 1
-        seen_from = targets.centre, targets.radius, blocks, sources.centre, sources.radius, sources.start
-        first, near, begin, far = _seen_by(*seen_from)
-        return cls(targets, sources, (first, near), (begin, far))
-
-    @cached_property
-    def most(self) -> int:
-        """The most points and nodes that any block sees."""
-        return int((np.diff(self.near[0]) + np.diff(self.far[0])).max())
+        count = len(targets.blocks) - 1
+        first, near, begin, far = _seen_by(
+            targets.centre, targets.radius, count, sources.centre, sources.radius, sources.start
+        )
+        most = int((np.diff(first) + np.diff(begin)).max())
+        return cls(targets, sources, View(first, near, begin, far, targets.blocks, most))
 
     def winding_and_gradient(self, dipoles: Array, width: float) -> tuple[Array, Array]:
         """Return the winding number (M,) and its gradient (3, M) at the targets of ordered dipoles (3, N), softened."""
         points = self.targets.points
         out, gradient = np.zeros(points.shape[1], np.float32), np.zeros(points.shape, np.float32)
-        seen_here = *self.elements(dipoles), points, self.targets.blocks, np.float32(width**2), self.most
-        _gradient(*seen_here, out, gradient)
+        _gradient(*self.elements(dipoles), points, np.float32(width**2), out, gradient)
         return out, gradient
 
     def winding(self, dipoles: Array, width: float, every: int = 1) -> Array:
         """Return the winding number (M,) alone; only every `every`-th block of targets is looked at, others have 0."""
         points = self.targets.points
         out = np.zeros(points.shape[1], np.float32)
-        _winding(*self.elements(dipoles), points, self.targets.blocks, every, np.float32(width**2), self.most, out)
+        _winding(*self.elements(dipoles), points, every, np.float32(width**2), out)
         return out
 
     def adjoint(self, weights: Array, width: float) -> Array:
         """Return the sum (3, M) over sources of weight times how a dipole at the target turns the source's number."""
         points = self.targets.points
         out = np.empty(points.shape, np.float32)
-        seen_here = *self.elements(weights[None]), points, self.targets.blocks, np.float32(width**2), self.most
-        _adjoint(*seen_here, out)
+        _adjoint(*self.elements(weights[None]), points, np.float32(width**2), out)
         return out
 
-    def elements(self, values: Array, counted: Array | None = None) -> tuple[Any, Any, Any, Any, Any, Any]:
-        """Return points with values (3 + K, N), nodes with theirs, and what each block sees.
+    def elements(self, values: Array, counted: Array | None = None) -> tuple[Array, Array, View]:
+        """Return points with values (3 + K, N), nodes with theirs, and what each block sees of both.
 
         counted  what a node has the sums of, the values where it is None
         """
@@ -86,7 +91,7 @@ class Sight:
         values = single(values)
         own = np.concatenate([tree.points, values])
         node = np.concatenate([tree.centre, sums(values if counted is None else single(counted), tree.start)])
-        return own, node, *self.near, *self.far
+        return own, node, self.view
 
 
 @numba.njit(cache=True, nogil=True)
@@ -127,11 +132,16 @@ def _seen_by(
 
 
 @numba.njit(cache=True, nogil=True)
-def seen(
-    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers, b: int, out: Array
-) -> tuple[int, int]:
+def seen_of(view: View, b: int) -> tuple[Numbers, Numbers]:
+    """Return the numbers of the points and of the nodes that block b of targets sees."""
+    first, begin = view.first, view.begin
+    return view.near[first[b] : first[b + 1]], view.far[begin[b] : begin[b + 1]]
+
+
+@numba.njit(cache=True, nogil=True)
+def gathered(own: Array, node: Array, view: View, b: int, out: Array) -> tuple[int, int]:
     """Write what block b of targets sees into out, near points first; return their number and that of all."""
-    points, nodes = near[first[b] : first[b + 1]], far[begin[b] : begin[b + 1]]
+    points, nodes = seen_of(view, b)
     close, beyond = len(points), len(nodes)
     for row in range(len(own)):
         given, kept = own[row], out[row]
@@ -145,14 +155,11 @@ def seen(
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _gradient(
-    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
-    points: Array, blocks: Integers, soft: Any, most: int, out: Array, gradient: Array,
-) -> None:  # fmt: skip
-    all_seen, inverse = np.empty((6, most), np.float32), np.empty(most, np.float32)
+def _gradient(own: Array, node: Array, view: View, points: Array, soft: Any, out: Array, gradient: Array) -> None:
+    all_seen, inverse, blocks = np.empty((6, view.most), np.float32), np.empty(view.most, np.float32), view.blocks
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
     for b in range(len(blocks) - 1):
-        count = seen(own, node, first, near, begin, far, b, all_seen)[1]
+        count = gathered(own, node, view, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
@@ -174,14 +181,11 @@ def _gradient(
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _winding(
-    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
-    points: Array, blocks: Integers, every: int, soft: Any, most: int, out: Array,
-) -> None:  # fmt: skip
-    all_seen = np.empty((6, most), np.float32)
+def _winding(own: Array, node: Array, view: View, points: Array, every: int, soft: Any, out: Array) -> None:
+    all_seen, blocks = np.empty((6, view.most), np.float32), view.blocks
     sx, sy, sz, mx, my, mz = all_seen[0], all_seen[1], all_seen[2], all_seen[3], all_seen[4], all_seen[5]
     for b in range(0, len(blocks) - 1, every):
-        count = seen(own, node, first, near, begin, far, b, all_seen)[1]
+        count = gathered(own, node, view, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             total = np.float32(0)
@@ -193,14 +197,11 @@ def _winding(
 
 
 @numba.njit(cache=True, nogil=True, fastmath=True, error_model="numpy")
-def _adjoint(
-    own: Array, node: Array, first: Integers, near: Numbers, begin: Integers, far: Numbers,
-    points: Array, blocks: Integers, soft: Any, most: int, out: Array,
-) -> None:  # fmt: skip
-    all_seen, inverse = np.empty((4, most), np.float32), np.empty(most, np.float32)
+def _adjoint(own: Array, node: Array, view: View, points: Array, soft: Any, out: Array) -> None:
+    all_seen, inverse, blocks = np.empty((4, view.most), np.float32), np.empty(view.most, np.float32), view.blocks
     sx, sy, sz, weight = all_seen[0], all_seen[1], all_seen[2], all_seen[3]
     for b in range(len(blocks) - 1):
-        count = seen(own, node, first, near, begin, far, b, all_seen)[1]
+        count = gathered(own, node, view, b, all_seen)[1]
         for i in range(blocks[b], blocks[b + 1]):
             x, y, z = points[0, i], points[1, i], points[2, i]
             for j in range(count):
