@@ -93,12 +93,12 @@ def test_rows_with_nan_are_left_out_as_of_files(tmp_path: Path) -> None:
         (TURN, None),
         (TURN.matrix.reshape(N, 9), None),
         (TURN.matrix.tolist(), "matrix"),
-        (ScipyRotation.from_matrix(TURN.matrix), None),
+        (ScipyRotation.from_matrix(np.array(TURN.matrix)), None),
         (TURN.quaternion_wxyz(), "quaternion-wxyz"),
         (np.roll(TURN.quaternion_wxyz(), -1, axis=1), "quaternion-xyzw"),
         (TURN.rpy(), "rpy"),
         (TURN.log(), "rotation-vector"),
-        (ScipyRotation.from_matrix(TURN.matrix).as_euler("ZYZ"), "zyz"),
+        (ScipyRotation.from_matrix(np.array(TURN.matrix)).as_euler("ZYZ"), "zyz"),
     ],
 )
 def test_every_form_of_rotation_is_the_same_rotation(rotation: Any, form: str | None) -> None:

@@ -36,7 +36,6 @@ _FAR = (0.02, 0.02, 0.02, *_WINDOWS)
 _MODEL = 2500  # points that views are fitted to
 _NEAR = 0.005  # of the surface: what measures it, as far as it is asked whether the views agree [m]
 _STANDS_OUT = 4.0  # times the depth noise: what is higher is not the table
-_WIDER = 3.0  # times as wide as before its views were moved: no object is
 _SAME = 0.1  # of the depth noise: views that spread by less are as good as each other
 _ON = 3.0  # times the depth noise: so near the surface a pixel lies on it
 _SAMPLES = 200_000  # pixels that are asked whether they do
@@ -137,13 +136,16 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
         return first
     given, tries = (scene.R, scene.p), []
     near = off < _NEARBY and _apart(scene, first, _FAR[0], off > 0) < (_NEARBY if off else _UNTOLD)
-    fits: list[Callable[[], Seen]] = [lambda: first, lambda: _fitted(scene, first, _FINE if near else _FAR, near=near)]
+    fits: list[Callable[[], Seen]] = [
+        lambda: first,
+        lambda: _fitted(scene, first, _FINE if near else _FAR, off > 0, near),
+    ]
     if off and not near:
         fits.append(lambda: _fit_slid(scene))
     for fit in fits:
         scene.R, scene.p = given
         with suppress(CannotAnswer):
-            tries.append(_Try.of(scene, _no_wrinkle(fit(), first)))
+            tries.append(_Try.of(scene, fit()))
     if not tries:
         raise no_surface()
     # Shares are added of what contradicts a try: views see past its surface, show less of it than of the best, and
@@ -152,13 +154,6 @@ def agreed(scene: Scene, first: Seen, off: float) -> Seen:
     best = min(tries, key=lambda each: each.crossed - each.shown / max(most, 1) + each.seen.spread / least)
     scene.R, scene.p = best.R, best.p
     return best.seen
-
-
-def _no_wrinkle(seen: Seen, first: Seen) -> Seen:
-    """Return what is seen; CannotAnswer where that is a table that views bent: views that agree blur an object less."""
-    if seen.region.mask.sum() > _WIDER * first.region.mask.sum():
-        raise no_surface()
-    return seen
 
 
 def left_open(scene: Scene, seen: Seen, xyz: Array, normal: Array) -> float:
@@ -173,7 +168,7 @@ def left_open(scene: Scene, seen: Seen, xyz: Array, normal: Array) -> float:
 
 def _fit_slid(scene: Scene) -> Seen:
     slid(scene)
-    return _fitted(scene, Seen.by(scene), _WINDOWS)
+    return _fitted(scene, Seen.by(scene), _WINDOWS, level=True)
 
 
 def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
@@ -200,16 +195,20 @@ def _apart(scene: Scene, seen: Seen, window: float, wrong: bool) -> float:
     return float(np.sqrt(((turn @ middle + shift) @ shown.T).var(0).sum() + by_turns))
 
 
-def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], near: bool = False) -> Seen:
+def _fitted(scene: Scene, seen: Seen, windows: tuple[float, ...], level: bool, near: bool = False) -> Seen:
     """Return what the views see once they are fitted to their own surface, which may be off by windows [m] in turn.
 
-    near  whether the reported poses are: of what views hardly show, poses far off tell less than they do
+    level  whether every view was turned and lifted until it had the table level: while views are far apart, what
+           little of a low thing they share must not tilt them again
+    near   whether the reported poses are: of what views hardly show, poses far off tell less than they do
     """
     errors = PoseErrors.unknown(scene.given.rotation.matrix, *_REPORTED)
     for window in windows:
         sights = _sights(scene, seen, window)
         errors = errors.seen(sights.off(), *sights.each_by_itself())
-        sights = moved(sights, errors) if window > _TOGETHER else moved_together(sights, errors if near else None)
+        sights = (
+            moved(sights, errors, level) if window > _TOGETHER else moved_together(sights, errors if near else None)
+        )
         scene.R, scene.p = sights.images.R, sights.images.p
         seen = replace(Seen.by(scene), errors=errors)
     return seen

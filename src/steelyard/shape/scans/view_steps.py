@@ -27,6 +27,7 @@ _ALIKE = 50.0  # neighbours on the surface whose errors are one: an edge that bl
 _PAIRS = 90_000  # of a point and a view that are looked at, about: of many views a share of the points is enough
 # Precision of a view's last pose [1/rad^2], [1/m^2].
 _DAMPED = np.repeat([1 / np.radians(2.0) ** 2, 1 / 0.01**2], 3)
+_SLIDES = np.array([2, 3, 4])  # of a step: what leaves the table level
 _BESIDE = 2  # pixels from one whose normal is taken to its neighbours
 _SAME_WAY = 0.7  # cosine of two normals of one surface
 _FLOOR = 1e-4  # of the surface: it is known no better [m]
@@ -83,16 +84,21 @@ class Sights:
         return H.reshape(g.size, g.size) * (step / _ALIKE), g.reshape(-1) * (step / _ALIKE)
 
 
-def moved(sights: Sights, errors: PoseErrors) -> Sights:
+def moved(sights: Sights, errors: PoseErrors, level: bool = False) -> Sights:
     """Return views that measure the surface, each fitted to it by itself, by what is believed of their poses.
+
+    level  whether views have the table where it is: then they slide on it only
 
     Point-to-plane distances of the pixels that its points fall on, Huber-weighted, three Gauss-Newton steps.
     """
+    free = _SLIDES if level else np.arange(6)
     for _ in range(_STEPS):
         H, g = sights.each_by_itself()
         pull = errors.precision * (errors.mean - sights.off())
-        steps = np.linalg.solve(H + np.diag(errors.precision), (pull - g)[..., None])
-        sights = sights.after(np.asarray(steps[..., 0]))
+        known = (H + np.diag(errors.precision))[:, free[:, None], free]
+        steps = np.zeros(g.shape)
+        steps[:, free] = np.linalg.solve(known, (pull - g)[:, free, None])[..., 0]
+        sights = sights.after(steps)
     return sights
 
 
