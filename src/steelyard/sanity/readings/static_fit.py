@@ -133,21 +133,19 @@ def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Ar
     scatter = np.stack([g.reshape(-1, size + 1).T @ g.reshape(-1, size + 1) for g in groups])
     total = scatter.sum(0)
     rest = total - scatter
-    solutions = _least_norm(np.concatenate([rest, total[None]]), size)
-    return total, solutions[-1], solutions[:-1]
+    left_out = np.stack([_least_norm(r[:size, :size], r[:size, size]) for r in rest])
+    return total, _least_norm(total[:size, :size], total[:size, size]), left_out
 
 
-def _least_norm(scatters: Array, size: int) -> Array:
-    """Return the least-norm solutions (B, size) of scatters (B, size + 1, size + 1), their columns scaled to one."""
-    matrix, vector = scatters[:, :size, :size], scatters[:, :size, size]
-    diagonal = np.diagonal(matrix, axis1=1, axis2=2)
-    whole = diagonal.sum(1, keepdims=True)
-    scale = np.where(whole > 1e-200, 1 / np.sqrt(np.maximum(np.maximum(diagonal, 1e-12 * whole), 1e-300)), 0.0)
-    values, axes = np.linalg.eigh(matrix * scale[:, :, None] * scale[:, None, :])
-    least = 1e-6 * np.maximum(values[:, -1:], 1e-300)
-    inverse = np.where(values > least, 1 / np.maximum(values, 1e-300), 0.0)
-    along = inverse * (np.swapaxes(axes, 1, 2) @ (scale * vector)[:, :, None])[:, :, 0]
-    return np.asarray(scale * (axes @ along[:, :, None])[:, :, 0])
+def _least_norm(matrix: Array, vector: Array) -> Array:
+    """Return the least-norm solution after scaling the columns to one."""
+    size = float(np.trace(matrix))
+    if not size > 1e-200:
+        return np.zeros(len(vector))
+    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * size))
+    values, axes = np.linalg.eigh(matrix * np.outer(scale, scale))
+    inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
+    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))
 
 
 def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
