@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from typing import Any
@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.asked import Progress, require_one
-from steelyard.bench.pool import batches, spread
+from steelyard.bench.pool import batches
 from steelyard.check import Array
 from steelyard.errors import SteelyardError
 from steelyard.identify.noise_aware import NoiseAware
@@ -77,7 +77,7 @@ def run(
     cases = [Case(motion, noise, spectrum, declared, bias) for spectrum in spectra]
     found: dict[str, list[Outcome | str]] = {case.spectrum: [] for case in cases}
     for case in cases:
-        for outcomes in _fitted(case, jobs, workers):
+        for outcomes in batches(partial(_fit, case), jobs, workers):
             found[case.spectrum] += outcomes
             if progress is not None:
                 progress(sum(map(len, found.values())), len(jobs) * len(cases))
@@ -93,17 +93,9 @@ def run(
     }
 
 
-def _fitted(case: Case, jobs: list[tuple[int, str]], workers: int) -> Iterator[list[Outcome | str]]:
-    """Yield the outcomes of the jobs in order, a batch at a time."""
-    yield from spread(partial(_fit_all, case), batches(jobs), workers)
-
-
-def _fit_all(case: Case, jobs: Sequence[tuple[int, str]]) -> list[Outcome | str]:
-    return [_fit(case, seed, name) for seed, name in jobs]
-
-
-def _fit(case: Case, seed: int, name: str) -> Outcome | str:
-    """Return the outcome of one log, or the message of the error that it raised."""
+def _fit(case: Case, job: tuple[int, str]) -> Outcome | str:
+    """Return the outcome of the log of a seed and an object, or the message of the error that it raised."""
+    seed, name = job
     bias = np.random.default_rng([seed, 1]).normal(0, BIAS_STD) if case.bias == "free" else None
     options: dict[str, Any] = {"shuffled": False, "spectrum": case.spectrum, "bias": bias}
     log, true = simulate_log(name, case.motion, case.noise, seed, **options)

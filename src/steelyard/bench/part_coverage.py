@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
@@ -14,7 +14,7 @@ from steelyard.bench.asked import Progress, require_one
 from steelyard.bench.coverage import HALF_WIDTH, object_scale, rms_error, widths
 from steelyard.bench.objects.cases import Case, load_case, noisy_rows
 from steelyard.bench.objects.part_timing import TIMING, timings
-from steelyard.bench.pool import batches, spread
+from steelyard.bench.pool import batches
 from steelyard.bench.timing import REPEATS
 from steelyard.check import Array
 from steelyard.errors import BadValue, SteelyardError
@@ -75,7 +75,7 @@ def run(
         for truth in TRUTHS:
             jobs = [(folders[k % len(folders)], k, noise, truth) for k in range(seeds)]
             found: list[Outcome | str] = []
-            for outcomes in _fitted(jobs, workers):
+            for outcomes in batches(_fit, jobs, workers):
                 found += outcomes
                 done += len(outcomes)
                 if progress is not None:
@@ -91,15 +91,6 @@ def run(
     }
 
 
-def _fitted(jobs: list[Job], workers: int) -> Iterator[list[Outcome | str]]:
-    """Yield the outcomes of the jobs in order, a batch at a time."""
-    yield from spread(_fit_all, batches(jobs), workers)
-
-
-def _fit_all(jobs: Sequence[Job]) -> list[Outcome | str]:
-    return [_fit(*job) for job in jobs]
-
-
 @lru_cache(maxsize=64)
 def _case(folder: Path, truth: str) -> tuple[Case, Array] | None:
     """Return the case and the true masses (P,) of its parts; None where these are not known."""
@@ -113,8 +104,9 @@ def _case(folder: Path, truth: str) -> tuple[Case, Array] | None:
     return replace(case, known=replace(case.known, truth=body), log=log), case.part_masses
 
 
-def _fit(folder: Path, seed: int, noise: str, truth: str) -> Outcome | str:
+def _fit(job: Job) -> Outcome | str:
     """Return the outcome of one log, or the message of the error that it raised."""
+    folder, seed, noise, truth = job
     try:
         loaded = _case(folder, truth)
         if loaded is None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from concurrent.futures import ProcessPoolExecutor
+from functools import partial
 from multiprocessing import get_context
 from typing import TypeVar
 
@@ -11,9 +12,7 @@ Job = TypeVar("Job")
 Row = TypeVar("Row")
 
 
-def batches(jobs: Sequence[Job], size: int = 20) -> list[Sequence[Job]]:
-    """Return the jobs in order, `size` at a time: for calls that each are done sooner than they are handed over."""
-    return [jobs[k : k + size] for k in range(0, len(jobs), size)]
+BATCH = 20  # jobs: calls that each are done sooner than they are handed over
 
 
 def spread(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int) -> Iterator[Row]:
@@ -24,3 +23,12 @@ def spread(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int) -> Ite
     # Fresh processes: a fork would copy the locks of BLAS and Numba threads.
     with ProcessPoolExecutor(workers, mp_context=get_context("spawn")) as pool:
         yield from pool.map(call, jobs)
+
+
+def batches(call: Callable[[Job], Row], jobs: Sequence[Job], workers: int) -> Iterator[list[Row]]:
+    """Yield what `call` makes of the jobs, in their order, a batch at a time."""
+    yield from spread(partial(_each, call), [jobs[k : k + BATCH] for k in range(0, len(jobs), BATCH)], workers)
+
+
+def _each(call: Callable[[Job], Row], jobs: Sequence[Job]) -> list[Row]:
+    return [call(job) for job in jobs]

@@ -182,15 +182,14 @@ def _without_blends(
     two has colours that scatter less than `plain` along that way.
     """
     count = len(modes)
-    size = np.bincount(label, minlength=count)
-    for m in np.argsort(size, kind="stable") if count > 2 else ():
+    for m in np.argsort(np.bincount(label, minlength=count), kind="stable") if count > 2 else ():
         mine = label == m
         if not mine.any():  # its points have all been given to others
             continue
         votes = _votes(label, near, count)[mine]
         beside = np.where(np.arange(count) == m, 0, votes.sum(0))
         two = np.argsort(-beside, kind="stable")[:2]
-        if beside[two].min() < 0.1 * beside.sum() or beside[two].sum() < 0.8 * beside.sum():
+        if beside[two].min() < 0.1 * beside.sum():
             continue
         a, way = modes[two[0]], modes[two[1]] - modes[two[0]]
         length = max(float(np.linalg.norm(way)), 1e-12)
@@ -199,7 +198,7 @@ def _without_blends(
         thin = (votes[:, two].sum(1) > 0).mean() > 0.6
         runs = np.std(along) * length > plain
         between = 0.1 < np.median(along) < 0.9 and np.median(off) < 0.1 * length
-        if between and (thin or runs) and size[m] < size[two].max():
+        if between and (thin or runs):
             label = label.copy()
             label[mine] = two[(along > 0.5).astype(np.int64)]
     used, label = np.unique(label, return_inverse=True)

@@ -18,7 +18,7 @@ from steelyard.shape.nesting import body_of
 from steelyard.shape.third_moments import third_moments
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.materials import Material
-from steelyard.workshop.solids import block
+from steelyard.workshop.solids import block, mesh_of
 from steelyard.workshop.tools import Tool
 
 
@@ -111,9 +111,7 @@ def layer_moments(surface: TriangleMesh, layers: Sequence[Layer], density: float
         limits[layer.axis] = (
             float(low[layer.axis] + layer.start * reach), float(low[layer.axis] + layer.end * reach)
         )  # fmt: skip
-        cut = (body ^ block(*limits)).to_mesh64()
-        triangles = cut.tri_verts.astype(np.int64)
-        slab = TriangleMesh(cut.vert_properties[:, :3], triangles, np.zeros(len(triangles), np.int64))
+        slab = mesh_of(body ^ block(*limits), unit=1.0)
         added += (layer.density - density) * part_moments(slab)[0]
     return added
 

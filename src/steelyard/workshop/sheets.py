@@ -10,7 +10,7 @@ import numpy as np
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh
 from steelyard.workshop.sampling import POINTS, spread_evenly
-from steelyard.workshop.solids import block, ring
+from steelyard.workshop.solids import block, mesh_of, ring
 
 KINDS = ("channel", "plate", "tube")
 
@@ -62,11 +62,5 @@ def _sheet(kind: str, rng: np.random.Generator, points: int) -> Sheet:
 
 def sheet_of(name: str, body: Any, rng: np.random.Generator, points: int) -> Sheet:
     """Return a solid in millimetres with `points` points spread evenly over its surface."""
-    mesh = _mesh(body)
+    mesh = mesh_of(body)
     return Sheet(name, mesh, body.volume() * 1e-9, Cloud(spread_evenly(mesh, rng, points)[0]))
-
-
-def _mesh(body: Any) -> TriangleMesh:
-    found = body.to_mesh64()
-    triangles = found.tri_verts.astype(np.int64)
-    return TriangleMesh(found.vert_properties[:, :3] * 1e-3, triangles, np.zeros(len(triangles), np.int64))

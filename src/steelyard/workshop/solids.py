@@ -9,9 +9,12 @@ from typing import Any
 import manifold3d
 import numpy as np
 
+from steelyard.shape.mesh import TriangleMesh
+
 Solid = Any  # manifold3d.Manifold, which has no type information
 Point = tuple[float, float]
 ROUND = 36  # facets of a full circle
+MM = 1e-3  # [m]
 SLIVER = 2e-3  # share of a solid's volume below which a piece was left behind by set operations
 
 
@@ -138,6 +141,17 @@ def _inverted(solid: Solid) -> Solid:
     mesh = solid.to_mesh64()
     return manifold3d.Manifold(
         manifold3d.Mesh64(mesh.vert_properties[:, :3].copy(), np.ascontiguousarray(mesh.tri_verts[:, ::-1]))
+    )
+
+
+def mesh_of(*solids: Solid, unit: float = MM) -> TriangleMesh:
+    """Return one mesh [m] of all solids, part k of solid k; `unit` [m] is theirs."""
+    meshes = [solid.to_mesh64() for solid in solids]
+    first = np.cumsum([0, *(len(mesh.vert_properties) for mesh in meshes)])
+    return TriangleMesh(
+        unit * np.concatenate([mesh.vert_properties[:, :3] for mesh in meshes]),
+        np.concatenate([mesh.tri_verts.astype(np.int64) + n for mesh, n in zip(meshes, first[:-1], strict=True)]),
+        np.repeat(np.arange(len(solids)), [len(mesh.tri_verts) for mesh in meshes]),
     )
 
 

@@ -17,9 +17,8 @@ from steelyard.shape.mesh import TriangleMesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop.draw import Draw
 from steelyard.workshop.materials import Colour, Material
-from steelyard.workshop.solids import Solid, union, without_slivers
+from steelyard.workshop.solids import MM, Solid, mesh_of, union, without_slivers
 
-MM = 1e-3
 Finish = Literal["even", "scuffed", "shaded"]
 _AXES = {"x": (1, 0, 0), "y": (0, 1, 0), "z": (0, 0, 1), "-x": (-1, 0, 0), "-y": (0, -1, 0), "-z": (0, 0, -1)}
 
@@ -116,7 +115,8 @@ def make_tool(
         if solid.volume() <= 0:
             raise BadValue(f"{name}: nothing is left of the part '{piece.name}' once the parts before it are cut out.")
     colours = [one_colour or piece.rgb or draw.colour(piece.material) for piece in pieces]
-    mesh = _joined(solids, colours)
+    mesh = mesh_of(*solids)
+    mesh = replace(mesh, rgb=np.array(colours, np.uint8)[mesh.part])
     return Tool(
         name=name,
         mesh=mesh,
@@ -140,16 +140,3 @@ def apart(solids: Sequence[Solid]) -> list[Solid]:
     for solid in solids:
         left.append(without_slivers(solid - union(left)) if left else solid)
     return left
-
-
-def _joined(solids: Sequence[Solid], colours: Sequence[Colour]) -> TriangleMesh:
-    """Return one mesh [m] of all solids [mm], part k of solid k."""
-    meshes = [solid.to_mesh64() for solid in solids]
-    sizes = np.cumsum([0, *(len(mesh.vert_properties) for mesh in meshes)])
-    counts = [len(mesh.tri_verts) for mesh in meshes]
-    return TriangleMesh(
-        MM * np.concatenate([mesh.vert_properties[:, :3] for mesh in meshes]),
-        np.concatenate([mesh.tri_verts.astype(np.int64) + n for mesh, n in zip(meshes, sizes[:-1], strict=True)]),
-        np.repeat(np.arange(len(solids)), counts),
-        np.repeat(np.array(colours, np.uint8), counts, axis=0),
-    )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import gzip
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -16,7 +15,7 @@ from steelyard.io.example import columns_text, toml_string
 from steelyard.logs.team_log import TeamLog, TeamRecording, TeamRobot
 from steelyard.logs.team_track import Track
 from steelyard.spatial import Rotation
-from steelyard.whole_files import whole_folder, write_bytes, write_text
+from steelyard.whole_files import whole_folder, write_text
 
 # Quantity -> columns, what its description says beside them, digits after the point.
 _COLUMNS: dict[str, tuple[tuple[str, ...], str, int]] = {
@@ -54,24 +53,22 @@ def write_team(
     path: Path,
     joints: Sequence[Mapping[str, JointReadings]] = (),
     *,
-    packed: bool = False,
     heading: str = "",
 ) -> Path:
     """Write the description to `path` and one CSV per robot and recording into the folder of that name beside it.
 
     joints   by recording and robot: written in place of the poses and forces that they give
-    packed   gzip the tables
     heading  stands first in the description, as a comment
 
     All of it or nothing is written; other files in the folders stay. Returns `path`. Raises BadFile where a folder
     cannot be written, BadValue for a six-axis robot with joints.
     """
     with whole_folder(path.parent) as new:
-        _write(log, new / path.name, joints, packed, heading)
+        _write(log, new / path.name, joints, heading)
     return path
 
 
-def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings]], packed: bool, heading: str) -> None:
+def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings]], heading: str) -> None:
     """Write the tables, then the description."""
     folder = path.with_suffix("")
     folder.mkdir(exist_ok=True)
@@ -88,10 +85,10 @@ def _write(log: TeamLog, path: Path, joints: Sequence[Mapping[str, JointReadings
                 text.append(_recording(recording) + "  away = true   # it holds nothing then\n")
             if robot.name not in recording.tracks:
                 continue
-            name = _own_name(f"{robot.name}-{recording.name}", taken) + (".csv.gz" if packed else ".csv")
+            name = _own_name(f"{robot.name}-{recording.name}", taken) + ".csv"
             columns = _columns(recording.tracks[robot.name], joints[k].get(robot.name) if by_joints else None)
             text.append(_recording(recording) + _stream(f"{folder.name}/{name}", columns))
-            _write_table(folder / name, recording.tracks[robot.name].time, columns, packed)
+            _write_table(folder / name, recording.tracks[robot.name].time, columns)
     write_text(path, "\n".join(text))
 
 
@@ -156,15 +153,13 @@ def _stream(path: str, columns: Mapping[str, Array]) -> str:
     return "\n".join(lines) + "\n"
 
 
-def _write_table(path: Path, time: Array, columns: Mapping[str, Array], packed: bool) -> None:
+def _write_table(path: Path, time: Array, columns: Mapping[str, Array]) -> None:
     names, parts = ["t"], [_cells(time[:, None], 6)]
     for name, values in columns.items():
         names += _COLUMNS[name][0]
         parts.append(_cells(values, _COLUMNS[name][2]))
     rows = [",".join(names), *(",".join(cells) for cells in np.concatenate(parts, axis=1).tolist())]
-    text = ("\n".join(rows) + "\n").encode()
-    # Without a stamp, so that the same log gives the same file.
-    write_bytes(path, gzip.compress(text, 9, mtime=0) if packed else text)
+    write_text(path, "\n".join(rows) + "\n")
 
 
 def _cells(values: Array, digits: int) -> np.ndarray[tuple[int, ...], np.dtype[np.str_]]:
