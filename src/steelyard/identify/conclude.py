@@ -133,14 +133,20 @@ def conclude(
     left_out = leave_one_out(problem, solution, bread, response)
     if left_out:
         estimate = replace(estimate, evidence=replace(estimate.evidence, **left_out))
-    return _as_blocks_show(widened(estimate.with_findings(*_findings(estimate)))) if response is None else estimate
+    return widened(estimate.with_findings(*_findings(estimate))) if response is None else estimate
 
 
 def widened(estimate: Estimate) -> Estimate:
     """Return the estimate with error bars at least as wide as leaving blocks out shows, where there are enough blocks.
 
     What the model leaves out (a soft wrist, cross-talk) is no noise, and only differs from one stretch to the next.
+    With a shape, too: what the log says of mass and centre is wrong by as much.
     """
+    return _each_widened(_all_widened(estimate))
+
+
+def _all_widened(estimate: Estimate) -> Estimate:
+    """Return the estimate with all bars wider alike, where leaving blocks out moves half of the numbers by more."""
     moved, known = _moved(estimate), estimate.identified
     if moved is None or not known.any() or (factor := float(np.median(moved[known]))) < WORTH_WIDENING:
         return estimate
@@ -156,7 +162,7 @@ def widened(estimate: Estimate) -> Estimate:
     )
 
 
-def _as_blocks_show(estimate: Estimate) -> Estimate:
+def _each_widened(estimate: Estimate) -> Estimate:
     """Return the estimate with no number's bar narrower than leaving blocks out shows; correlations are kept.
 
     What the model leaves out (an arm that swings after a stop) moves some numbers more than others.
