@@ -17,6 +17,7 @@ from steelyard.errors import BadDescription, BadFile
 from steelyard.io import contents
 from steelyard.io.cloud_files import read_cloud
 from steelyard.io.contents import load_json, parse_toml
+from steelyard.io.moment_files import read_moments
 from steelyard.io.object_folders import read_track
 from steelyard.io.ply_files import read_mesh
 from steelyard.io.recordings.stream_files import open_table
@@ -66,8 +67,11 @@ def test_an_npz_that_unpacks_to_much_is_not_unpacked(read: Callable[[Path], Any]
 
 
 @pytest.mark.usefixtures("one_mib")
-def test_motions_that_unpack_to_much_are_not_unpacked(tmp_path: Path) -> None:
+def test_moments_and_motions_that_unpack_to_much_are_not_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "a.npz"
+    names = ("scatter", "noise_class", "block", "still", "acceleration_variance", "wrench_variance")
+    np.savez_compressed(path, **dict.fromkeys(names, np.zeros((2**16, 1))))
+    assert said(read_moments, path) == TOO_MUCH
     np.savez_compressed(path, **dict.fromkeys(MOTION.values(), np.zeros((13107, 3))))
     assert said(read_track, path) == TOO_MUCH
 

@@ -88,15 +88,16 @@ def read_numbers(path: Path, names: Sequence[str]) -> dict[str, Any]:
     return found
 
 
-def read_arrays(path: Path, names: Sequence[str] = (), most: int | None = None) -> dict[str, Any]:
+def read_arrays(path: Path, names: Sequence[str] = (), of: str = "It needs", most: int | None = None) -> dict[str, Any]:
     """Return arrays of an NPZ file by name, all where none is named; raises BadFile where one is missing or damaged.
 
+    of    begins what is said of the names where one of them is missing
     most  [bytes] that the arrays may have together; raises BadFile where they have more, before one is unpacked
     """
     ArrayTable.open(path)  # refuses what is no NPZ, and pickles by their header
     held = array_headers(path)  # other members of the zip are passed over
     if missing := [name for name in names if name not in held]:
-        raise BadFile(f'{path}: array "{missing[0]}" is missing. It needs {", ".join(names)}.')
+        raise BadFile(f'{path}: array "{missing[0]}" is missing. {of} {", ".join(names)}.')
     wanted = names or list(held)
     require_bounded(path, sum(held[name].size for name in wanted), most)
     with np.load(path, allow_pickle=False) as archive:
