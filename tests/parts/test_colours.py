@@ -117,6 +117,17 @@ def test_a_print_is_no_part_but_a_ring_is():
     assert (cleaned[ring] == 2).mean() > 0.97
 
 
+def test_what_is_written_on_a_label_is_no_part_either():
+    cloud = body([BAR], [(230, 230, 230)], points=6000)
+    skin = skin_of(solid(cloud, [BAR]))
+    x, y, z = cloud.xyz.T
+    label = np.zeros(len(cloud), dtype=np.int64)
+    for number, half in ((1, 0.009), (2, 0.0055), (1, 0.003)):
+        label[(z == 0.02) & (abs(x - 0.05) < half) & (abs(y - 0.01) < half)] = number
+    assert np.bincount(label)[1:].min() > 20
+    assert not without_prints(label, skin).any()
+
+
 def test_the_order_of_points_changes_nothing():
     cloud, skin = two_halves((200, 60, 50), (60, 62, 66))
     rgb = noisy(cloud.rgb, 8)
