@@ -14,7 +14,7 @@ from steelyard.shape.cells.complex import Complex
 from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.nesting import winding_number
-from steelyard.shape.sides.sheets import sheet_planes, torn
+from steelyard.shape.sides.sheets import sheet_planes, stacked, torn
 from steelyard.shape.sides.tree import Tree
 from steelyard.shape.solid import Solid
 from steelyard.shape.tets import TetMesh
@@ -204,6 +204,16 @@ def test_right_normals_on_both_sides_of_a_thin_wall_are_not_torn(wall: float) ->
     turned = np.where((along < np.median(along))[:, None], -normals, normals)
     link = sheet_planes(xyz, index)[1]
     assert torn(xyz, normals, index, link) < 0.004 < torn(xyz, turned, index, link)
+
+
+def test_two_sheets_that_look_the_same_way_are_in_doubt() -> None:
+    made = sheet(block((0, 100), (0, 30), (0, 1)))
+    xyz, normals, *_ = spread_evenly(made.mesh, np.random.default_rng(1), 2000)
+    index = Cloud(xyz).near.index
+    link = sheet_planes(xyz, index)[1]
+    same = np.where(normals[:, 2:] < -0.5, -normals, normals)
+    assert stacked(xyz, normals, index, link) < 0.01
+    assert stacked(xyz, same, index, link) > 0.5
 
 
 @pytest.mark.parametrize(

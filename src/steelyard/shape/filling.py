@@ -12,6 +12,7 @@ from steelyard.shape.cells.cells import votes_of
 from steelyard.shape.cells.islands import without_islands
 from steelyard.shape.orient import DEPTH, Oriented, on_sheets, ties_between
 from steelyard.shape.sides.discs import Discs
+from steelyard.shape.sides.sheets import stacked
 from steelyard.shape.tets import TetMesh
 
 CLEAR = 0.2  # doubt below which no sheets need be looked at
@@ -31,7 +32,7 @@ class Filled:
     inside  (T,) whether each is, without free groups
     solid   those that are
     blur    how little their winding numbers look like a solid (see `_blur`)
-    doubt   the same, where it is not clear with the share of ties between points that are not kept
+    doubt   the same, with what contradicts them (see `_contradictions`) where it is not clear
     """
 
     mesh: TetMesh
@@ -63,7 +64,7 @@ def _filled(surface: Oriented) -> Filled | None:
         return None
     inside = without_islands(mesh, score > 0)
     blur = _blur(mesh.volumes, found, votes)
-    doubt = blur + (ties_between(sites, surface.normals, surface.layers).torn if blur > CLEAR else 0.0)
+    doubt = blur + _contradictions(surface) if blur > CLEAR else blur
     return Filled(mesh, score, inside, mesh.chosen(inside), blur, doubt)
 
 
@@ -136,3 +137,10 @@ def _blur(volumes: Array, found: Array, votes: Array) -> float:
     """
     inside = volumes * (found - 0.5 + votes > 0)
     return float((inside * (1 - found + 2 * (votes < 0) * (found > 0.5))).sum() / inside.sum())
+
+
+def _contradictions(surface: Oriented) -> float:
+    """Return the share of points beside a sheet that looks the same way, and that of ties between points not kept."""
+    sites, normals, layers = surface.sites, surface.normals, surface.layers
+    behind = stacked(sites.xyz, normals, sites.near.index, sites.sheets(layers)[1])
+    return behind + ties_between(sites, normals, layers).torn

@@ -21,6 +21,7 @@ from steelyard.shape.working_cloud import WorkingCloud, working_cloud
 from steelyard.spatial import area_vectors, summed
 
 POINTS = 4000
+_UNCLEAR = 0.38  # doubt above which one thickness of the walls is looked for
 _FEWER, _LEAST_OF_FEWER = (2, 4), 1000  # one point in so many is tried where noise leaves doubt; not fewer points
 _AGAINST = 0.3  # cosine between a point's normal and the solid's surface below which they disagree
 _TURNED = 0.25  # of the points: normals that come with a cloud and disagree this often are not used
@@ -122,7 +123,7 @@ def _enclosed(used: WorkingCloud, sites: Sites) -> tuple[Solid, float]:
         return anew
     surface, found = clearer_alone(surface, found)
     doubt = found.doubt
-    if cloud.normals is None and doubt > BLURRED:
+    if cloud.normals is None and doubt > _UNCLEAR:
         as_found = surface
         surface, found = by_walls(surface, found)
         doubt = doubt if surface is as_found else 0.0

@@ -14,6 +14,10 @@ from steelyard.shape.points.plane_axis import least_axis
 _SLOPE = 0.12  # of the line between neighbours on one sheet against its planes, at which their link has fallen to 1/e
 _PARALLEL = 0.7  # cosine between the planes of neighbours on one sheet, at least
 _OPPOSITE = -0.5  # cosine between normals that face opposite ways
+_STEEP = 0.25  # slope of the line to a neighbour on another sheet, at least
+_ALIKE = 0.9  # cosine between normals that look the same way
+_FLAT = 3.0  # links of a point on a flat piece
+_FEW = 3
 _FIRST = 18  # neighbours that give the first plane
 _LEAST = 4.0  # links that a plane needs to be drawn anew
 
@@ -30,6 +34,22 @@ def sheet_planes(xyz: Array, index: Integers) -> tuple[Array, Array]:
     for widened in (2.0, 1.4):
         normal = _own_planes(xyz, normal, index, _links(xyz, normal, index, widened * _SLOPE))
     return normal, np.asarray(_links(xyz, normal, index, _SLOPE))
+
+
+def stacked(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
+    """Return the share of points (N, 3) beside another sheet that looks the same way, closer than their neighbours.
+
+    Between two such sheets of a solid there must be one that looks the other way: one of the two is wrong. Only
+    points on flat pieces count, and only with three such neighbours, as the steps of a body have a few.
+    """
+    linked = np.abs(link).sum(1)
+    away = xyz[index] - xyz[:, None]
+    steep = _STEEP * np.linalg.norm(away, axis=2)
+    off = np.abs(np.einsum("nkd,nd->nk", away, normals)) > steep
+    off &= np.abs(np.einsum("nkd,nkd->nk", away, normals[index])) > steep
+    off &= np.einsum("nkd,nd->nk", normals[index], normals) > _ALIKE
+    off &= (linked[:, None] > _FLAT) & (linked[index] > _FLAT)
+    return float((off.sum(1) >= _FEW).mean())
 
 
 def torn(xyz: Array, normals: Array, index: Integers, link: Array) -> float:
