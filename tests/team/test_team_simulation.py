@@ -12,9 +12,9 @@ import pytest
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
+from steelyard.logs.moments import regressors
 from steelyard.robots import Omnid
 from steelyard.simulate import team_cases
-from steelyard.simulate.conditions import regressor
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import CASES, EXACT, GRAVITY, Hinge, Presence, Slip, TeamNoise, TeamScene, case
 from steelyard.simulate.team_motions import Freedom, draw_motion
@@ -256,7 +256,7 @@ WRENCH_SIDE = {
 @pytest.mark.parametrize("name", WRENCH_SIDE)
 def test_motions_show_as_much_of_a_body_as_they_should(name: str) -> None:
     make, rank = WRENCH_SIDE[name]
-    stacked = regressor(make()).reshape(-1, 10)
+    stacked = regressors(make()).reshape(-1, 10)
     size = np.linalg.norm(stacked, axis=0)
     values = np.linalg.svd(stacked / np.where(size > 0, size, 1.0), compute_uv=False)
     assert int((values > 1e-9 * values[0]).sum()) == rank
