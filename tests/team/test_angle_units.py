@@ -22,7 +22,7 @@ from steelyard.team.misread.files import require_one_angle_unit
 def scaled(track: Track, factor: float) -> Track:
     """Return the track with roll, pitch and yaw, or rates, read in another unit."""
     channels = dict(track.channels)
-    angles = Turn.from_matrix(channels["rotation"]).as_euler("xyz")
+    angles = Turn.from_matrix(channels["rotation"].copy()).as_euler("xyz")
     channels["rotation"] = Turn.from_euler("xyz", factor * angles).as_matrix()
     if "angular_velocity" in channels:
         channels["angular_velocity"] = factor * channels["angular_velocity"]

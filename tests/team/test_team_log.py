@@ -146,7 +146,7 @@ def test_a_missing_number_loses_its_channel_only_and_the_whole_wrench() -> None:
 def test_dates_are_seconds_and_rotations_are_matrices() -> None:
     turn = Rotation.exp(np.ones((5, 3)))
     dated = np.datetime64("2024-05-01T12:00:00") + (TIME * 1e9).astype("m8[ns]")
-    for rotation in (turn, turn.matrix, ScipyRotation.from_matrix(turn.matrix)):
+    for rotation in (turn, turn.matrix, ScipyRotation.from_matrix(turn.matrix.copy())):
         made = Track.of(dated, rotation=rotation)  # type: ignore[arg-type]
         assert np.diff(made.time) == pytest.approx(0.01, abs=1e-6)
         assert made.rotation.matrix == pytest.approx(turn.matrix)
