@@ -8,9 +8,9 @@ import pytest
 from steelyard.identify.masses.shape_error import CORE, MEASURED, ShapeError
 from steelyard.identify.noise_aware import NoiseAware
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.people import people_jacobian
 from steelyard.inertia import InertialParameters, solids
 from steelyard.inertia.parameters import frame_change
+from steelyard.inertia.people import people_jacobian
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation

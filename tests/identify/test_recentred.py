@@ -11,8 +11,8 @@ from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses.recentred import apart, recentred
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError
 from steelyard.identify.part_masses import PartMasses
-from steelyard.identify.people import parameter_jacobian, people_jacobian
 from steelyard.inertia import InertialParameters, solids
+from steelyard.inertia.people import parameter_jacobian, people_jacobian
 from steelyard.parts.parts import Parts
 from steelyard.simulate.handling import handling_log
 from steelyard.spatial import Pose, Rotation

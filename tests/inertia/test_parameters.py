@@ -164,18 +164,6 @@ def test_log_cholesky_jacobian(batch: tuple[int, ...], data: st.DataObject) -> N
 
 @pytest.mark.parametrize("batch", BATCHES)
 @given(data=st.data())
-def test_com_jacobian(batch: tuple[int, ...], data: st.DataObject) -> None:
-    phi = data.draw(bodies(batch)).vector + np.eye(10)[0]  # at least 1 kg, so that differences are accurate
-
-    def people(vector: np.ndarray) -> np.ndarray:
-        body = InertialParameters(vector)
-        return np.concatenate([body.com, forms.upper(body.inertia_com)], axis=-1)
-
-    assert_allclose(forms.com_jacobian(phi), differences(people, phi), rtol=1e-6, atol=1e-7)
-
-
-@pytest.mark.parametrize("batch", BATCHES)
-@given(data=st.data())
 def test_principal_frame(batch: tuple[int, ...], data: st.DataObject) -> None:
     body = data.draw(bodies(batch))
     moments, X_SP = body.principal()

@@ -12,13 +12,11 @@ from scipy.spatial import Delaunay, cKDTree
 from steelyard.errors import BadValue
 from steelyard.evaluate.segments import score_segments
 from steelyard.io.object_folders import read_object
-from steelyard.parts import seams
 from steelyard.parts.description import cuts_of
 from steelyard.parts.doubt import doubts
 from steelyard.parts.hierarchy import Hierarchy
-from steelyard.parts.segment import coloured_pieces, segment
+from steelyard.parts.segment import segment
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.hull import hull_work
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import enclose
 from steelyard.spatial import Pose, Rotation
@@ -262,27 +260,3 @@ def test_published_objects(data_dir, name, parts, ari):
     found = segment(cloud, enclose(cloud))
     assert score_segments(known.cloud.labels, found.point_part).ari >= ari
     assert len(found) <= 2 * parts
-
-
-@pytest.mark.parametrize("colours", [[STEEL, RUBBER], [STEEL, STEEL]])
-def test_seams_are_the_same_where_qhull_stands_in(colours, monkeypatch: pytest.MonkeyPatch) -> None:
-    pieces = coloured_pieces(*made(MALLET, colours))
-
-    def tree():
-        return seams.seam_tree(pieces.mesh, pieces.skin, pieces.piece, pieces.colour, pieces.pairs, pieces.corners)
-
-    def cut_room(points: int):
-        rooms.append(points)
-        work = hull_work(points)
-        return work._replace(face=work.face[:150].copy())  # room for 150 faces: larger hulls are a fault
-
-    monkeypatch.setattr(seams, "_BLUNT", 1e-13)
-    right, rooms, runs = tree(), [], []
-    merge = seams.merge
-    monkeypatch.setattr(seams, "merge", lambda *given: runs.append(1) or merge(*given))
-    monkeypatch.setattr(seams, "hull_work", cut_room)
-    found = tree()
-    assert len(rooms) == 1 < len(runs)
-    assert np.array_equal(found.hierarchy.merges, right.hierarchy.merges)
-    np.testing.assert_allclose(found.seam, right.seam, rtol=1e-9, atol=1e-12)
-    np.testing.assert_allclose(found.hierarchy.hull, right.hierarchy.hull, rtol=1e-9)

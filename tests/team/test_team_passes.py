@@ -32,16 +32,32 @@ def test_the_cubic_is_that_of_scipy(rows: int) -> None:
     np.testing.assert_allclose(curve.at(time), CubicSpline(known, values)(time), atol=2e-14)
 
 
-@pytest.mark.parametrize("rows", [2, 30, 300])
-def test_through_gaps_a_curve_is_monotone_and_held_beyond_its_ends(rows: int) -> None:
+@pytest.mark.parametrize("rows", [4, 30, 300])
+def test_in_a_gap_a_curve_is_monotone_and_beyond_its_ends_it_is_held(rows: int) -> None:
     rng = np.random.default_rng(rows)
     known, values = np.cumsum(rng.uniform(0.5, 1.5, rows)), rng.normal(size=(rows, 4))
     known[rows // 2 :] += 20.0
-    time = rng.uniform(known[0] - 5, known[-1] + 5, 200)
+    ends = known[rows // 2 - 1 : rows // 2 + 1]
     curve = Curve.through(known, values)
-    assert not curve.whole or rows == 2
+    assert not curve.whole
+    time = np.append(rng.uniform(*ends, 200), [known[0] - 5, known[-1] + 5])
     expected = PchipInterpolator(known, values)(np.clip(time, known[0], known[-1]))
     np.testing.assert_allclose(curve.at(time), expected, atol=2e-14)
+
+
+def test_away_from_a_gap_a_curve_stays_cubic() -> None:
+    known = np.concatenate([np.arange(0, 5, 0.1), np.arange(7, 12, 0.1)])
+    time = np.arange(1, 4, 0.013)
+    found = Curve.through(known, np.sin(3 * known)[:, None]).at(time)[:, 0]
+    np.testing.assert_allclose(found, np.sin(3 * time), atol=1e-4)
+
+
+@pytest.mark.parametrize("rows", [2, 3])
+def test_few_samples_are_joined_by_a_monotone_curve(rows: int) -> None:
+    known, values = np.arange(rows) + 0.0, np.random.default_rng(rows).normal(size=(rows, 2))
+    time = np.linspace(-1, rows, 50)
+    expected = PchipInterpolator(known, values)(np.clip(time, known[0], known[-1]))
+    np.testing.assert_allclose(Curve.through(known, values).at(time), expected, atol=2e-14)
 
 
 @pytest.mark.parametrize("size", [0.0, 1e-12, 1e-8, 1e-3, 0.02, 1.0, 3.0])

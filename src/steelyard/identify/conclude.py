@@ -17,10 +17,10 @@ from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.dense import eigen, product, product_transposed
 from steelyard.identify.cost.linear import fitted, inverse_scaled, nonnegative, normal_equations, without_bias
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.people import ENTRIES, parameter_jacobian, people_jacobian
 from steelyard.identify.problem import ADD_POSES, Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import InertialParameters
+from steelyard.inertia.people import ENTRIES, parameter_jacobian, people_jacobian
 from steelyard.logs.log import Mask
 
 # Identified means: the data alone, without prior, give one standard deviation below these shares of

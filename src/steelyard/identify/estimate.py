@@ -12,8 +12,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.evidence import Evidence, PartMass
 from steelyard.findings import Finding, by_cause, codes
-from steelyard.identify.people import people_jacobian
 from steelyard.inertia import InertialParameters
+from steelyard.inertia.people import people_jacobian
 from steelyard.tables.words import in_a_line, in_words
 
 

@@ -11,8 +11,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
 from steelyard.identify.conclude import natural_sizes
 from steelyard.identify.cost.linear import unit_diagonal
-from steelyard.identify.people import NAMES
 from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia.people import NAMES, people_jacobian
 
 # A result is exact to this share of mass, radius of gyration and inertia: what is typed from a data sheet is rounded.
 EXACT = 1e-6
@@ -71,7 +71,7 @@ def _quantities(body: InertialParameters, covariance: Array, any_grasp: bool) ->
     """Return what is compared, its covariance and its names."""
     if body.mass == 0:
         raise BadValue("a body of mass zero has no centre of mass; there is nothing to compare.")
-    J = forms.people_jacobian(body.vector)
+    J = people_jacobian(body.vector.copy())
     people = J @ covariance @ J.T + np.diag(np.square(EXACT * natural_sizes(body.vector.copy())))
     if not any_grasp:
         return body.people, people, NAMES

@@ -12,9 +12,9 @@ from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.conclude import identified, natural_sizes
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.people import ENTRIES
 from steelyard.identify.problem import BiasPrior
 from steelyard.inertia import InertialParameters
+from steelyard.inertia.people import ENTRIES
 from steelyard.logs.log import Mask
 
 # Two runs whose biases differ with a probability below this do not share one.

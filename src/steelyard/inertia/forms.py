@@ -127,42 +127,6 @@ def log_cholesky_jacobian(theta: Array) -> Array:
     return np.stack(columns, axis=-1)
 
 
-def _shift_slopes() -> Array:
-    """Return C (6, 3, 3): entry k of |h|^2 1 - h h^T is h^T C_k h / 2."""
-    out = np.zeros((6, 3, 3))
-    for k, (i, j) in enumerate(UPPER):
-        out[k] += 2 * np.eye(3) * (i == j)
-        out[k, i, j] -= 1
-        out[k, j, i] -= 1
-    return out
-
-
-_SHIFT = _shift_slopes()
-
-
-def com_jacobian(phi: Array) -> Array:
-    """Return d (com, inertia about the CoM: xx xy xz yy yz zz) / d phi, shape (..., 9, 10).
-
-    With c = h/m and I_C = I - m (|c|^2 1 - c c^T) = I - (|h|^2 1 - h h^T)/m.
-    """
-    m, h = phi[..., 0, None], phi[..., 1:4]
-    out = np.zeros((*phi.shape[:-1], 9, 10))
-    out[..., :3, 0] = -h / m**2
-    out[..., [0, 1, 2], [1, 2, 3]] = 1 / m
-    slope = np.einsum("kab,...b->...ka", _SHIFT, h)
-    out[..., [3, 4, 5, 6, 7, 8], [4, 5, 6, 7, 8, 9]] = 1.0
-    out[..., 3:, 0] = 0.5 * np.einsum("...ka,...a->...k", slope, h) / m**2
-    out[..., 3:, 1:4] = -slope / m[..., None]
-    return out
-
-
 def principal_slopes(axes: Array) -> Array:
     """Return d (principal moments) / d (inertia xx xy xz yy yz zz), (3, 6), of principal axes (3, 3) in columns."""
     return np.asarray(upper(axes.T[:, :, None] * axes.T[:, None, :]) * [1, 2, 2, 1, 2, 1])
-
-
-def people_jacobian(phi: Array) -> Array:
-    """Return d (mass, com, inertia about the CoM) / d phi, shape (..., 10, 10)."""
-    out = np.zeros((*phi.shape[:-1], 10, 10))
-    out[..., 0, 0], out[..., 1:, :] = 1, com_jacobian(phi)
-    return out

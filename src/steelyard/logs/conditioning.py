@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from functools import lru_cache
-from typing import Any
 
 import numpy as np
 
@@ -12,6 +10,7 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.logs.clock import sampling_rate
+from steelyard.logs.curve import Curve
 
 _NOISE_BLOCK = 64
 _QUIETEST = 0.84  # 0.1 quantile of the noise level over blocks of that length
@@ -20,39 +19,18 @@ _QUIETEST = 0.84  # 0.1 quantile of the noise level over blocks of that length
 FILTERED = 1 / 3
 
 
-@dataclass(frozen=True, eq=False)
-class Signal:
-    """A channel as a function of its own clock: cubic through its (filtered) samples.
-
-    start, end  [s] of the samples
-    rate        [Hz] median sampling rate
-    """
-
-    spline: Any
-    start: float
-    end: float
-    rate: float
-
-    def at(self, time: Array) -> Array:
-        """Return values (M, D) at `time` [s]; before the first and after the last sample the end value is held."""
-        return np.asarray(self.spline(np.clip(time, self.start, self.end)))
-
-
-def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Signal:
+def signal(time: Array, values: Array, cutoff_hz: float | None = None) -> Curve:
     """Return `values` (N, D) as a function of time, low-passed at `cutoff_hz` where that is below 0.4 of the rate.
 
-    Without a cut-off the samples themselves are met exactly. Linear where fewer than four samples are left.
+    Without a cut-off the samples themselves are met exactly.
     """
-    from scipy.interpolate import CubicSpline, make_interp_spline
-
     t, y = check.finite("time", time), check.finite("values", values)
     rate = sampling_rate(t)
     if cutoff_hz is not None and cutoff_hz < 0.4 * rate and len(t) > 30:
         even = np.linspace(t[0], t[-1], int(np.ceil((t[-1] - t[0]) * rate)) + 1)
-        y = lowpass(CubicSpline(t, y)(even), cutoff_hz, (len(even) - 1) / (t[-1] - t[0]))
+        y = lowpass(Curve.through(t, y).at(even), cutoff_hz, (len(even) - 1) / (t[-1] - t[0]))
         t = even
-    spline = CubicSpline(t, y) if len(t) > 3 else make_interp_spline(t, y, 1)
-    return Signal(spline, float(t[0]), float(t[-1]), rate)
+    return Curve.through(t, y)
 
 
 def lowpass(values: Array, cutoff_hz: float, rate_hz: float, order: int = 4) -> Array:

@@ -8,7 +8,8 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.clock import stamps_of
-from steelyard.logs.conditioning import Signal, noise_left, noise_std, signal
+from steelyard.logs.conditioning import noise_left, noise_std, signal
+from steelyard.logs.curve import Curve
 from steelyard.logs.recording import STANDARD_GRAVITY, Stream
 from steelyard.spatial import Rotation, lever_acceleration
 
@@ -23,7 +24,7 @@ class Imu:
     """
 
     name: str
-    signal: Signal
+    signal: Curve
     noise_std: float
     rotation: Rotation | None
     position: Array | None

@@ -10,7 +10,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.errors import BadDescription
 from steelyard.logs.clock import stamps_of
-from steelyard.logs.conditioning import Signal, noise_left, noise_std, signal
+from steelyard.logs.conditioning import noise_left, noise_std, signal
+from steelyard.logs.curve import Curve
 from steelyard.logs.recording import Stream
 from steelyard.logs.smoothing import Smooth, smooth, smooth_rotations, turning
 from steelyard.spatial import Rotation, lever_acceleration
@@ -58,7 +59,7 @@ class Channel:
     """
 
     stream: str
-    curve: Signal | Smooth
+    curve: Curve | Smooth
     world: bool
     variance: float = 0.0
 

@@ -18,7 +18,6 @@ from steelyard.parts.merging import merge_all
 from steelyard.shape.hull import TOLERANCE
 from steelyard.shape.mesh import Integers
 from steelyard.shape.pairs import distinct_pairs
-from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
 
 
@@ -39,9 +38,7 @@ def cluster(mesh: TetMesh, piece: Any = None) -> Hierarchy:
     xyz = np.ascontiguousarray(mesh.vertices - used.mean(0)) / diagonal
     volumes = np.bincount(leaf, mesh.volumes / diagonal**3, count).astype(np.float64)
     tets, edges = np.bincount(leaf, minlength=count), _edges(mesh, leaf, count)
-    merges, costs, volume, hull = with_stand_ins(
-        xyz, lambda known: merge_all(xyz, start, member, volumes, tets, edges, TOLERANCE, known)
-    )
+    merges, costs, volume, hull = merge_all(xyz, start, member, volumes, tets, edges, TOLERANCE)
     return Hierarchy(leaf, merges, costs, volume * diagonal**3, hull * diagonal**3)
 
 

@@ -18,9 +18,8 @@ from steelyard.check import Array
 from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
 from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place, six_volumes
 from steelyard.parts.reach import MOST, Room, reach, room
-from steelyard.shape.hull import HullWork, hull_work
+from steelyard.shape.hull import HullWork, hull_volume, hull_work
 from steelyard.shape.hulls.borrowed import borrowed, integer
-from steelyard.shape.stand_ins import StandIns, sure_hull
 
 # Hollow is counted in grains of this share of the whole volume. Unions that leave out the same tets are equally hollow,
 # and rounding is not to choose between them (the smaller one goes first), nor to make a convex union hollow.
@@ -56,12 +55,11 @@ class Edges(NamedTuple):
 
 
 class Making(NamedTuple):
-    """What hulls are made of and with: points (V, 3), how level is level, room, and hulls that Qhull stands in for."""
+    """What hulls are made of and with: points (V, 3), how level is level, and room."""
 
     xyz: Any
     tolerance: float
     work: HullWork
-    stand_ins: StandIns
 
 
 class Measure(NamedTuple):
@@ -104,8 +102,7 @@ def _key(hull: float, exact: bool, va: float, vb: float, na: int, nb: int, measu
 
 
 def merge_all(
-    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, ends: Any, tolerance: float,
-    stand_ins: StandIns,
+    xyz: Array, start: Any, member: Any, leaf_volume: Array, leaf_tets: Any, ends: Any, tolerance: float
 ) -> tuple[Any, Array, Array, Array]:  # fmt: skip
     """Return merges (n - 1, 2), the cost (n - 1,) of each, and volume and hull (2 n - 1,) of every node, leaves first.
 
@@ -120,7 +117,7 @@ def merge_all(
     gone, head = np.zeros(2 * n - 1, np.bool_), np.full(2 * n - 1, -1, np.int32)
     clusters = Clusters(volume, np.zeros(2 * n - 1), tets, gone, head, np.full((2 * n - 1, 2), -1, np.int32))
     hulls = hulls_of(start, member, 2 * n - 1, len(xyz))
-    making, tree = Making(xyz, tolerance, hull_work(len(xyz)), stand_ins), Tree(merges, cost)
+    making, tree = Making(xyz, tolerance, hull_work(len(xyz))), Tree(merges, cost)
     edges = Edges(np.empty((len(ends), 4), np.int32), np.empty(len(ends)), np.zeros(len(ends), np.int8))
     _begin(making, n, clusters, hulls, ends, edges)
     made = _join_neighbours(making, n, clusters, hulls, edges, empty_heap(len(ends)), room(), tree)
@@ -132,14 +129,14 @@ def merge_all(
 @numba.njit(cache=True, nogil=True)
 def _begin(making: Making, n: int, clusters: Clusters, hulls: Hulls, ends: Any, edges: Edges) -> None:
     """Find the hulls of the first clusters and hang their edges on them."""
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     volume, hull, head, end = clusters.volume, clusters.hull, clusters.head, edges.end
     for k in range(n):
         if hulls.length[k] == 4:
             hull[k] = volume[k]
             four_faces(xyz, hulls, k)
         else:
-            hull[k], kept = sure_hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, stand_ins)
+            hull[k], kept = hull_volume(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work)
             keep_in_place(hulls, k, work.point, work.stack, kept, hull[k] > 0)
     for e in range(len(ends)):
         a, b = ends[e, 0], ends[e, 1]
@@ -175,7 +172,7 @@ def _join_neighbours(
     heap = Heap(borrowed(p.edge), borrowed(p.order), borrowed(p.place))
     end, stage = edges.end, edges.stage
     measure = Measure(n, clusters.volume[:n].sum(), float(clusters.tets[:n].sum()))
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     made, heaped, stamp = integer(0), integer(0), integer(1)
     last, kept = integer(-1), integer(0)  # the edge whose hull was made last, and its number of vertices
     for e in range(len(end)):
@@ -187,7 +184,7 @@ def _join_neighbours(
             heaped = _priced(clusters, edges, heap, heaped, e, measure)
         elif stage[e] == _GROWN:
             count = both(hulls, end[e, 0], end[e, 1])
-            edges.known[e], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
+            edges.known[e], kept = hull_volume(xyz, hulls.rows, count, tolerance, work)
             stage[e], last = _EXACT, e
             heaped = _priced(clusters, edges, heap, heaped, e, measure)
         else:
@@ -234,12 +231,12 @@ def _note(clusters: Clusters, edges: Edges, e: int, key: float, made: int, measu
 @numba.njit(cache=True, nogil=True)
 def _hull_again(making: Making, hulls: Hulls, a: int, b: int) -> int:
     """Make the hull of two clusters, which was made before, or is that of five points; return its vertices."""
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     count = both(hulls, a, b)
     if count == 5:
         five_faces(xyz, hulls.rows, work.point, work.stack)
         return 5
-    return int(sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)[1])
+    return int(hull_volume(xyz, hulls.rows, count, tolerance, work)[1])
 
 
 @numba.njit(cache=True, nogil=True, forceinline=True)
@@ -279,7 +276,7 @@ def _hand_over(clusters: Clusters, edges: Edges, heap: Heap, heaped: int, e: int
 @numba.njit(cache=True, nogil=True)
 def _join_bodies(making: Making, n: int, made: int, clusters: Clusters, hulls: Hulls, tree: Tree) -> None:
     """Join separate bodies: always the two of least volume, until one is left."""
-    xyz, tolerance, work, stand_ins = making
+    xyz, tolerance, work = making
     merges, cost = tree
     volume, gone = clusters.volume, clusters.gone
     bodies = [(volume[k], k) for k in range(n + made) if not gone[k]]
@@ -288,7 +285,7 @@ def _join_bodies(making: Making, n: int, made: int, clusters: Clusters, hulls: H
         (va, a), (vb, b) = heapq.heappop(bodies), heapq.heappop(bodies)
         c = n + made
         count = both(hulls, a, b)
-        clusters.hull[c], kept = sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
+        clusters.hull[c], kept = hull_volume(xyz, hulls.rows, count, tolerance, work)
         merges[made, 0], merges[made, 1] = min(a, b), max(a, b)
         cost[made], volume[c] = np.inf, va + vb
         gone[a] = gone[b] = True

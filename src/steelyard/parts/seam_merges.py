@@ -13,9 +13,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.parts.hulls import Hulls, both, keep, keep_in_place
 from steelyard.parts.seam_costs import PAINT, WIDTH, price_of, support_of
-from steelyard.shape.hull import HullWork
+from steelyard.shape.hull import HullWork, hull_volume
 from steelyard.shape.mesh import Integers
-from steelyard.shape.stand_ins import StandIns, sure_hull
 
 _NEARER = 1e-3  # of all bits equally dear to join, the nearest: per cube root of the volume between their middles
 
@@ -167,16 +166,16 @@ def _join(at: Clusters, p: int, q: int, hull: float, node: int) -> None:
 
 @numba.njit(cache=True, nogil=True)
 def _hull_of_both(
-    xyz: Array, at: Clusters, hulls: Hulls, p: int, q: int, tolerance: float, work: HullWork, stand_ins: StandIns
+    xyz: Array, at: Clusters, hulls: Hulls, p: int, q: int, tolerance: float, work: HullWork
 ) -> tuple[float, int]:
     """Return the volume of the hull of two clusters, and how many vertices it has; `work` holds them."""
     count = both(hulls, at.node[p], at.node[q])
-    return sure_hull(xyz, hulls.rows, count, tolerance, work, stand_ins)
+    return hull_volume(xyz, hulls.rows, count, tolerance, work)
 
 
 @numba.njit(cache=True, nogil=True)
 def _next_pair(
-    xyz: Array, at: Clusters, hulls: Hulls, tolerance: float, work: HullWork, stand_ins: StandIns
+    xyz: Array, at: Clusters, hulls: Hulls, tolerance: float, work: HullWork
 ) -> tuple[int, int, bool, float, int]:
     """Return the rows of the two clusters to join next, whether nothing asks for it, and their hull: volume, vertices.
 
@@ -186,7 +185,7 @@ def _next_pair(
     p = _cheapest(at)
     while p >= 0 and not at.exact[p, at.best[p]]:
         q = at.best[p]
-        hull, kept = _hull_of_both(xyz, at, hulls, p, q, tolerance, work, stand_ins)
+        hull, kept = _hull_of_both(xyz, at, hulls, p, q, tolerance, work)
         last_p, last_q = p, q
         at.known[p, q], at.exact[p, q] = hull, True
         at.price[p, q] = _price(at, p, q, hull)[0]
@@ -195,13 +194,13 @@ def _next_pair(
     apart = p < 0  # bodies of different colours that do not touch
     p, q = _two_smallest(at) if apart else (p, at.best[p])
     if last_p != p or last_q != q:
-        hull, kept = _hull_of_both(xyz, at, hulls, p, q, tolerance, work, stand_ins)
+        hull, kept = _hull_of_both(xyz, at, hulls, p, q, tolerance, work)
     return p, q, apart, hull, kept
 
 
 @numba.njit(cache=True, nogil=True)
 def merge(
-    xyz: Array, at: Clusters, hulls: Hulls, tolerance: float, work: HullWork, stand_ins: StandIns
+    xyz: Array, at: Clusters, hulls: Hulls, tolerance: float, work: HullWork
 ) -> tuple[Any, Array, Array, Array, Array]:
     """Return merges (n - 1, 2) with cost and seam (n - 1,) of each, and volume and hull (2 n - 1,) of every node.
 
@@ -212,14 +211,14 @@ def merge(
     cost, seam = np.empty(n - 1), np.empty(n - 1)
     node_volume, node_hull = np.empty(2 * n - 1), np.empty(2 * n - 1)
     for k in range(n):
-        at.hull[k], kept = sure_hull(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work, stand_ins)
+        at.hull[k], kept = hull_volume(xyz, hulls.vertex[hulls.offset[k] :], hulls.length[k], tolerance, work)
         keep_in_place(hulls, k, work.point, work.stack, kept, False)
         node_volume[k], node_hull[k] = at.volume[k], at.hull[k]
     for made in range(n - 1):
         _price_changed(at)
         _find_partners(at)
         at.changed[:] = False
-        p, q, apart, hull, kept = _next_pair(xyz, at, hulls, tolerance, work, stand_ins)
+        p, q, apart, hull, kept = _next_pair(xyz, at, hulls, tolerance, work)
         if apart:
             paint = PAINT * min(at.share[p], at.share[q])
             cost[made], seam[made] = np.inf, paint + max(0.0, hull - at.volume[p] - at.volume[q])

@@ -25,7 +25,6 @@ from steelyard.parts.skin import Skin
 from steelyard.shape.hull import hull_work
 from steelyard.shape.mesh import Integers
 from steelyard.shape.pairs import joined
-from steelyard.shape.stand_ins import with_stand_ins
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import area_vectors, summed
 
@@ -63,14 +62,9 @@ def seam_tree(
     volume = np.bincount(piece, mesh.volumes, count) / mesh.volume
     weighted = mesh.volumes[:, None] * (mesh.centroids - middle) / scale
     centre = summed(piece, weighted, count) / np.maximum(volume * mesh.volume, 1e-300)[:, None]
-    given = volume, share, colour, centre, contact, touch
-    work = hull_work(len(xyz))
-    merges, cost, seam, node_volume, hull = with_stand_ins(
-        xyz,
-        lambda known: merge(
-            xyz, Clusters.of(*given), hulls_of(start, member, 2 * count - 1, len(xyz)), _BLUNT, work, known
-        ),
-    )
+    clusters = Clusters.of(volume, share, colour, centre, contact, touch)
+    hulls = hulls_of(start, member, 2 * count - 1, len(xyz))
+    merges, cost, seam, node_volume, hull = merge(xyz, clusters, hulls, _BLUNT, hull_work(len(xyz)))
     whole = mesh.volume
     return SeamTree(Hierarchy(piece, merges, cost, node_volume * whole, hull * whole), seam)
 

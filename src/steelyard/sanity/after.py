@@ -7,7 +7,7 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.people import NAMES
+from steelyard.inertia.people import NAMES
 from steelyard.logs.alignment import Aligned
 from steelyard.logs.clock import median_step
 from steelyard.logs.conditioning import noise_std

@@ -1,10 +1,11 @@
 """Volume of the convex hull of points: a compiled quickhull for inner loops, and SciPy's Qhull.
 
 A point is added where it lies more than a tolerance above a face; which faces it sees is then decided by the exact sign
-of a determinant: in double precision with an error bound, and without any rounding where that cannot tell. So the
-surface stays closed whatever the points (grids, coplanar faces, duplicates, slivers), and only points within the
-tolerance of the hull are left out. Its topology is checked all the same: a fault is reported, never a wrong volume, and
-Qhull's hull stands in for it (`stand_ins`).
+of a determinant: in double precision with an error bound, and without any rounding where that cannot tell. Points are
+taken on a grid of 2^53 steps along each edge of their box, so that their differences are exact and no product vanishes.
+Every surface is then convex to the last digit, and what a point sees of one is a disk: the next one is closed, too,
+whatever the points (grids, coplanar faces, duplicates, slivers), and only points within the tolerance of the hull are
+left out. Its topology is checked all the same: a fault is reported, never a wrong volume.
 
 Source: Barber, Dobkin, Huhdanpaa 1996, "The Quickhull algorithm for convex hulls" (outside sets, farthest point first);
 Shewchuk 1997, "Adaptive precision floating-point arithmetic" (error bounds, exact differences and products).
@@ -67,10 +68,13 @@ def hull_volume(points: Array, rows: Any, count: int, tolerance: float, work: Hu
         nothing += 0.0 * (x + y + z)
         low_x, low_y, low_z = min(low_x, x), min(low_y, y), min(low_z, z)
         high_x, high_y, high_z = max(high_x, x), max(high_y, y), max(high_z, z)
+    wide_x, wide_y, wide_z = high_x - low_x, high_y - low_y, high_z - low_z
     for k in range(count):
         x, y, z = points[rows[k], 0], points[rows[k], 1], points[rows[k], 2]
-        xyz[k, 0], xyz[k, 1], xyz[k, 2] = x - low_x, y - low_y, z - low_z
-    wide_x, wide_y, wide_z = high_x - low_x, high_y - low_y, high_z - low_z
+        # Adding the box's edge rounds to the grid, and taking it away again is exact.
+        xyz[k, 0] = x - low_x + wide_x - wide_x
+        xyz[k, 1] = y - low_y + wide_y - wide_y
+        xyz[k, 2] = z - low_z + wide_z - wide_z
     noise = _ROUNDING * wide_x * wide_y * wide_z
     if not noise + nothing < np.inf:
         return np.nan, -1

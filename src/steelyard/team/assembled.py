@@ -14,8 +14,8 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.evidence import Evidence
 from steelyard.inertia import InertialParameters, forms
-from steelyard.inertia.forms import people_jacobian
 from steelyard.inertia.parameters import frame_change
+from steelyard.inertia.people import people_jacobian
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose
 from steelyard.team.estimate import GraspEstimate, TeamEstimate
@@ -84,7 +84,7 @@ def known(body: InertialParameters, covariance: Array, units: Array) -> Mask:
     """Return which (10,) of mass, centre of mass and inertia about it are known: two standard deviations are below
     SHOWN of what a body of this mass and size can have, `units` (10,).
     """
-    jacobian = people_jacobian(body.vector)
+    jacobian = people_jacobian(body.vector.copy())
     std = np.sqrt(np.maximum(np.diag(jacobian @ covariance @ jacobian.T), 0))
     scale = units / np.concatenate([[1.0], np.full(3, units[0]), np.ones(6)])
     scale[0] = min(scale[0], abs(float(body.mass)))

@@ -16,7 +16,7 @@ from steelyard.errors import CannotAnswer
 from steelyard.evidence import Evidence
 from steelyard.findings import Finding
 from steelyard.inertia import InertialParameters
-from steelyard.inertia.forms import people_jacobian
+from steelyard.inertia.people import parameter_jacobian
 from steelyard.logs.clock import median_step
 from steelyard.logs.stillness import MOVING, TURNING
 from steelyard.logs.team_conditioning import all_conditioned
@@ -189,7 +189,7 @@ def _assembled(
     people[1:4, 1:4] = rest.com_covariance
     people[4:, 4:] = turning.covariance if turning else (rest.mass * reach**2) ** 2 * np.eye(6)
     body = InertialParameters.from_com(rest.mass, rest.com, turning.matrix if turning else np.zeros((3, 3)))
-    back = np.linalg.inv(people_jacobian(body.vector))
+    back = parameter_jacobian(body.vector.copy())
     evidence = Evidence(
         rank=10 if known else 4,
         condition=turning.condition if turning else float(1 / max(np.sin(rest.tilt), 1e-9)),

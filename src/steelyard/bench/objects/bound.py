@@ -13,6 +13,7 @@ from steelyard.check import Array
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
 from steelyard.identify.cost.noise_cost import residual_map_of, weight
 from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia.people import people_jacobian
 from steelyard.inertia.regressor import design
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.moments import Moments
@@ -41,7 +42,7 @@ def expected_scores(spread: Array, body: InertialParameters, edges: Array) -> di
     root = vectors * np.sqrt(np.maximum(values, 0))
     error = np.random.default_rng(0).standard_normal((DRAWS, 10)) @ root.T
     mass = float(body.mass)
-    centre = error @ forms.com_jacobian(body.vector)[:3].T
+    centre = error @ people_jacobian(body.vector.copy())[1:4].T
     relative = np.linalg.solve(body.pseudo_inertia, forms.pseudo_inertia(error))
     return {
         "mass_pct": float(np.mean(100 * np.abs(error[:, 0]) / mass)),

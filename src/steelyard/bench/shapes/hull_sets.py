@@ -46,7 +46,7 @@ def run(sets: int, progress: Progress | None = None) -> dict[str, Any]:
     """Return per kind the largest error of our volumes and how many sets were given back.
 
     error   |ours - Qhull's|, over Qhull's volume or a thousandth of the cube of the set's size, whichever is larger
-    faults  sets that the kernel gives back; in a clustering Qhull's hull stands in for those (`shape.stand_ins`)
+    faults  sets that the kernel gives back
     """
     if sets < 1:
         raise BadValue(f"at least one set is needed; got {sets}.")

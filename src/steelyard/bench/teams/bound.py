@@ -16,8 +16,8 @@ from scipy.fft import dct
 from steelyard.bench.asked import Progress
 from steelyard.bench.teams.intervals import errors
 from steelyard.check import Array
-from steelyard.identify.people import people_jacobian
 from steelyard.inertia.parameters import frame_change
+from steelyard.inertia.people import people_jacobian
 from steelyard.inertia.regressor import basis, motion_map
 from steelyard.simulate.team import TeamTrial, simulate_team
 from steelyard.simulate.team_cases import EXACT, TeamNoise, TeamScene

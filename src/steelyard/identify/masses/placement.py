@@ -70,8 +70,8 @@ def gap_of(phi: Array, covariance: Array, parts: Parts) -> Gap | None:
     gap = com - nearest
     distance = float(np.linalg.norm(gap))
     ahead = gap / max(distance, 1e-12)
-    slope = np.einsum("i,ij->j", ahead, forms.com_jacobian(phi)[:3])[:4]  # none of it is of the inertia
-    std = float(np.sqrt(max(slope @ covariance[:4, :4] @ slope, 0.0)))
+    slope = np.append(-(ahead @ com), ahead) / mass  # of the gap with mass and first moment
+    std = float(np.sqrt(max(float(slope @ covariance[:4, :4] @ slope), 0.0)))
     if distance < CLEAR * std:
         return None
     outside = float(ahead @ com) - float((parts.centroid @ ahead + REACH * _gyration(parts, ahead)).max())

@@ -16,8 +16,8 @@ from scipy.linalg import eigh
 from steelyard.check import Array
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.cost.linear import inverse_scaled
-from steelyard.identify.people import half_trace_com, parameter_jacobian, people_jacobian
 from steelyard.inertia import InertialParameters
+from steelyard.inertia.people import half_trace_com, parameter_jacobian, people_jacobian
 
 # An entry of the inertia may be off by so many half traces. Were it free, noise in the accelerations of rows at rest
 # would pass for inertia, and hide where the centre of mass is.

@@ -10,8 +10,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses.models import Masses
-from steelyard.identify.people import half_trace_com, parameter_jacobian
 from steelyard.inertia import InertialParameters, forms
+from steelyard.inertia.people import half_trace_com, parameter_jacobian
 from steelyard.parts.parts import Parts
 from steelyard.spatial import Pose, Rotation
 

@@ -20,7 +20,7 @@ from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses.shape_error import ShapeError
 from steelyard.logs.log import MotionLog, Noise
-from steelyard.logs.recording import ROUNDED_GRAVITY
+from steelyard.logs.recording import INCH, ROUNDED_GRAVITY
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.readings.levers import UNITS
 
@@ -51,11 +51,11 @@ USUAL = (300.0, 12_000.0)
 # How many times larger the shape would be, and the mistake that made it small or large.
 _SCALES = (
     (10.0, "centimetres taken for millimetres"),
-    (25.4, "inches taken for millimetres"),
+    (1e3 * INCH, "inches taken for millimetres"),
     (1000.0, "metres taken for millimetres"),
     (0.1, "millimetres taken for centimetres"),
     (0.01, "centimetres taken for metres"),
-    (0.0254, "inches taken for metres"),
+    (INCH, "inches taken for metres"),
     (0.001, "millimetres taken for metres"),
 )
 _REMEDY = (

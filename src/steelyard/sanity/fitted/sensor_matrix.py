@@ -14,8 +14,8 @@ import numpy as np
 from steelyard.check import Array
 from steelyard.findings import Finding, codes
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.people import parameter_jacobian
 from steelyard.inertia import forms
+from steelyard.inertia.people import parameter_jacobian
 from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.aside import stands_aside

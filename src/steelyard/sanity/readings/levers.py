@@ -90,12 +90,12 @@ INCHES = Unit(
 # way to the centre of mass, and are only named.
 SMALL = (MILLIMETRES, CENTIMETRES, INCHES)
 UNITS = (
-    Unit(4.44822, "forces in N are read as lbf"),
-    Unit(1 / 4.44822, "forces in lbf are read as N"),
+    Unit(POUND_FORCE, "forces in N are read as lbf"),
+    Unit(1 / POUND_FORCE, "forces in lbf are read as N"),
     Unit(STANDARD_GRAVITY, "forces in N are read as kgf, or torques in kgf*m as N*m"),
     Unit(1 / STANDARD_GRAVITY, "forces in kgf are read as N, or torques in N*m as kgf*m"),
-    Unit(1 / 0.112985, "torques in N*m are read as lbf*in"),
-    Unit(0.112985, "torques in lbf*in are read as N*m"),
+    Unit(1 / (POUND_FORCE * INCH), "torques in N*m are read as lbf*in"),
+    Unit(POUND_FORCE * INCH, "torques in lbf*in are read as N*m"),
     Unit(100.0, "torques in N*m are read as N*cm"),
     Unit(
         FOOT,

@@ -38,25 +38,16 @@ def _difference(a: float, b: float) -> tuple[float, float]:
 
 @numba.njit(cache=True, nogil=True)
 def determinant(xyz: Array, a: int, b: int, c: int, p: int) -> float:
-    """Return (b - a) x (c - a) . (p - a) of four rows with its true sign, from a sum without rounding."""
-    sides = np.empty((3, 3, 2))
-    for k in range(3):
-        sides[0, k, 0], sides[0, k, 1] = _difference(xyz[b, k], xyz[a, k])
-        sides[1, k, 0], sides[1, k, 1] = _difference(xyz[c, k], xyz[a, k])
-        sides[2, k, 0], sides[2, k, 1] = _difference(xyz[p, k], xyz[a, k])
-    parts = np.empty(200)  # of the sum so far, by rising size, none overlapping: 6 x 8 products of 4 parts at most
+    """Return (b - a) x (c - a) . (p - a) of four rows, whose differences are exact, with its true sign."""
+    parts = np.empty(24)  # of the sum so far, by rising size, none overlapping: 6 products of 4 parts at most
     used = integer(0)
     for turn in range(6):
         i = turn % 3
         j, k = ((i + 1) % 3, (i + 2) % 3) if turn < 3 else ((i + 2) % 3, (i + 1) % 3)
-        for bits in range(8):
-            u, v, w = sides[0, i, bits & 1], sides[1, j, (bits >> 1) & 1], sides[2, k, bits >> 2]
-            if u != 0.0 and v != 0.0 and w != 0.0:
-                m, m2 = _product(u if turn < 3 else -u, v)
-                for factor in (m2, m):
-                    n, n2 = _product(factor, w)
-                    used = _add_exactly(parts, used, n2)
-                    used = _add_exactly(parts, used, n)
+        u, v, w = xyz[b, i] - xyz[a, i], xyz[c, j] - xyz[a, j], xyz[p, k] - xyz[a, k]
+        for factor in _product(u if turn < 3 else -u, v):
+            for number in _product(factor, w):
+                used = _add_exactly(parts, used, number)
     return float(parts[used - 1]) if used > 0 else 0.0
 
 

@@ -19,6 +19,7 @@ import numpy as np
 from steelyard.check import FAILURES, Array
 from steelyard.errors import BadValue
 from steelyard.logs.misread import MISREAD
+from steelyard.logs.recording import INCH
 from steelyard.logs.team_log import TeamLog
 from steelyard.spatial import Pose, Rotation
 from steelyard.team.adjoint import extent
@@ -85,7 +86,7 @@ def _turned(right: Callable[[Array], Array | None]) -> Callable[[Pose], Pose | N
     return meant
 
 
-METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": 0.0254}
+METRES: Mapping[str, float] = {"m": 1.0, "mm": 1e-3, "cm": 1e-2, "inches": INCH}
 SCALES = tuple(_scaled(a, b, METRES[a] / METRES[b]) for a in METRES for b in METRES if a != b)
 # Lengths that all robots tell in another unit fit one another as well as before; turns do not.
 TURNS = (

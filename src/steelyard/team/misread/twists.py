@@ -14,7 +14,7 @@ from steelyard.check import FAILURES
 from steelyard.errors import BadValue
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
-from steelyard.team.misread.poses import Reading
+from steelyard.team.misread.poses import METRES, Reading
 from steelyard.team.twists.team import TwistTeam
 
 # So read, noise is below this share of the twists, and these shares fall by this factor (rms).
@@ -62,7 +62,7 @@ def _from_home(track: Track) -> Track | None:
 
 
 # What velocities may be in, read as m/s [m/s].
-UNITS = {"mm/s": 1e-3, "cm/s": 1e-2, "inches/s": 0.0254}
+UNITS = {f"{name}/s": size for name, size in METRES.items() if name != "m"}
 HOME = Reading(
     "the twists of {} are in the axes of its home", "Turn them into those of its grasp, by its rotation.", _from_home
 )

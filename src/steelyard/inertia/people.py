@@ -15,19 +15,19 @@ ENTRIES = np.array(["xx", "xy", "xz", "yy", "yz", "zz"])  # of an inertia
 NAMES = ("mass", "com x", "com y", "com z", *(f"I{entry}" for entry in ENTRIES))
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def people_jacobian(phi: Array) -> Array:
     """Return d (mass, com, inertia about the CoM xx xy xz yy yz zz) / d phi (10, 10) at phi (10,)."""
     return _slopes(phi, -1.0, 1 / phi[0])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def parameter_jacobian(phi: Array) -> Array:
     """Return d phi / d (mass, com, inertia about the CoM) (10, 10) at phi (10,): the inverse of `people_jacobian`."""
     return _slopes(phi, phi[0], phi[0])
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def _slopes(phi: Array, sign: float, scale: float) -> Array:
     """Return a Jacobian that adds (sign > 0) or takes away the inertia of the mass at its centre.
 
@@ -53,7 +53,7 @@ def _slopes(phi: Array, sign: float, scale: float) -> Array:
     return out
 
 
-@numba.njit(cache=True)
+@numba.njit(cache=True, error_model="numpy")
 def half_trace_com(phi: Array) -> float:
     """Return half the trace of the inertia about the centre of mass of phi (10,) [kg m^2]."""
     square = phi[1] * phi[1] + phi[2] * phi[2] + phi[3] * phi[3]
