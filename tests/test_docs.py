@@ -120,7 +120,7 @@ def test_code_of_the_mujoco_page_runs(tmp_path: Path, monkeypatch: pytest.Monkey
     monkeypatch.chdir(tmp_path)
     body = scenarios.body("wrench").parameters()
     made = motion_arrays(body=body)
-    turns = SciPyRotation.from_matrix(made["rotation_world_from_sensor"]).as_quat(scalar_first=True)
+    turns = SciPyRotation.from_matrix(made["rotation_world_from_sensor"].copy()).as_quat(scalar_first=True)
     run = {"ft_force": made["force_sensor"], "ft_torque": made["torque_sensor"], "ft_pos": made["position_world"]}
     np.savez("run.npz", time=made["time"], ft_quat=turns, **run)
     page = (ROOT / "docs" / "mujoco.md").read_text()
