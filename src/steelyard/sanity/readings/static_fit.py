@@ -148,7 +148,7 @@ def _least_norm(matrix: Array, vector: Array) -> Array:
     return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))
 
 
-def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
+def masses_at_a_glance(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
     """Return the mass [kg] that the force shows by acceleration, then by weight (2,), jackknife std, the share left.
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
@@ -182,7 +182,7 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     """
     if view.acceleration is None or rotation is None or not varies(view, gravity, rotation):
         return ()
-    masses, spread, left = both_masses(view, gravity, rotation)
+    masses, spread, left = masses_at_a_glance(view, gravity, rotation)
     moved, weighed = float(masses[0]), float(np.sign(masses[0]) * masses[1])
     both = (
         f"The force follows the acceleration as that of {abs(moved):.4g} ± {spread[0]:.2g} kg, but the direction of "
