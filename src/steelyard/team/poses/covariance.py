@@ -24,6 +24,8 @@ from steelyard.team.poses.solver import OWN
 KIND = np.repeat(np.arange(5), [3, 3, 3, 3, 1])
 # Windows are so many times the correlation length, and no longer than this share of the rows.
 WINDOW, LONGEST = 8.0, 0.1
+# Parts of a window.
+WIDTH = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -145,17 +147,23 @@ def _turned(rows: Array, central: Array) -> Array:
 def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
     rows = len(fit.rows.apart)
-    # Sums over an eighth of a window, then over windows that move by as much.
     window = np.clip(WINDOW * correlation_time(fit.rows.apart, rows / 4), 10, max(int(LONGEST * rows), 2))
-    part = max(1, int(window) // 8)
-    sums = _turned(fit.rows.pulls(fit.noise, part)[: rows // part], central)
-    sums = np.cumsum(np.concatenate([np.zeros((1, sums.shape[1])), sums - sums.mean(0)]), axis=0)
-    width = min(8, max(1, len(sums) // 4))
-    batches, share = sums[width:] - sums[:-width], width / (len(sums) - 1)
-    # Batches of a series whose mean was taken away scatter less than the series does.
-    variance = (batches**2).mean(0) / share / (1 - share)
+    part = max(1, int(window) // WIDTH)
+    variance = sum_variance(_turned(fit.rows.pulls(fit.noise, part)[: rows // part], central))
     # Traces, which no turn of anybody's axes changes.
     seen, white = (
         np.array([x.reshape(-1, OWN)[:, k == KIND].sum() for k in range(5)]) for x in (variance, information)
     )
     return np.asarray(np.maximum(seen / np.maximum(white, 1e-300), 1.0))
+
+
+def sum_variance(parts: Array) -> Array:
+    """Return the variance (P,) of the sum of a correlated series, of which `parts` (B, P) are the sums in turn.
+
+    By windows of WIDTH parts, which move by one.
+    """
+    sums = np.cumsum(np.concatenate([np.zeros((1, parts.shape[1])), parts - parts.mean(0)]), axis=0)
+    width = min(WIDTH, max(1, len(sums) // 4))
+    batches, share = sums[width:] - sums[:-width], width / len(parts)
+    # Batches of a series whose mean was taken away scatter less than the series does.
+    return np.asarray((batches**2).mean(0) / share / (1 - share))
