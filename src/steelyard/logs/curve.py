@@ -9,6 +9,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.logs.clock import sampling_rate
+from steelyard.logs.runs import around
 
 # Samples farther apart than so many median steps have a gap between them.
 BRIDGED = 2.5
@@ -33,7 +34,7 @@ class Curve:
 
         steps, values = np.diff(known), np.ascontiguousarray(values, dtype=np.float64)
         gap = steps > BRIDGED * np.median(steps)
-        monotone = np.append(gap, False) | np.append(False, gap) | (len(known) < 4)
+        monotone = around(gap) | (len(known) < 4)
         slope = np.empty_like(values) if monotone.all() else _slopes(known, values)
         if monotone.any():
             slope[monotone] = PchipInterpolator(known, values).derivative()(known)[monotone]

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.delays import Clocks, Question, features, free_residual, scan_without_wrench, turning
 from steelyard.logs.imu import Imu, Mounting, first_mount
 from steelyard.logs.kinematics import Motion
@@ -241,7 +242,7 @@ def _descend(layout: _Layout, theta: Array, sigma: Array, power: int = 1) -> tup
     r = _residual(layout, theta)
     least = _first_scales(layout)
     seen = np.clip(robust_std(r), 0.3 * least, 3 * least)
-    seen[6:] *= np.sqrt(_memory(r[:, 6:]))
+    seen[6:] *= np.sqrt(correlation_time(r[:, 6:], _LONGEST_MEMORY * len(r)))
     seen[:6] = np.where(np.isfinite(sigma[:6]), seen[:6], np.inf)
     return theta, _weights(r, seen, power), seen
 
@@ -252,18 +253,6 @@ def _normal(J: Array, weights: Array, r: Array, pull: Array) -> tuple[Array, Arr
     flat = J.reshape(-1, J.shape[-1])
     H = weighted.reshape(flat.shape).T @ flat + np.diag(pull)
     return H, np.asarray((weighted * r[..., None]).sum(1))
-
-
-def _memory(residual: Array) -> Array:
-    """Return how many rows (k,) of a correlated residual (N, k) are worth one independent row, at least 1."""
-    rows, channels = residual.shape
-    if channels == 0:
-        return np.ones(0)
-    spectrum = np.abs(np.fft.rfft(residual - residual.mean(0), 2 * rows, axis=0)) ** 2
-    correlation = np.fft.irfft(spectrum, axis=0)[: max(int(_LONGEST_MEMORY * rows), 2)]
-    correlation = correlation / np.maximum(correlation[0], 1e-300)
-    positive = np.cumprod(correlation > 0.05, axis=0)
-    return np.asarray(np.maximum(2 * (correlation * positive).sum(0) - 1, 1.0))
 
 
 def _first_scales(layout: _Layout) -> Array:

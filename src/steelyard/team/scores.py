@@ -14,6 +14,7 @@ import numba
 import numpy as np
 
 from steelyard.check import Array, Integers
+from steelyard.team.definite import shown_axes
 
 # Directions of scaled parameters with less than this share of the information are open: they stay at zero.
 OPEN = 1e-9
@@ -50,8 +51,8 @@ class Scores:
         held  (C, C) information from elsewhere
         """
         H = self.information.sum(0) + (0.0 if held is None else held)
-        scale = 1 / np.sqrt(np.maximum(np.diag(H), 1e-300))
-        inverse = np.linalg.pinv(H * np.outer(scale, scale), rcond=OPEN, hermitian=True) * np.outer(scale, scale)
+        root, values = shown_axes(H, OPEN)
+        inverse = (root / values) @ root.T
         size = inverse @ self.pull.sum(0)
         # With the parameters taken out: what is explained is no noise.
         left = self.pull - self.information @ size

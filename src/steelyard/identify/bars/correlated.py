@@ -19,6 +19,7 @@ from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.linear import nonnegative
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
+from steelyard.logs.autocorrelation import lagged_products
 from steelyard.logs.clock import median_step
 from steelyard.logs.log import Integers, MotionLog
 
@@ -170,9 +171,7 @@ def _placed(values: Array, slot: Integers) -> Array:
 
 def _autocovariance(series: Array, rows: int) -> Array:
     """Return the tapered autocovariance at lags 0, 1, ... per row, up to where it is lost in its own noise."""
-    size = 2 ** int(np.ceil(np.log2(2 * len(series))))
-    power = np.abs(np.fft.rfft(series, size)) ** 2
-    raw = np.fft.irfft(power, size)[: len(series) // 4] / rows
+    raw = lagged_products(series, len(series) // 4) / rows
     if not raw[0] > 0:
         return np.zeros(1)
     correlation = raw / raw[0]

@@ -11,6 +11,7 @@ from scipy.special import chdtrc
 from steelyard.check import Array, Integers, Mask
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import design
+from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.clock import median_step
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
@@ -98,7 +99,7 @@ def _in_order(log: MotionLog, with_bias: bool) -> tuple[Mask, tuple[Finding, ...
         return everything, ()
     slices, row = sliced
     found = consensus.largest(slices)
-    memory = _memory(found)
+    memory = correlation_time(np.where(found.kept[:, None], found.residual, 0.0), len(found.kept) / 8, power=2)
     touches = _touches(slices, found, memory)
     if not touches:
         return everything, ()
@@ -153,16 +154,6 @@ def _slices(log: MotionLog, with_bias: bool) -> tuple[Slices, Integers] | None:
         size**-2,
     )
     return slices, np.repeat(np.arange(len(edges)), counts)
-
-
-def _memory(found: Consensus) -> float:
-    """Return how many slices in a row carry one independent squared residual."""
-    e = np.where(found.kept[:, None], found.residual / found.tolerance, 0.0)
-    power = np.abs(np.fft.rfft(e, 2 * len(e), axis=0)) ** 2
-    shared = np.fft.irfft(power.sum(1))[: max(len(e) // 8, 2)]
-    correlation = shared[1:] / max(float(shared[0]), 1e-300)
-    quiet = np.flatnonzero(correlation < 0.1)
-    return 1 + 2 * float((correlation[: quiet[0] if len(quiet) else None] ** 2).sum())
 
 
 def _touches(slices: Slices, found: Consensus, memory: float) -> list[Touch]:

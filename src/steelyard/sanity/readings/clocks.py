@@ -20,7 +20,7 @@ from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.readings.glance import glance, resampled, stream_of
 from steelyard.sanity.readings.rivals import best_rival, reading_of
-from steelyard.sanity.readings.static_fit import both_masses
+from steelyard.sanity.readings.static_fit import masses_at_a_glance
 from steelyard.spatial import Rotation
 
 # Turns are judged from so many rows on.
@@ -102,7 +102,7 @@ def _one_mass(recording: Recording) -> bool:
     view = glance(recording)
     if view is None or view.acceleration is None or view.rotation is None:
         return False
-    masses, spread, left = both_masses(view, recording.gravity, view.rotation)
+    masses, spread, left = masses_at_a_glance(view, recording.gravity, view.rotation)
     moved, weighed = (float(v) for v in masses)
     size, std = abs(weighed), float(spread.max())
     return std < size / SURE and left < LEFT and abs(moved - weighed) < max(ALIKE * size, WITHIN * std)

@@ -29,7 +29,7 @@ from steelyard.sanity.readings.rivals import (
     sign_of,
 )
 from steelyard.sanity.readings.silent import require_weight
-from steelyard.sanity.readings.static_fit import both_masses, examine_both_masses
+from steelyard.sanity.readings.static_fit import examine_both_masses, masses_at_a_glance
 from steelyard.sanity.readings.tilt import blind_axis, blind_tilt
 from steelyard.sanity.readings.torques import examine_swapped, examine_torques
 from steelyard.sanity.rows.still_rows import examine_leaps
@@ -180,6 +180,6 @@ def _moved_sign(view: Glance, reading: Reading) -> int:
     """Return the sign of the mass that the measured acceleration shows; 0 where none is measured or it is too weak."""
     if view.acceleration is None or reading.rotation is None:
         return 0
-    masses, spread, _ = both_masses(view, reading.gravity, reading.rotation)
+    masses, spread, _ = masses_at_a_glance(view, reading.gravity, reading.rotation)
     sure = abs(masses[0]) > 5 * spread[0] and 0.5 * abs(masses[1]) < abs(masses[0]) < 2 * abs(masses[1])
     return int(np.sign(masses[0])) if sure else 0

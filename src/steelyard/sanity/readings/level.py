@@ -11,7 +11,7 @@ from steelyard.logs.recording import Recording, Stream
 from steelyard.sanity.readings.glance import Glance
 from steelyard.sanity.readings.rivals import LEVEL, MUCH_BETTER, STEEP, Reading, sign_of
 from steelyard.sanity.readings.static_fit import StaticFit
-from steelyard.sanity.readings.tilt import GlanceTilt, Mirror, Turn, mirrored, tilt_of, turned_sensor
+from steelyard.sanity.readings.tilt import GlanceTilt, Mirror, Turn, mirrored, tilt_at_a_glance, turn_at_a_glance
 from steelyard.sanity.words import axis_words, direction_words, mount_remedy, mounted, unexplained
 
 # With fewer poses or stretches than this, a direction of gravity fits by chance.
@@ -29,9 +29,9 @@ def examine_level(recording: Recording, view: Glance, reading: Reading) -> tuple
     """
     if reading.rotation is None or reading.fit.force_share < LEVEL or int(view.block.max()) + 1 < FEWEST_BLOCKS:
         return recording, ()
-    tilt = tilt_of(view, reading.gravity, view.rotation, reading.fit.mass)
+    tilt = tilt_at_a_glance(view, reading.gravity, view.rotation, reading.fit.mass)
     sign = sign_of(view, reading)
-    turned, mirror = turned_sensor(view, reading.gravity, sign), mirrored(view, reading.gravity, sign)
+    turned, mirror = turn_at_a_glance(view, reading.gravity, sign), mirrored(view, reading.gravity, sign)
     if mirror is not None and _columns_mixed(mirror, turned, tilt, reading.fit):
         return recording, (_mixed_finding(mirror, reading.fit),)
     if turned is not None and _sensor_turned(turned, tilt, reading.fit):

@@ -23,7 +23,7 @@ from steelyard.logs.misread import INVERTED, MISREAD, Misread
 from steelyard.logs.recording import Recording
 from steelyard.sanity.readings.glance import Glance, glance, in_axes
 from steelyard.sanity.readings.static_fit import StaticFit, better_fit, varies
-from steelyard.sanity.readings.tilt import GlanceTilt, tilt_of, turned_sensor
+from steelyard.sanity.readings.tilt import GlanceTilt, tilt_at_a_glance, turn_at_a_glance
 from steelyard.sanity.words import unexplained
 
 # A rival leaves less than this share of the force variance that the log as given leaves.
@@ -83,7 +83,7 @@ def _best_by_force(recording: Recording, view: Glance, given: Reading) -> Readin
     """Return the rival whose forces turn with gravity as those of the reading as given do not."""
     if given.fit.force_share < GOOD:
         return None
-    free = tilt_of(view, given.gravity, view.rotation, given.fit.mass)
+    free = tilt_at_a_glance(view, given.gravity, view.rotation, given.fit.mass)
     bar = MUCH_BETTER * given.fit.force_share
 
     def able(rivals: Iterable[Reading], bar: float) -> list[Reading]:
@@ -200,9 +200,9 @@ def outdone(reading: Reading, view: Glance, gravity: Array) -> bool:
 
     In turns about one axis a turn of S is a tilt and a change of sign, too; then the reading holds.
     """
-    free = tilt_of(reading.view or view, reading.gravity, reading.rotation, reading.fit.mass)
+    free = tilt_at_a_glance(reading.view or view, reading.gravity, reading.rotation, reading.fit.mass)
     left = min(reading.fit.force_share, 1.0 if free is None or free.angle > STEEP else free.force_share)
-    turned = turned_sensor(view, gravity, 1) if left > LEVEL else None
+    turned = turn_at_a_glance(view, gravity, 1) if left > LEVEL else None
     return turned is not None and turned.force_share < MUCH_BETTER * left
 
 

@@ -14,6 +14,7 @@ import numpy as np
 
 from steelyard.check import Array, Integers
 from steelyard.findings import Finding, about
+from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.sanity.readings.glance import Glance, Seen
 from steelyard.spatial import cross_matrix
 
@@ -139,16 +140,12 @@ def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Ar
 
 def _least_norm(matrix: Array, vector: Array) -> Array:
     """Return the least-norm solution after scaling the columns to one."""
-    size = float(np.trace(matrix))
-    if not size > 1e-200:
-        return np.zeros(len(vector))
-    scale = 1 / np.sqrt(np.maximum(np.diag(matrix), 1e-12 * size))
-    values, axes = np.linalg.eigh(matrix * np.outer(scale, scale))
-    inverse = np.where(values > 1e-6 * max(float(values[-1]), 1e-300), 1 / np.maximum(values, 1e-300), 0.0)
-    return np.asarray(scale * (axes @ (inverse * (axes.T @ (scale * vector)))))
+    # Columns of less than this share of all squares say nothing.
+    floor = 1e-12 * float(np.trace(matrix))
+    return np.asarray(inverse_scaled(matrix + floor * np.eye(len(matrix)), 1e-6) @ vector)
 
 
-def both_masses(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
+def masses_at_a_glance(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
     """Return the mass [kg] that the force shows by acceleration, then by weight (2,), jackknife std, the share left.
 
     gravity, rotation  (3,) [m/s^2] in W, and S to W (N, 3, 3), as the log is read
@@ -182,7 +179,7 @@ def examine_both_masses(view: Glance, gravity: Array, rotation: Array | None) ->
     """
     if view.acceleration is None or rotation is None or not varies(view, gravity, rotation):
         return ()
-    masses, spread, left = both_masses(view, gravity, rotation)
+    masses, spread, left = masses_at_a_glance(view, gravity, rotation)
     moved, weighed = float(masses[0]), float(np.sign(masses[0]) * masses[1])
     both = (
         f"The force follows the acceleration as that of {abs(moved):.4g} ± {spread[0]:.2g} kg, but the direction of "

@@ -52,7 +52,7 @@ class Turn:
     force_share: float
 
 
-def tilt_of(view: Glance, gravity: Array, rotation: Array | None, mass: float) -> GlanceTilt | None:
+def tilt_at_a_glance(view: Glance, gravity: Array, rotation: Array | None, mass: float) -> GlanceTilt | None:
     """Return the gravity that fits best; None without rotations (N, 3, 3) or where nothing is seen of it.
 
     gravity  (3,) [m/s^2] in W, as given
@@ -124,7 +124,7 @@ def force_and_weight(seen: Seen, sign: float) -> tuple[Array, Array]:
     return force, -pull * (np.sign(sign) or 1.0)
 
 
-def turned_sensor(view: Glance, gravity: Array, sign: float) -> Turn | None:
+def turn_at_a_glance(view: Glance, gravity: Array, sign: float) -> Turn | None:
     """Return the constant turn of S that explains the force best; None without rotations or all forces.
 
     Where the sensor turns tells it (Wahba); then what the acceleration adds to the force puts it right.

@@ -17,6 +17,7 @@ from dataclasses import replace
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
+from steelyard.logs.autocorrelation import correlation_time
 from steelyard.logs.clock import median_step
 from steelyard.logs.recording import Recording, Stream
 from steelyard.logs.runs import runs
@@ -29,8 +30,8 @@ _KEPT = ("force", "torque", "rotation", "gravity", "specific_force")
 SAME, FEWEST_ROWS = np.radians(2.0), 8.0
 # Rows remember each other where they are worth fewer by this factor; means are over so many times the factor.
 WORTH_LESS, TIMES = 1.5, 3.0
-# Correlations below this are chance.
-LEAST = 0.05
+# Rows remember each other over so many at most.
+MOST_LAGS = 10_000
 # One log in so many whose poses scatter as their rows say is taken for one whose poses do not.
 CHANCE = 1e-4
 
@@ -145,16 +146,12 @@ def _worth(values: Array, poses: Integers) -> float:
     count = np.diff(poses, axis=1)[:, 0]
     means = np.add.reduceat(values, poses[:, 0], axis=0) / count[:, None]
     left = values - np.repeat(means, count, axis=0)
-    left = left / np.maximum(left.std(0), 1e-300)
     number = np.repeat(np.arange(len(poses)), count)
-    worth = 1.0
-    for lag in range(1, int(count.max()) // 2):
-        pairs = number[lag:] == number[:-lag]
-        alike = float((left[lag:] * left[:-lag])[pairs].sum() / max(float((left**2).sum()), 1e-300))
-        if alike < LEAST:
-            break
-        worth += 2 * alike
-    return worth
+    # Poses so far apart that none reaches into the next.
+    longest = min(int(count.max()) // 2, MOST_LAGS)
+    apart = np.zeros((len(left) + longest * len(poses), left.shape[1]))
+    apart[np.arange(len(left)) + longest * number] = left
+    return correlation_time(apart, longest)
 
 
 def _apart_by(recording: Recording, pull: Array, poses: Integers, worth: float) -> float:

@@ -3,9 +3,10 @@
 With the first body X(t) in the home of the reference robot, the hinge's screw s at the angle q(t), and S_i = exp(q s)
 for robots that hold the second body, the identity for the others,
     T_i(t) = Z_i^-1 X(t) S_i(t) G_i exp(e_i),   e_i ~ N(0, W^-1).
-A row has seven unknowns of motion, which are eliminated row by row as in `poses.fit`; homes of robots that share no
-body are tied to each other by the hinge alone. Robots are taken to err alike: a body that one robot holds tells little
-of how that robot errs.
+A row has seven unknowns of motion, which are eliminated row by row; homes of robots that share no body are tied to each
+other by the hinge alone. Robots are taken to err alike: a body that one robot holds tells little of how that robot
+errs. In `poses.fit`, of one body, what a row says of its motion depends on who was seen alone, so that rows are summed
+before they are weighed; here it changes with the angle, and every row has equations of its own.
 Source: own; the paper names jointed payloads as future work.
 """
 
@@ -21,6 +22,7 @@ from steelyard.spatial.screws import log_pose
 from steelyard.team.adjoint import adjoint_inverse, exp
 from steelyard.team.adjoint import log as pose_log
 from steelyard.team.definite import shown_axes
+from steelyard.team.poses.covariance import WIDTH, sum_variance
 from steelyard.team.poses.measured import TeamMotion
 from steelyard.team.poses.solver import OWN
 
@@ -29,8 +31,8 @@ STEPS = 30
 CLOSE, SETTLED = 1e-6, 1e-3
 # Noise to begin with, and what encoders resolve at best [rad, m].
 GUESS, LEAST = np.array([1e-3, 1e-3]), np.array([1e-7, 1e-7])
-# Rows on which what the motion takes up is worked out for the noise, and batches that tell how noise is correlated.
-JUDGED, BATCHES = 40, 30
+# Rows on which what the motion takes up is worked out for the noise, and windows that tell how noise is correlated.
+JUDGED, WINDOWS = 40, 30
 # Rows that are worked on at a time where all are: they need some 10 kB each with four robots.
 CHUNK = 2000
 # Information along a direction, in units of its parameters' own, below which it is one that nothing can show.
@@ -289,10 +291,10 @@ def _inverse(H: Array, timed: bool) -> tuple[Array, int]:
 
 
 def _inflation(scores: Array, H: Array) -> float:
-    """Return how many times larger than for white noise the variance of the scores' sums over batches is."""
-    batches = np.add.reduceat(scores, np.arange(0, len(scores), max(1, len(scores) // BATCHES)), axis=0)
-    scale = 1 / np.maximum(np.diag(H), 1e-300)
-    return max(1.0, float((((batches - batches.mean(0)) ** 2).sum(0) * scale).mean()))
+    """Return how many times larger than for white noise the variance of the scores is."""
+    part = max(1, len(scores) // (WIDTH * WINDOWS))
+    variance = sum_variance(np.add.reduceat(scores, np.arange(0, len(scores), part), axis=0))
+    return max(1.0, float((variance / np.maximum(np.diag(H), 1e-300)).mean()))
 
 
 def _centred(team: Hinged, unknown: Integers, carried: Array) -> tuple[Hinged, Array]:

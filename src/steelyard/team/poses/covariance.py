@@ -14,6 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.logs.autocorrelation import correlation_time
 from steelyard.spatial import Pose, cross, cross_matrix
 from steelyard.team.poses.fit import PoseFit
 from steelyard.team.poses.recurring import recurring
@@ -23,6 +24,8 @@ from steelyard.team.poses.solver import OWN
 KIND = np.repeat(np.arange(5), [3, 3, 3, 3, 1])
 # Windows are so many times the correlation length, and no longer than this share of the rows.
 WINDOW, LONGEST = 8.0, 0.1
+# Parts of a window.
+WIDTH = 8
 
 
 @dataclass(frozen=True, eq=False)
@@ -144,14 +147,9 @@ def _turned(rows: Array, central: Array) -> Array:
 def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     """Return how many times larger than for white noise the variance of the scores is, per kind of parameter (5,)."""
     rows = len(fit.rows.apart)
-    # Sums over an eighth of a window, then over windows that move by as much.
-    part = max(1, _window(fit.rows.apart, rows) // 8)
-    sums = _turned(fit.rows.pulls(fit.noise, part)[: rows // part], central)
-    sums = np.cumsum(np.concatenate([np.zeros((1, sums.shape[1])), sums - sums.mean(0)]), axis=0)
-    width = min(8, max(1, len(sums) // 4))
-    batches, share = sums[width:] - sums[:-width], width / (len(sums) - 1)
-    # Batches of a series whose mean was taken away scatter less than the series does.
-    variance = (batches**2).mean(0) / share / (1 - share)
+    window = np.clip(WINDOW * correlation_time(fit.rows.apart, rows / 4), 10, max(int(LONGEST * rows), 2))
+    part = max(1, int(window) // WIDTH)
+    variance = sum_variance(_turned(fit.rows.pulls(fit.noise, part)[: rows // part], central))
     # Traces, which no turn of anybody's axes changes.
     seen, white = (
         np.array([x.reshape(-1, OWN)[:, k == KIND].sum() for k in range(5)]) for x in (variance, information)
@@ -159,15 +157,13 @@ def _inflation(fit: PoseFit, information: Array, central: Array) -> Array:
     return np.asarray(np.maximum(seen / np.maximum(white, 1e-300), 1.0))
 
 
-def _window(residual: Array, rows: int) -> int:
-    """Return the number of rows of a window, from how long residuals stay correlated."""
-    every = residual.reshape(rows, -1)
-    flat: Array = (every if every[0].all() else every[:, every.any(0)]).ravel()
-    power, width = max(float(flat @ flat), 1e-300), len(flat) // rows
-    length, lag = 1.0, 1
-    while lag < rows // 4:
-        share = float(flat[lag * width :] @ flat[: -lag * width]) / power
-        if share < 0.05:
-            break
-        length, lag = length + 2 * share, lag + 1
-    return int(np.clip(WINDOW * length, 10, max(int(LONGEST * rows), 2)))
+def sum_variance(parts: Array) -> Array:
+    """Return the variance (P,) of the sum of a correlated series, of which `parts` (B, P) are the sums in turn.
+
+    By windows of WIDTH parts, which move by one.
+    """
+    sums = np.cumsum(np.concatenate([np.zeros((1, parts.shape[1])), parts - parts.mean(0)]), axis=0)
+    width = min(WIDTH, max(1, len(sums) // 4))
+    batches, share = sums[width:] - sums[:-width], width / len(parts)
+    # Batches of a series whose mean was taken away scatter less than the series does.
+    return np.asarray((batches**2).mean(0) / share / (1 - share))

@@ -19,6 +19,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from steelyard.check import Array
+from steelyard.logs.autocorrelation import correlation_time
 from steelyard.team.poses.fit import PoseFit, Rows
 from steelyard.team.poses.solver import OWN
 from steelyard.team.stacked import Stretch, row_slices
@@ -56,7 +57,7 @@ def recurring(fit: PoseFit) -> Recurring | None:
     count, shown = thin.data.count, features.shape[1]
     found = np.einsum("tk,t,tna->kna", features, share, thin.apart)
     left = thin.apart - np.einsum("tk,kna->tna", features, found)
-    variance = np.einsum("t,tna->na", share, left**2) * _memory(left) / len(left)
+    variance = np.einsum("t,tna->na", share, left**2) * correlation_time(left, len(left) / 4) / len(left)
     square, noise = (found**2).reshape(-1, 2, 3).sum((0, 2)), shown * variance.reshape(-1, 2, 3).sum((0, 2))
     # The payload's motion takes up what all have in common, homes what turns with the pose.
     visible = 1 - (6 * shown + 6 * (count - 1)) / (6 * shown * count)
@@ -91,19 +92,6 @@ def _features(rows: Rows, noise: Array, share: Array) -> Array | None:
     U, size, _ = np.linalg.svd(moved, full_matrices=False)
     plain = size > MOVED
     return U[:, plain] / np.sqrt(np.maximum(share, 1e-300))[:, None] if plain.any() else None
-
-
-def _memory(left: Array) -> float:
-    """Return over how many rows residuals (T, N, 6) remember each other."""
-    flat = left.reshape(len(left), -1)
-    flat = flat / np.maximum(np.sqrt((flat**2).mean(0)), 1e-300)
-    memory = 1.0
-    for lag in range(1, len(flat) // 4):
-        alike = float((flat[lag:] * flat[:-lag]).mean())
-        if alike < 0.05:
-            break
-        memory += 2 * alike
-    return memory
 
 
 def _scores(fit: PoseFit, rows: Rows, sized: Array) -> Array:
