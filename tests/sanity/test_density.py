@@ -17,11 +17,15 @@ from steelyard.inertia import InertialParameters
 from steelyard.parts.parts import Parts
 from steelyard.pipelines.held_object import identify_rows
 from steelyard.pipelines.shape_in_parts import shape_of
-from steelyard.sanity.fitted.no_body import impossible_density
+from steelyard.sanity.fitted.no_body import LIGHT, impossible_density
 from steelyard.shape.cloud import Cloud
 from steelyard.simulate import hammer
-from steelyard.simulate.handling import exact_log
+from steelyard.simulate.handling import exact_log, handling_log
+from steelyard.workshop import solids
+from steelyard.workshop.draw import Draw
+from steelyard.workshop.materials import ABS, STAINLESS_STEEL
 from steelyard.workshop.sampling import surface_cloud
+from steelyard.workshop.tools import Grasp, Piece, Tool, make_tool
 
 VOLUME = 1e-4  # of 0.62 kg: 6200 kg/m^3
 
@@ -145,6 +149,41 @@ def test_a_light_scan_is_trusted_less_about_inertia() -> None:
         off = (made.parameters.inertia_com - body.inertia_com)[[0, 1, 2], [0, 1, 2]] / made.std[[4, 7, 9]]
         assert np.abs(off).max() < 3
     assert (sure.std[4:] < 0.2 * found.std[4:] * float(solid.mass / hollow.mass)).all()
+
+
+def bottle(wall: float | None) -> Tool:
+    """Return a closed plastic bottle on a foot of steel, hollow but for its walls [mm], or solid."""
+    outside = solids.rod(38, 0, 190)
+    inside = solids.rod(38 - (wall or 0), wall or 0, 190 - (wall or 0))
+    body = outside - inside if wall else outside
+    pieces = [Piece("bottle", body, ABS, (240, 190, 24)), Piece("foot", solids.rod(38, -14, 0), STAINLESS_STEEL)]
+    return make_tool("bottle", pieces, Grasp((0, 0, 190), "x", "z"), Draw())
+
+
+def scanned(tool: Tool) -> tuple[Estimate, InertialParameters]:
+    """Return what a log and a scan of the outside of a tool give, and the truth."""
+    truth = tool.parts.whole(tool.densities * tool.parts.volume).in_frame(tool.X_OS.inverse())
+    scan = shape_of(surface_cloud(tool))
+    return identify_rows(handling_log(truth, "slow", "moderate"), parts=scan, pose=tool.X_OS.inverse()), truth
+
+
+def test_a_light_part_of_a_scan_is_trusted_less_in_its_own_inertia() -> None:
+    """The whole is no lighter than wood, so that only the mass of the part tells."""
+    for wall, light in ((2.5, True), (None, False)):
+        found, truth = scanned(bottle(wall))
+        assert found.mass / sum(part.volume for part in found.parts) > LIGHT
+        assert any("such a part is trusted to 35 %" in note for note in found.notes) == light
+        assert not any("the shape is trusted to 35 %" in note for note in found.notes)
+        off = (found.parameters.inertia_com - truth.inertia_com)[[0, 1, 2], [0, 1, 2]] / found.std[[4, 7, 9]]
+        assert np.abs(off).max() < 2.5
+
+
+def test_a_mesh_of_light_parts_is_taken_to_be_solid() -> None:
+    tool = bottle(2.5)
+    truth = tool.parts.whole(tool.densities * tool.parts.volume)
+    solid = bottle(None).parts
+    found = identify_rows(handling_log(truth, "slow", "moderate"), parts=solid, pose=sy.Pose.identity())
+    assert not any("light for a solid" in note for note in found.notes)
 
 
 def test_a_shape_alone_weighs_nothing(made: hammer.Example) -> None:

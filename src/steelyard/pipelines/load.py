@@ -64,7 +64,7 @@ class Load:
         estimate = replace(estimate, notes=(*notes, *estimate.notes))
         if self.shape is None:
             return estimate
-        light = maybe_hollow(self.shape.error, estimate.mass, float(self.shape.cuts[0].volume.sum()))
+        light = maybe_hollow(self.shape.error, estimate, self.shape.cuts)
         if not light:
             return estimate
         error, note = light

@@ -19,6 +19,9 @@ from steelyard.spatial import Pose, Rotation
 LEAN = 0.2
 # What a hidden core may take from a second moment across a long body, as a share of it (one standard deviation).
 CORE = 0.15
+# What is thought solid and is hollow has up to half as much again of each second moment about its centre (a shell, for
+# one that is three quarters empty).
+HOLLOW = 0.35
 # A scan puts the centroids of its parts off by so much, one standard deviation per axis [m].
 DRAWN = 1e-3
 # Masses of a scan's parts need not sum to the whole closer than this share: a sum that is known a thousand times better
@@ -39,6 +42,7 @@ class ShapeError:
     turn_rad        of the whole shape about its centre of mass, per axis [rad]
     grasp_m, grasp_rad   of the pose of the object in the sensor, per axis [m, rad]
     grasp_at        the origin of the object's frame in the sensor's [m], about which that turn is
+    hollow          parts of the body that may be hollow, as if they were solid: each errs by itself, by HOLLOW
     """
 
     com_m: float = 0.0
@@ -48,6 +52,7 @@ class ShapeError:
     grasp_m: float = 0.0
     grasp_rad: float = 0.0
     grasp_at: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    hollow: tuple[InertialParameters, ...] = ()
 
     def __post_init__(self) -> None:
         values = (self.com_m, self.inertia_share, self.stretch, self.turn_rad, self.grasp_m, self.grasp_rad)
@@ -122,7 +127,8 @@ class ShapeError:
             slope = _turned(body.inertia_com)
             inner[4:, 4:] += self.turn_rad**2 * slope @ slope.T
         back = parameter_jacobian(phi)
-        return np.asarray(back @ inner @ back.T)
+        shells = sum(ShapeError(stretch=HOLLOW).covariance(part) for part in self.hollow)
+        return np.asarray(back @ inner @ back.T + shells)
 
     def with_grasp(self, body: InertialParameters) -> Array:
         """Return the covariance (10, 10) that a wrong shape and a wrong grasp give the parameters of a body.

@@ -18,9 +18,11 @@ from steelyard.errors import CannotAnswer
 from steelyard.evidence import PartMass
 from steelyard.findings import Finding
 from steelyard.identify.estimate import Estimate
-from steelyard.identify.masses.shape_error import ShapeError
+from steelyard.identify.masses.shape_error import HOLLOW, ShapeError
+from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import INCH, ROUNDED_GRAVITY
+from steelyard.parts.parts import Parts
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.readings.levers import UNITS
 
@@ -39,9 +41,10 @@ HEAVIEST, DENSEST = 500.0, 22600.0
 
 # Half of what the lightest foams weigh [kg/m^3]: an inflated ball that counts as solid has more.
 LIGHTEST = 5.0
-# Lighter than plastics and most woods [kg/m^3]: what a scan takes for solid is probably hollow, and then has up to half
-# as much again of each second moment about its centre (a shell, for one that is three quarters empty).
-LIGHT, HOLLOW = 600.0, 0.35
+# Lighter than plastics and most woods [kg/m^3]: what a scan takes for solid is probably hollow.
+LIGHT = 600.0
+# A part is as light as that where it would be with so many more standard deviations of its mass.
+CLEARLY = 2.0
 # Standard deviations by which mass and volume together must miss what materials have.
 SURE = 3.0
 # No shape gives its volume better than this, as a share of it.
@@ -58,6 +61,10 @@ _SCALES = (
     (INCH, "inches taken for metres"),
     (0.001, "millimetres taken for metres"),
 )
+_LIGHT_SOLID = (
+    "is light for a solid: foam, wood, or hollow, which no scan shows and which makes moments of inertia larger"
+)
+_TRUSTED = f"is trusted to {100 * HOLLOW:.0f} %"
 _REMEDY = (
     "Check the scale of the shape, which must be in metres, the units of force and torque, and that the mass is "
     "the object's alone: take a gripper away with --tool."
@@ -170,18 +177,31 @@ def _left(identify: Callable[[MotionLog], Estimate], log: MotionLog, times: floa
     return np.inf if chi2 is None else chi2
 
 
-def maybe_hollow(error: ShapeError, mass: float, volume: float) -> tuple[ShapeError, str] | None:
-    """Return how wrong the scan of this volume [m^3] may be about inertia, being light, and why; None where it is not.
+def maybe_hollow(error: ShapeError, estimate: Estimate, cuts: Sequence[Parts]) -> tuple[ShapeError, str] | None:
+    """Return how wrong a scan may be about inertia, being light or light in parts, and why; None where it is not.
+
+    cuts  of the scan into parts, in S; the parts of the estimate are those of one of them
 
     A mesh that is given is taken to be solid: its user knows.
     """
-    density = mass / volume
-    if not 0 < error.stretch < HOLLOW or not LIGHTEST < density < LIGHT:
+    if not 0 < error.stretch < HOLLOW or error.hollow:
         return None
-    return error.at_least(0.0, HOLLOW), (
-        f"{density:.3g} kg/m^3 is light for a solid: foam, wood, or hollow, which no scan shows and which makes "
-        f"moments of inertia larger; the shape is trusted to {100 * HOLLOW:.0f} % in them"
-    )
+    density = estimate.mass / float(cuts[0].volume.sum())
+    if LIGHTEST < density < LIGHT:
+        return error.at_least(0.0, HOLLOW), f"{density:.3g} kg/m^3 {_LIGHT_SOLID}; the shape {_TRUSTED} in them"
+    cut = next((cut for cut in cuts if len(cut) == len(estimate.parts)), None)
+    light = [k for k, part in enumerate(estimate.parts) if _clearly_light(part)]
+    if cut is None or not light:
+        return None
+    parts = [estimate.parts[k] for k in light]
+    hollow = tuple(InertialParameters(cut.per_mass[:, k] * estimate.parts[k].mass) for k in light)
+    named = " and ".join(f"part {part.label} with {part.density:.3g} kg/m^3" for part in parts)
+    return replace(error, hollow=hollow), f"{named} {_LIGHT_SOLID}; the shape of such a part {_TRUSTED} in its own"
+
+
+def _clearly_light(part: PartMass) -> bool:
+    """Say whether a part is lighter than solids are, and the log says so."""
+    return part.density > LIGHTEST and (part.mass + CLEARLY * part.std) / part.volume < LIGHT
 
 
 def impossible_density(
