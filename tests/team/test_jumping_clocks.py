@@ -12,7 +12,7 @@ from steelyard.check import Array
 from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.simulate.team import TeamTrial, simulate_team
-from steelyard.simulate.team_cases import CASES, TeamScene
+from steelyard.simulate.team_cases import CASES, Presence, TeamNoise, TeamScene
 from steelyard.team.clocks.jumps import cut_at_jumps
 from steelyard.team.joint import JointTeam
 
@@ -102,3 +102,26 @@ def test_sound_clocks_fast_ones_and_lost_rows_are_no_leap(case: str) -> None:
             assert cut_at_jumps(fast)[0] is fast
         lost = with_track(log, "robot1", "motion", track.rows(np.r_[:1000, 1040 : len(track)]))
         assert cut_at_jumps(lost)[0] is lost
+
+
+@pytest.mark.parametrize("reads_n", [0.0, 3.0], ids=["tared", "biased"])
+def test_a_robot_that_follows_late_before_it_takes_hold_has_no_leaping_clock(reads_n: float) -> None:
+    """It then holds nothing, so that how it turns is nobody else's turning, though it looks like it."""
+    joins, late, name = 9.0, 50, "robot2"
+    noise = TeamNoise(pose_rad=3e-4, pose_m=2e-4, force_white_N=1.0)
+    scene = TeamScene(noise, 4, sensing="poses", six_axis=frozenset({0}), motion_samples=2500)
+    holding = track_of(simulate_team(scene, 3).log, name, "motion")
+    made = simulate_team(replace(scene, presence=(Presence(2, joins=joins),)), 3)
+    track = track_of(made.log, name, "motion")
+    # Where it would be if it held the payload, half a second ago; it catches up before it takes hold.
+    before = track.time - track.time[0] < joins - 0.8
+    rows = np.maximum(np.arange(len(track)) - late * before, 0)
+    poses = {channel: holding.channels[channel][rows] for channel in ("rotation", "position")}
+    force = track.channels["force"] + reads_n * np.array([0.6, 0.0, 0.8])
+    came = replace(track, channels={**track.channels, **poses, "force": force})
+    found = JointTeam().identify(with_track(made.log, name, "motion", came))
+    assert not {"clock-unsteady", "clock-offset", "robot-left", "grasp-slipped"} & found.codes()
+    (said,) = [finding.message for finding in found.findings if finding.code == "robot-joined"]
+    assert said.startswith(f"'{name}' took hold of the payload at ")
+    away = np.append(found.mass, found.com) - np.append(made.truth.body.mass, made.truth.body.com)
+    assert np.abs(away / found.std[:4]).max() < 4

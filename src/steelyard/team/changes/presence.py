@@ -14,13 +14,16 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.findings import Finding
+from steelyard.logs.clock import median_step
 from steelyard.logs.runs import lasting, runs
+from steelyard.logs.team_log import TeamLog
+from steelyard.logs.team_track import Track
 from steelyard.team.payload.body_rows import averaged
 from steelyard.team.stacked import Stretch
 
-# A push below this share of the robot's usual one is idle where it stays so for IDLE_S [s]; forces are averaged over
-# MEAN_S. What happens within EDGE_S of a change is used for nothing.
-SHARE, IDLE_S, MEAN_S, EDGE_S = 0.1, 1.0, 0.2, 0.4
+# A push below this share of the robot's usual one, that which it passes in a tenth of its rows, is idle where it stays
+# so for IDLE_S [s]; forces are averaged over MEAN_S. What happens within EDGE_S of a change is used for nothing.
+SHARE, USUAL, IDLE_S, MEAN_S, EDGE_S = 0.1, 0.9, 1.0, 0.2, 0.4
 # One who has let go may still bear a gripper that hangs beyond the sensor: below this share it is asked.
 LIGHT = 0.6
 # A fifth of the seconds show who goes ways of its own: it may rest between.
@@ -38,7 +41,7 @@ def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
     usual = np.zeros(count)
     for i in range(count):
         felt = np.concatenate([size[part.felt[:, i], i] for size, part in zip(sizes, parts, strict=True)])
-        usual[i] = np.quantile(felt, 0.9) if len(felt) else 0.0
+        usual[i] = np.quantile(felt, USUAL) if len(felt) else 0.0
     out = []
     for size, part in zip(sizes, parts, strict=True):
         small = (size < share * usual) & part.felt & part.carries
@@ -47,9 +50,39 @@ def idle(parts: Sequence[Stretch], share: float) -> list[Mask]:
 
 
 def _smoothed(part: Stretch) -> Array:
-    """Return the size (T, N) [N] of the force averaged over MEAN_S."""
-    mean = averaged(part.wrench[..., 3:], MEAN_S, part.rate)
+    return _push(part.wrench[..., 3:], part.rate)
+
+
+def _push(force: Array, rate: float) -> Array:
+    """Return the size (T, ...) [N] of a force (T, ..., 3) averaged over MEAN_S; rate in Hz."""
+    mean = averaged(force, MEAN_S, rate)
     return np.asarray(np.sqrt(mean[..., 0] ** 2 + mean[..., 1] ** 2 + mean[..., 2] ** 2))
+
+
+def usual_pushes(log: TeamLog) -> dict[str, float]:
+    """Return the push [N] that every robot with forces passes in a tenth of its rows, before any clock is known."""
+    sizes = {name: [_felt(track) for _, track in log.tracks_of(name)] for name in log.names}
+    felt = {name: np.concatenate(own) if own else np.zeros(0) for name, own in sizes.items()}
+    return {name: float(np.nanquantile(own, USUAL)) for name, own in felt.items() if np.isfinite(own).any()}
+
+
+def perhaps_idle(track: Track, share: float, usual: float) -> Mask:
+    """Return the rows (T,) in which a robot may hold nothing: it says so, or pushes with less than a share for IDLE_S.
+
+    usual  its push [N], as of `usual_pushes`
+    """
+    rows = _felt(track) < share * usual
+    rows = lasting(rows, IDLE_S / median_step(track.time)) if rows.any() else rows
+    return rows if track.carrying is None else rows | ~track.carrying
+
+
+def _felt(track: Track) -> Array:
+    """Return the size (T,) [N] of a track's averaged force, NaN where none was measured."""
+    good = track.mask("force")
+    if not good.any() or len(track) < 2:
+        return np.full(len(track), np.nan)
+    force = np.where(good[:, None], track.channels["force"], 0.0)
+    return np.where(good, _push(force, 1 / median_step(track.time)), np.nan)
 
 
 def as_long(values: Any, rows: int) -> Any:
@@ -123,8 +156,7 @@ def presence_findings(before: Sequence[Stretch], after: Sequence[Stretch], names
         for i, name in enumerate(names):
             gone = was.seen[:, i] & ~now.seen[:, i] & now.carries[:, i] & ~now.felt[:, i]
             for start, stop in runs(lasting(gone, IDLE_S * was.rate)):
-                text = _with_gripper(name, was, was.wrench[:, i, 3:], start, stop)
-                out.append(Finding.of("robot-left", text))
+                out.append(_with_gripper(name, was, was.wrench[:, i, 3:], start, stop))
             for start, stop in runs(was.carries[:, i] & ~now.carries[:, i]):
                 if start > 0:
                     text = f"'{name}' let go of the payload at {was.time[start]:.2f} s of '{was.name}'"
@@ -138,12 +170,15 @@ def presence_findings(before: Sequence[Stretch], after: Sequence[Stretch], names
     return out
 
 
-def _with_gripper(name: str, part: Stretch, push: Array, start: int, stop: int) -> str:
-    """Return what is said of a robot that let go from one row to another and went on to push (T, 3) [N]."""
+def _with_gripper(name: str, part: Stretch, push: Array, start: int, stop: int) -> Finding:
+    """Return what is said of a robot that holds nothing from one row to another and pushes (T, 3) [N] all the same."""
     size = float(np.linalg.norm(push[start:stop].mean(0)))
-    if start == 0 and stop == len(part):
-        what = f"'{name}' held nothing during all of '{part.name}'"
-    else:
-        until = "" if stop == len(part) else f" until {part.time[stop]:.2f} s"
-        what = f"'{name}' let go of the payload at {part.time[start]:.2f} s of '{part.name}'{until}"
-    return f"{what} and measured {size:.2g} N, as of its gripper's weight; nobody's wrench is used meanwhile."
+    still = f"measured {size:.2g} N, as of its gripper's weight; nobody's wrench is used"
+    if start == 0 and stop < len(part):
+        text = f"'{name}' took hold of the payload at {part.time[stop]:.2f} s of '{part.name}'"
+        return Finding.of("robot-joined", f"{text} and until then {still} before.")
+    if start == 0:
+        return Finding.of("robot-left", f"'{name}' held nothing during all of '{part.name}' and {still} meanwhile.")
+    until = "" if stop == len(part) else f" until {part.time[stop]:.2f} s"
+    what = f"'{name}' let go of the payload at {part.time[start]:.2f} s of '{part.name}'{until}"
+    return Finding.of("robot-left", f"{what} and {still} meanwhile.")

@@ -4,7 +4,8 @@ How fast a rigid payload turns is the same for every robot, so that two clocks a
 robots turn alike. Where one shift fits up to some time, and another from there on, either far better than the other's,
 and one that grows steadily does not, a clock has jumped. What it jumped by, the fit tells as for clocks that are set
 anew between recordings (`unsteady`). The recording is cut at the gap that the jump leaves in the stamps, or, where
-stamps were counted and rows lost, at the time at which both shifts together fit best.
+stamps were counted and rows lost, at the time at which both shifts together fit best. A robot that may hold nothing for
+a while goes ways of its own meanwhile: how it turns then tells of no clock.
 Source: own.
 """
 
@@ -14,30 +15,23 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numba import njit
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.logs.clock import NEAR_S, SAME_S, UNSURE_S, jump_gap
 from steelyard.logs.team_log import TeamLog, TeamRecording
 from steelyard.logs.team_track import Track
 from steelyard.team.adjoint import turning_speed
+from steelyard.team.changes.presence import LIGHT, perhaps_idle, usual_pushes
 from steelyard.team.clocks.errors import NOTHING, PUNCTUAL, ClockError, ClockErrors, Errors, Step
+from steelyard.team.clocks.shifts import LARGEST_S, LEAST_S, LEFT, STEP_S, WIDTH, Split, best_split, costs, lines
 
-# Shifts are looked for up to so many seconds, and a share of the recording, in steps, and jumps by so much about the
-# one that fits best throughout; speeds are those over OVER_S.
-FARTHEST_S, SHARE, STEP_S, OVER_S = 2.0, 0.25, 0.01, 0.05
-LARGEST_S = 0.7
-# Times at which a clock may have jumped [s] apart, and how long a part must be at least [s].
-BIN_S, LEAST_S = 0.1, 2.5
-# By how much [s] a clock that is called must have jumped; either part's own shift leaves less by this factor than the
-# other's; both together leave less than a shift that grows steadily; and robots turn alike but for this share.
-JUMPS_S, FITS, BETTER, LEFT = 0.025, 2.0, 1.1, 0.5
+# Shifts are looked for up to so many seconds, and a share of the recording; speeds are those over OVER_S.
+FARTHEST_S, SHARE, OVER_S = 2.0, 0.25, 0.05
 # Clocks that drift apart by so much [s] over a recording, up to this rate, are put right before the fit: where one
 # shift leaves more than this share of how the speed varies, and so many times what one leaves that grows, in so many
 # bins.
 DRIFTS_S, FASTEST, ROUGH, DRIFTING, FEW_BINS = 0.04, 0.015, 0.002, 1.3, 200
-_WIDTH = round(BIN_S / STEP_S)
 # Jumps of one recording.
 MOST = 3
 
@@ -58,7 +52,8 @@ def cut_at_jumps(log: TeamLog, drifts: bool = False) -> tuple[TeamLog, ClockErro
 
     drifts  whether stamps of clocks that run so fast or slow that a fit would not find its way are put right, too
     """
-    made = [part for r in log.recordings for part in _parts(log, r, MOST, drifts)]
+    usual = usual_pushes(log)
+    made = [part for r in log.recordings for part in _parts(log, r, MOST, drifts, usual)]
     errors = ClockErrors(tuple(late for _, late in made))
     if not errors:
         return log, NOTHING
@@ -66,11 +61,13 @@ def cut_at_jumps(log: TeamLog, drifts: bool = False) -> tuple[TeamLog, ClockErro
     return errors.corrected(cut), errors
 
 
-def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> list[tuple[TeamRecording, Errors]]:
+def _parts(
+    log: TeamLog, recording: TeamRecording, most: int, drifts: bool, usual: Mapping[str, float]
+) -> list[tuple[TeamRecording, Errors]]:
     """Return a recording, or its parts, each with what clocks are late by that run fast or jumped before it."""
     if recording.kind == "still":
         return [(recording, {})]
-    pairs = dict(_pairs(recording, log.reference, log.others))
+    pairs = dict(_pairs(recording, log.reference, log.others, usual))
     for name in pairs if most else ():
         jump = pairs[name].jump()
         if jump is None:
@@ -83,9 +80,9 @@ def _parts(log: TeamLog, recording: TeamRecording, most: int, drifts: bool) -> l
             more = {jump.name: ClockError(jump.after - jump.before) for jump in jumps}
             later = [
                 (r, {n: more.get(n, PUNCTUAL) + late.get(n, PUNCTUAL) for n in {*more, *late}})
-                for r, late in _parts(log, second, most - 1, drifts)
+                for r, late in _parts(log, second, most - 1, drifts, usual)
             ]
-            return [*_parts(log, first, most - 1, drifts), *later]
+            return [*_parts(log, first, most - 1, drifts, usual), *later]
     found = ((name, pair.drift()) for name, pair in pairs.items() if drifts)
     return [(recording, {name: drift for name, drift in found if drift is not None})]
 
@@ -134,7 +131,8 @@ def _alike(jump: Jump, others: Iterable[Jump | None]) -> Iterator[Jump]:
 class _Pair:
     """How fast two robots turn, x and y (T,) from `begin` [s] on, and what shifts within `far` leave of it.
 
-    cost  (2 far + 1, K) squares that every shift of y leaves of every bin, of `width` steps
+    cost   (2 far + 1, K) squares that every shift of y leaves of every bin, of `width` steps
+    light  (T,) where either may hold nothing
     """
 
     recording: TeamRecording
@@ -146,17 +144,28 @@ class _Pair:
     far: int
     width: int
     cost: Array
+    light: Mask
 
     def jump(self) -> Jump | None:
-        """Return where the clock surely jumps beside the reference's, None where it does not."""
-        usual = int(self.cost.sum(1).argmin()) - self.far
-        splits = [_split(self.x, self.y, common, round(LARGEST_S / STEP_S)) for common in {0, usual}]
-        best = min((split for split in splits if split is not None), key=lambda split: split.left, default=None)
-        if best is None or not best.sure:
+        """Return where the clock surely jumps beside the reference's, None where it does not.
+
+        Who holds nothing for a while turns as he likes: the time in which both surely hold the payload must show it.
+        """
+        best = self._best(self.x, self.y)
+        if best is not None and self.light.any():
+            best = self._best(*(np.where(self.light, np.nan, speed) for speed in (self.x, self.y)))
+        if best is None:
             return None
         own, other = (self.recording.tracks[n] for n in (self.reference, self.name))
         last, first = _place(own, other, self.begin + best.at, best.before, best.after)
         return Jump(self.name, last, first, best.before, best.after)
+
+    def _best(self, x: Array, y: Array) -> Split | None:
+        """Return the best split of two speeds (T,), NaN where they tell nothing, if it is sure."""
+        usual = int(self.cost.sum(1).argmin()) - self.far
+        splits = [best_split(x, y, common, round(LARGEST_S / STEP_S)) for common in {0, usual}]
+        best = min((split for split in splits if split is not None), key=lambda split: split.left, default=None)
+        return best if best is not None and best.sure else None
 
     def drift(self) -> ClockError | None:
         """Return how the clock surely runs fast or slow beside the reference's, so much that no fit would follow."""
@@ -168,78 +177,33 @@ class _Pair:
             return None
         bins, bin_s = self.cost.shape[1], STEP_S * self.width
         seconds = bin_s * (bins - 1)
-        least, start, grows = min(_lines(self.cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far)))
+        least, start, grows = min(lines(self.cost, min(int(FASTEST * seconds / STEP_S), 2 * self.far)))
         if abs(grows) * STEP_S < DRIFTS_S or least > LEFT * total or usual < DRIFTING * least:
             return None
         middle = self.begin + STEP_S * self.far + 0.5 * bin_s * bins
         return ClockError(STEP_S * (start - self.far), STEP_S * grows / seconds, middle)
 
 
-def _pairs(recording: TeamRecording, reference: str, others: Sequence[str]) -> Iterator[tuple[str, _Pair]]:
+def _pairs(
+    recording: TeamRecording, reference: str, others: Sequence[str], usual: Mapping[str, float]
+) -> Iterator[tuple[str, _Pair]]:
     """Yield the pair of each robot and the reference of which enough is known."""
     begin, end = recording.span
     far = round(min(FARTHEST_S, SHARE * (end - begin)) / STEP_S)
     time = np.arange(begin, end - OVER_S, STEP_S)
     if reference not in recording.tracks or len(time) * STEP_S < 2 * (LEAST_S + LARGEST_S):
         return
-    x = _speed(recording.tracks[reference], time)
+    own = recording.tracks[reference]
+    x, light = _speed(own, time), _light(own, time, usual.get(reference, 0.0))
     if x is None:
         return
-    width = _WIDTH * -(-((len(x) - 2 * far) // _WIDTH) // FEW_BINS)
+    width = WIDTH * -(-((len(x) - 2 * far) // WIDTH) // FEW_BINS)
     for name in others:
-        y = _speed(recording.tracks[name], time) if name in recording.tracks else None
-        if y is not None:
-            yield name, _Pair(recording, reference, name, begin, x, y, far, width, _costs(x, y, far, width))
-
-
-@dataclass(frozen=True)
-class _Split:
-    """Two shifts [s] that together fit best, `before` the time `at` [s] and `after` it.
-
-    left    share of how the speed varies that they leave
-    fits    how many times as much either part is left by the other's shift, the lesser of the two
-    both    what they leave in all, of `cost`
-    cost    (S, K) what every shift leaves of every bin
-    """
-
-    at: float
-    before: float
-    after: float
-    left: float
-    fits: float
-    both: float
-    cost: Array
-
-    @property
-    def sure(self) -> bool:
-        far = abs(self.after - self.before) > JUMPS_S
-        if not (far and self.fits > FITS and self.left < LEFT):
-            return False
-        # A shift that grows or falls steadily, by up to all that is looked for, leaves much more.
-        return min((left for left, _, _ in _lines(self.cost, len(self.cost) - 1)), default=np.inf) > BETTER * self.both
-
-
-def _split(x: Array, y: Array, common: int, most: int) -> _Split | None:
-    """Return the best split of two speeds (T,), by shifts within `most` steps of one that they have in common."""
-    begin = most + max(-common, 0)
-    x, y = x[max(-common, 0) :], y[max(common, 0) :]
-    x, y = x[: len(y)], y[: len(x)]
-    ends = round(LEAST_S / BIN_S)
-    if len(x) * STEP_S < 2 * (LEAST_S + LARGEST_S) + BIN_S:
-        return None
-    cost, inner = _costs(x, y, most, _WIDTH), x[most:-most]
-    least = 1e-12 * float(inner @ inner) + 1e-300
-    sums = np.cumsum(cost, axis=1)
-    rest = sums[:, -1:] - sums
-    at = int((sums.min(0) + rest.min(0))[ends:-ends].argmin()) + ends
-    i, j = int(sums[:, at].argmin()), int(rest[:, at].argmin())
-    one, two = (max(float(value), least) for value in (sums[i, at], rest[j, at]))
-    before, after = (STEP_S * (k - most + common) for k in (i, j))
-    return _Split(
-        STEP_S * begin + BIN_S * (at + 1), before, after,
-        (one + two) / float(((inner - inner.mean()) ** 2).sum() + least),
-        min(sums[j, at] / one, rest[i, at] / two), one + two, cost,
-    )  # fmt: skip
+        track = recording.tracks.get(name)
+        y = None if track is None else _speed(track, time)
+        if track is not None and y is not None:
+            either = light | _light(track, time, usual.get(name, 0.0))
+            yield name, _Pair(recording, reference, name, begin, x, y, far, width, costs(x, y, far, width), either)
 
 
 def _speed(track: Track, time: Array) -> Array | None:
@@ -249,38 +213,9 @@ def _speed(track: Track, time: Array) -> Array | None:
     return np.interp(time, time[good], speed[good]) if good.sum() > 0.5 * len(time) else None
 
 
-@njit(cache=True)
-def _costs(x: Array, y: Array, most: int, width: int) -> Array:
-    """Return the squares (S, K) left between two speeds at every shift, summed over bins of `width` steps."""
-    count, shifts = (len(x) - 2 * most) // width, 2 * most + 1
-    out, total = np.empty((shifts, count)), np.empty(shifts)
-    # Shifts innermost: their sums do not wait for one another.
-    for k in range(count):
-        total[:] = 0.0
-        for t in range(k * width, (k + 1) * width):
-            here, there = x[most + t], y[t : t + shifts]
-            for shift in range(shifts):
-                off = here - there[shift]
-                total[shift] += off * off
-        for shift in range(shifts):
-            out[shift, k] = total[shift]
-    return out
-
-
-def _lines(cost: Array, most: int) -> Iterator[tuple[float, int, int]]:
-    """Yield what shifts leave that grow by so much [steps] over the bins, for all up to `most`: least, start, growth.
-
-    cost  (S, K) what every shift leaves of every bin
-    """
-    shifts, bins = cost.shape
-    along, where = np.linspace(-0.5, 0.5, bins), np.arange(bins)
-    for grows in np.arange(-(most // 2) * 2, most + 1, 2):
-        rows = np.round(grows * along).astype(np.int64)
-        starts = np.arange(-rows.min(), shifts - rows.max())
-        if len(starts):
-            left = cost[starts[:, None] + rows, where].sum(1)
-            best = int(left.argmin())
-            yield float(left[best]), int(starts[best]), int(grows)
+def _light(track: Track, time: Array, usual: float) -> Mask:
+    """Return when (T,) a robot may hold nothing, by its `usual` push [N]."""
+    return np.asarray(np.interp(time, track.time, perhaps_idle(track, LIGHT, usual)) > 0)
 
 
 def _place(own: Track, other: Track, near: float, before: float, after: float) -> tuple[float, float]:

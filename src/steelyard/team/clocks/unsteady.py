@@ -20,8 +20,8 @@ from steelyard.check import FAILURES, Array, Integers
 from steelyard.logs.runs import distinct_rows
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.clocks.errors import NOTHING, ClockError, ClockErrors, Step
-from steelyard.team.clocks.jumps import LEAST_S as PART_S
 from steelyard.team.clocks.jumps import MOST, cut_at_step
+from steelyard.team.clocks.shifts import LEAST_S as PART_S
 from steelyard.team.motion_fit import F
 from steelyard.team.scores import Scores
 from steelyard.team.stacked import Stretch
