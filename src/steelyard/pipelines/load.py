@@ -64,7 +64,9 @@ class Load:
         estimate = replace(estimate, notes=(*notes, *estimate.notes))
         if self.shape is None:
             return estimate
-        light = maybe_hollow(self.shape.error, estimate, self.shape.cuts)
+        cuts = self.shape.cuts
+        per_mass = next((cut.per_mass for cut in cuts if len(cut) == len(estimate.parts)), None)
+        light = maybe_hollow(self.shape.error, estimate, float(cuts[0].volume.sum()), per_mass)
         if not light:
             return estimate
         error, note = light

@@ -14,6 +14,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.evidence import PartMass
 from steelyard.findings import Finding
@@ -22,7 +23,6 @@ from steelyard.identify.masses.shape_error import HOLLOW, ShapeError
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.logs.recording import INCH, ROUNDED_GRAVITY
-from steelyard.parts.parts import Parts
 from steelyard.sanity.aside import stands_aside
 from steelyard.sanity.readings.levers import UNITS
 
@@ -177,24 +177,26 @@ def _left(identify: Callable[[MotionLog], Estimate], log: MotionLog, times: floa
     return np.inf if chi2 is None else chi2
 
 
-def maybe_hollow(error: ShapeError, estimate: Estimate, cuts: Sequence[Parts]) -> tuple[ShapeError, str] | None:
+def maybe_hollow(
+    error: ShapeError, estimate: Estimate, volume: float, per_mass: Array | None
+) -> tuple[ShapeError, str] | None:
     """Return how wrong a scan may be about inertia, being light or light in parts, and why; None where it is not.
 
-    cuts  of the scan into parts, in S; the parts of the estimate are those of one of them
+    volume    of the whole [m^3]
+    per_mass  (10, P) parameters in S of 1 kg of each of the estimate's parts; None where they are not told apart
 
     A mesh that is given is taken to be solid: its user knows.
     """
     if not 0 < error.stretch < HOLLOW or error.hollow:
         return None
-    density = estimate.mass / float(cuts[0].volume.sum())
+    density = estimate.mass / volume
     if LIGHTEST < density < LIGHT:
         return error.at_least(0.0, HOLLOW), f"{density:.3g} kg/m^3 {_LIGHT_SOLID}; the shape {_TRUSTED} in them"
-    cut = next((cut for cut in cuts if len(cut) == len(estimate.parts)), None)
     light = [k for k, part in enumerate(estimate.parts) if _clearly_light(part)]
-    if cut is None or not light:
+    if per_mass is None or not light:
         return None
     parts = [estimate.parts[k] for k in light]
-    hollow = tuple(InertialParameters(cut.per_mass[:, k] * estimate.parts[k].mass) for k in light)
+    hollow = tuple(InertialParameters(part.mass * per_mass[:, k]) for k, part in zip(light, parts, strict=True))
     named = " and ".join(f"part {part.label} with {part.density:.3g} kg/m^3" for part in parts)
     return replace(error, hollow=hollow), f"{named} {_LIGHT_SOLID}; the shape of such a part {_TRUSTED} in its own"
 
