@@ -140,9 +140,11 @@ def leave_out(columns: Array, values: Array, block: Integers) -> tuple[Array, Ar
 
 def _least_norm(matrix: Array, vector: Array) -> Array:
     """Return the least-norm solution after scaling the columns to one."""
+    size = float(np.trace(matrix))
+    if not size > 1e-200:
+        return np.zeros(len(vector))
     # Columns of less than this share of all squares say nothing.
-    floor = 1e-12 * float(np.trace(matrix))
-    return np.asarray(inverse_scaled(matrix + floor * np.eye(len(matrix)), 1e-6) @ vector)
+    return np.asarray(inverse_scaled(matrix + 1e-12 * size * np.eye(len(vector)), 1e-6) @ vector)
 
 
 def masses_at_a_glance(view: Glance, gravity: Array, rotation: Array) -> tuple[Array, Array, float]:
