@@ -17,8 +17,8 @@ from steelyard.findings import Finding
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.masses import density_priors
-from steelyard.identify.people import NAMES, half_trace_com
 from steelyard.inertia import forms
+from steelyard.inertia.people import NAMES, half_trace_com
 from steelyard.parts.parts import Parts
 
 # What small dense parts are of, near enough [kg/m^3]; parts with more than half of that are dense as they are.
