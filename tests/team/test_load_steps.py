@@ -58,6 +58,15 @@ def test_a_load_that_changes_in_a_motion_is_told_and_left_out(scene: dict[str, o
     assert off(found, made) < 4
 
 
+@pytest.mark.parametrize("share", [0.37, -0.2])
+def test_a_load_that_makes_a_sign_look_flipped_is_a_load(share: float) -> None:
+    made = trial(robots=2, kinds=("motion",), **TWISTS)  # type: ignore[arg-type]
+    found = JointTeam().identify(loaded(made, share * made.truth.body.mass, since=18.0))
+    assert found.codes() & LOADED
+    assert "wrench-sign-flipped" not in found.codes()
+    assert off(found, made) < 4
+
+
 def test_what_the_other_recordings_weigh_is_the_payload_though_it_is_the_shorter_part() -> None:
     made = trial(kinds=("still", "motion"), **MOTION)
     found = JointTeam().identify(loaded(made, 1.3, since=0.0, until=17.0))

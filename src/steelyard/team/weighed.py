@@ -104,7 +104,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     standing, propped = unpropped(seen.rows, fitted, summing(placed), highest_hz)
     rows, begun, late = with_timely_forces(standing, fitted(standing), fitted, highest_hz)
-    rows, alike, loaded = with_one_load(rows, begun, fitted, size, highest_hz)
+    rows, alike, loaded = with_one_load(rows, begun, fitted, summing(placed), size, highest_hz)
     first, touched = untouched(rows, alike, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
@@ -114,7 +114,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         _require_mass(payload)
         require_lift(float(payload.parameters[0]), "the forces")
     told = any(one.code in TOLD for one in (*seen.findings, *read))
-    wrong = () if told else tuple(unexplained(payload, D, log.names))
+    wrong = () if told else tuple(unexplained(payload, D, log.names, placed=not spread.blind.size))
     if wrong:
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
     if late is not None:

@@ -1,9 +1,9 @@
 """A payload that is another one from some time on: a thing put on it, taken from it, or let go by a robot nobody logs.
 
-What the fit leaves of a recording in motion is asked for a step of mass and first moment at every time, beside those of
-the whole recording, a bias, and a drift:
+What robots push in a recording in motion is asked for a step D of mass and first moment at every time, beside the ten
+parameters of the whole recording, a bias, and a drift:
 
-    left(t) = Y(t) d + b + c t + Y(t) D [t >= s]
+    pushed(t) = Y(t) phi + b + c t + Y(t) D [t >= s]
 
 A step of the sensors' bias at the same time must explain less: it does not turn with gravity. Either part may be the
 body that the other recordings weigh; alone, the longer one is.
@@ -19,10 +19,10 @@ from steelyard.check import Array, Mask
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding
 from steelyard.inertia.regressor import motion_map
+from steelyard.logs.recording import ROUNDED_GRAVITY
 from steelyard.team.changes.contact import MARGIN_S, mean_left
 from steelyard.team.payload.body_rows import BodyRows, PayloadRows, Run
 from steelyard.team.payload.fit import Fitted, Weighing
-from steelyard.team.payload.model import weight
 
 # Wrenches are averaged over BLOCK_S, and either part lasts LEAST_S [s].
 BLOCK_S, LEAST_S = 0.5, 3.0
@@ -31,8 +31,6 @@ BLOCK_S, LEAST_S = 0.5, 3.0
 SHARE, BEYOND, LEAVES = 0.08, 12.0, 0.7
 # The shorter part is the payload where recordings then disagree less by this factor.
 BETTER = 2.0
-# Of ten parameters: mass and first moments.
-WEIGHING = np.eye(10)[:4]
 
 
 @dataclass(frozen=True)
@@ -44,15 +42,16 @@ class LoadStep:
 
 
 def with_one_load(
-    rows: PayloadRows, fit: Weighing, fitted: Fitted, size: float, highest_hz: float
+    rows: PayloadRows, fit: Weighing, fitted: Fitted, D: Array, size: float, highest_hz: float
 ) -> tuple[PayloadRows, Weighing, tuple[Finding, ...]]:
     """Return rows and fit without the part of each recording in which the payload was another, and what is said of it.
 
-    Where forces are misread nothing is asked, and nothing is left out that the parameters hang on. size  of the team
+    Another load may make forces look misread, and is believed where they then are not; nothing is left out that the
+    parameters hang on. D  (6, 6 N) sums the pushes at B as they are given     size  of the team [m]
     """
     found = list[Finding]()
     for k, (body, left) in enumerate(rows):
-        step = None if fit.read or body.still else load_step(body, fit, size)
+        step = None if body.still else load_step(body, D, size)
         if step is None:
             continue
         parts = []
@@ -63,7 +62,7 @@ def with_one_load(
                 again = fitted(tried)
             except CannotAnswer:
                 continue
-            if again.payload.lost.shape[1] <= fit.payload.lost.shape[1]:
+            if not again.read and again.payload.lost.shape[1] <= fit.payload.lost.shape[1]:
                 parts.append((sum(len(run.motion) for run in kept.runs), later, tried, again))
         if not parts:
             continue
@@ -75,35 +74,36 @@ def with_one_load(
     return rows, fit, tuple(found)
 
 
-def load_step(body: BodyRows, fit: Weighing, size: float) -> LoadStep | None:
-    """Return when the payload of a recording surely becomes another, None where it does not."""
-    blocks = [_blocks(run, fit, size) for run in body.runs]
+def load_step(body: BodyRows, D: Array, size: float) -> LoadStep | None:
+    """Return when the payload of a recording surely becomes another, None where it does not.
+
+    D  (6, 6 N) sums the pushes at B     size  of the team [m]
+    """
+    blocks = [_blocks(run, D, size) for run in body.runs]
     if not blocks:
         return None
-    time, left, weighing = (np.concatenate(each) for each in zip(*blocks, strict=True))
-    order = np.argsort(time)
-    time, left, weighing = time[order], left[order], weighing[order]
-    bias = np.broadcast_to(np.eye(6), (len(time), 6, 6))
-    drift = bias * ((time - time.mean()) / max(np.ptp(time), 1e-9))[:, None, None]
-    always = np.concatenate([weighing, bias, drift], axis=2)
+    time, pushed, needed = (np.concatenate(each) for each in zip(*blocks, strict=True))
     allowed = (time - time[0] >= LEAST_S) & (time[-1] - time >= LEAST_S)
     if not allowed.any():
         return None
-    squares, H, steps, whole = _steps(left, always, weighing)
-    jumps, *_ = _steps(left, always, bias)
-    at = int(np.where(allowed, squares, np.inf).argmin())
-    noise = squares[at] / max(left.size - always.shape[2] - 4, 1)
+    bias = np.broadcast_to(np.eye(6), (len(time), 6, 6))
+    drift = bias * ((time - time.mean()) / np.ptp(time))[:, None, None]
+    always = np.concatenate([needed, bias, drift], axis=2)
+    left, H, steps, whole = _steps(pushed, always, needed[..., :4])
+    jumps, *_ = _steps(pushed, always, bias)
+    at = int(np.where(allowed, left, np.inf).argmin())
+    noise = left[at] / max(pushed.size - always.shape[2] - 4, 1)
     more = float(steps[at, 0])
     std = float(np.sqrt(max(np.linalg.pinv(H[at], hermitian=True)[0, 0], 0.0) * noise))
-    heavy = weight(fit.payload.parameters) * SHARE
-    sure = abs(more) > BEYOND * std and weight(np.eye(10)[0] * abs(more)) > heavy
-    if not sure or squares[at] > LEAVES * whole or jumps[allowed].min() < squares[at]:
+    heavy = SHARE * float(np.sqrt((pushed[:, 3:] ** 2).sum(1).mean()))
+    sure = abs(more) > BEYOND * std and ROUNDED_GRAVITY * abs(more) > heavy
+    if not sure or left[at] > LEAVES * whole or jumps[allowed].min() < left[at]:
         return None
     return LoadStep(float(time[at]) - 0.5 * BLOCK_S, more)
 
 
-def _blocks(run: Run, fit: Weighing, size: float) -> tuple[Array, Array, Array]:
-    """Return by blocks of a run time (B,) [s], what is left (B, 6) and what masses and first moments make (B, 6, 4).
+def _blocks(run: Run, D: Array, size: float) -> tuple[Array, Array, Array]:
+    """Return by blocks of a run time (B,) [s], what is pushed (B, 6), and what each parameter needs (B, 6, 10).
 
     Moments are over size.
     """
@@ -111,19 +111,17 @@ def _blocks(run: Run, fit: Weighing, size: float) -> tuple[Array, Array, Array]:
     count = len(run.motion) // length
     motion, pushed = (x[: count * length].reshape(count, length, -1).mean(1) for x in (run.motion, run.pushed))
     unit = np.repeat([size, 1.0], 3)
-    left = (pushed @ fit.D.T - motion @ motion_map(fit.payload.parameters).T) / unit
-    made = np.stack([motion @ motion_map(one).T for one in WEIGHING], axis=2) / unit[:, None]
-    return (run.rows.start + length * (np.arange(count) + 0.5)) / run.rate, left, made
+    needed = np.stack([motion @ motion_map(one).T for one in np.eye(10)], axis=2) / unit[:, None]
+    return (run.rows.start + length * (np.arange(count) + 0.5)) / run.rate, pushed @ D.T / unit, needed
 
 
-def _steps(left: Array, always: Array, steps: Array) -> tuple[Array, Array, Array, float]:
+def _steps(pushed: Array, always: Array, steps: Array) -> tuple[Array, Array, Array, float]:
     """Return what steps from every block on leave: squares (B,), information (B, S, S), sizes (B, S); and none at all.
 
-    left  (B, 6)     always  (B, 6, P) what is fitted beside     steps  (B, 6, S)
+    pushed  (B, 6)     always  (B, 6, P) what is fitted beside     steps  (B, 6, S)
     """
     inverse = np.linalg.pinv(np.einsum("bip,biq->pq", always, always), hermitian=True)
-    known = inverse @ np.einsum("bip,bi->p", always, left)
-    rest = left - always @ known
+    rest = pushed - always @ (inverse @ np.einsum("bip,bi->p", always, pushed))
     after = [
         np.cumsum(x[::-1], axis=0)[::-1]
         for x in (
@@ -152,7 +150,7 @@ def _disagree(fit: Weighing, size: float) -> float:
 def _finding(body: BodyRows, step: LoadStep, later: bool) -> Finding:
     """Return load-changed where the robots bear more than what is weighed, contact where they bear less."""
     more = -step.more if later else step.more
-    size = f"{weight(WEIGHING[0] * abs(more)):.2g} N"
+    size = f"{ROUNDED_GRAVITY * abs(more):.2g} N"
     when = f"Up to {step.at:.1f} s of '{body.name}'" if later else f"From {step.at:.1f} s of '{body.name}' on"
     if more > 0:
         what = f"{when} robots bear {size} more than the payload weighs, as where something lies on it"
