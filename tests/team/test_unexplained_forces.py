@@ -14,6 +14,7 @@ from steelyard.logs.team_log import TeamLog
 from steelyard.logs.team_track import Track
 from steelyard.simulate.team import simulate_team
 from steelyard.simulate.team_cases import CASES, TeamNoise, TeamScene
+from steelyard.simulate.team_motions import Freedom
 from steelyard.spatial import Rotation
 from steelyard.team.joint import JointTeam
 
@@ -129,3 +130,13 @@ def test_noise_of_sensors_is_not(noise: str, seed: int) -> None:
         "biased": CASES["D"],
     }
     assert named(simulate_team(scene(kinds[noise]), seed).log) == []
+
+
+@pytest.mark.parametrize("freedom", ["translation", "one_axis"])
+def test_moments_about_grasps_that_nobody_knows_are_not(freedom: str) -> None:
+    """Where the robots hold is open along some directions: what their squeeze then turns is no sensor's fault."""
+    turns = np.zeros((3, 0)) if freedom == "translation" else np.eye(3)[:, :1]
+    kept = replace(scene(), kinds=("motion",), freedom=Freedom(turns, np.eye(3)), six_axis=frozenset({1}))
+    found = JointTeam().identify(simulate_team(replace(kept, squeeze_N=30.0), 1).log)
+    assert "grasp-direction-lost" in found.codes()
+    assert "wrench-unexplained" not in found.codes()

@@ -32,13 +32,13 @@ FEWEST = 20
 NEAR = 0.01
 
 
-def unexplained(fit: PayloadFit, D: Array, names: Sequence[str]) -> Iterator[Finding]:
+def unexplained(fit: PayloadFit, D: Array, names: Sequence[str], placed: bool) -> Iterator[Finding]:
     """Yield wrench-unexplained where forces or moments leave so much; names whoever explains it.
 
-    D  (6, 6 N) sums the pushes at B
+    D  (6, 6 N) sums the pushes at B     placed  whether it is known where all grasps are: if not, moments say nothing
     """
     size = float(fit.scale[1] / fit.scale[0])
-    for found in list(_forces(fit, D, names)) or _moments(fit, D, names):
+    for found in list(_forces(fit, D, names)) or (_moments(fit, D, names) if placed else ()):
         yield _with_lengths(found, size) if size < NEAR else found
 
 

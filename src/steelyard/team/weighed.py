@@ -14,6 +14,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import TeamLog
 from steelyard.team.assembled import assembled, consistent, team_size
 from steelyard.team.changes.contact import unpropped, untouched, without_odd
+from steelyard.team.changes.load_steps import with_one_load
 from steelyard.team.clocks.errors import ClockErrors, Errors
 from steelyard.team.estimate import TeamEstimate
 from steelyard.team.mass_and_com import WITHOUT_WRISTS, require_lift
@@ -103,7 +104,8 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
 
     standing, propped = unpropped(seen.rows, fitted, summing(placed), highest_hz)
     rows, begun, late = with_timely_forces(standing, fitted(standing), fitted, highest_hz)
-    first, touched = untouched(rows, begun, fitted, size, highest_hz)
+    rows, alike, loaded = with_one_load(rows, begun, fitted, summing(placed), size, highest_hz)
+    first, touched = untouched(rows, alike, fitted, size, highest_hz)
     groups, D, C, read, payload = first.groups, first.D, first.C, first.read, first.payload
     payload, odd = without_odd(payload, groups, D, C, size, with_gain)
     payload, home_bias = with_home_bias(payload, D, C, placed.position[~six_axis], with_gain)
@@ -112,7 +114,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         _require_mass(payload)
         require_lift(float(payload.parameters[0]), "the forces")
     told = any(one.code in TOLD for one in (*seen.findings, *read))
-    wrong = () if told else tuple(unexplained(payload, D, log.names))
+    wrong = () if told else tuple(unexplained(payload, D, log.names, placed=not spread.blind.size))
     if wrong:
         payload = replace(payload, covariance=payload.covariance + covariance_of_unexplained(payload))
     if late is not None:
@@ -135,6 +137,7 @@ def weighed(seen: Seen, wrists: Mapping[str, float], with_gain: bool, highest_hz
         *(() if late is None else late.findings(log.names)),
         *seen.findings,
         *propped,
+        *loaded,
         *touched,
         *odd,
         *(gains(payload.gain, payload.gainless) if known else ()),

@@ -195,13 +195,13 @@ def without_odd(
     """
     parts = [part for group in groups for part in group.parts]
     heavy, odd, fit = weight(payload.parameters), list[int](), payload
-    left = _left(payload.parameters, parts, D, size)
+    left = mean_left(payload.parameters, parts, D, size)
     if len(parts) < FEWEST or left.max() < max(SHARE * heavy / 2, SUSPECT * float(np.median(left))):
         return payload, ()
     while len(odd) + 1 <= MOST_ODD * len(parts):
         odd.append(int(np.argmax(np.where(np.isin(np.arange(len(parts)), odd), 0.0, left))))
         fit = fit_payload(_without(groups, [parts[k] for k in odd]), D, C, size, with_gain)
-        left = _left(fit.parameters, parts, D, size)
+        left = mean_left(fit.parameters, parts, D, size)
         others = float(np.sqrt((np.delete(left, odd) ** 2).mean()))
         if fit.lost.shape[1] > payload.lost.shape[1]:
             break
@@ -216,7 +216,7 @@ def _without(groups: tuple[Group, ...], odd: list[Spectra]) -> tuple[Group, ...]
     return tuple(group for group in kept if group.parts)
 
 
-def _left(phi: Array, parts: list[Spectra], D: Array, size: float) -> Array:
+def mean_left(phi: Array, parts: Sequence[Spectra], D: Array, size: float) -> Array:
     """Return the size (R,) [N] of the mean wrench that every recording leaves, moments over the team's size."""
     each = np.array([_mean_wrench(phi, part, D) for part in parts])
     return np.asarray(np.linalg.norm(each / np.repeat([size, 1.0], 3), axis=1))
