@@ -23,7 +23,6 @@ from steelyard.identify.bars.effective import Effective
 from steelyard.identify.conclude import conclude, widened
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
-from steelyard.identify.masses.denser import reaching_denser
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
 from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses
@@ -199,8 +198,6 @@ class PartMasses:
             words = elsewhere(data, self.parts.whole(masses.mean), self.parts, self.shape_error)
             findings += [Finding.of("part-not-homogeneous", words)] if words else []
         if not any(f.code == "part-not-homogeneous" for f in findings):
-            by_prior = self.density == "averaged" and not self.materials
-            first = reaching_denser(first, self.parts, seen) if by_prior else first
             return first.with_findings(*findings)
         # Masses of parts that cannot be right say nothing of which is zero.
         said = [f for f in findings if f.code != "part-zero-mass"]
