@@ -90,14 +90,16 @@ def load_step(body: BodyRows, D: Array, size: float) -> LoadStep | None:
     drift = bias * ((time - time.mean()) / np.ptp(time))[:, None, None]
     always = np.concatenate([needed, bias, drift], axis=2)
     left, H, steps, whole = _steps(pushed, always, needed[..., :4])
-    jumps, *_ = _steps(pushed, always, bias)
     at = int(np.where(allowed, left, np.inf).argmin())
     noise = left[at] / max(pushed.size - always.shape[2] - 4, 1)
     more = float(steps[at, 0])
     std = float(np.sqrt(max(np.linalg.pinv(H[at], hermitian=True)[0, 0], 0.0) * noise))
     heavy = SHARE * float(np.sqrt((pushed[:, 3:] ** 2).sum(1).mean()))
     sure = abs(more) > BEYOND * std and ROUNDED_GRAVITY * abs(more) > heavy
-    if not sure or left[at] > LEAVES * whole or jumps[allowed].min() < left[at]:
+    if not sure or left[at] > LEAVES * whole:
+        return None
+    jumps, *_ = _steps(pushed, always, bias)
+    if jumps[allowed].min() < left[at]:
         return None
     return LoadStep(float(time[at]) - 0.5 * BLOCK_S, more)
 
