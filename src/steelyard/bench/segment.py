@@ -12,7 +12,7 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from steelyard.bench.asked import Progress
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.datasets.known_object import KnownObject
 from steelyard.errors import BadValue
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
@@ -22,7 +22,6 @@ from steelyard.parts.clustering import cluster
 from steelyard.parts.segment import Segmentation, coloured_pieces, nearest_cell, parts_of_pieces
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import oriented
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.volume import enclose

@@ -14,14 +14,14 @@ from scipy.spatial import ConvexHull, Delaunay, cKDTree
 from steelyard.bench.shapes import hull_sets
 from steelyard.bench.shapes.plain_clustering import plain_cluster
 from steelyard.bench.timing import REPEATS, thread_ms
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.parts.clustering import cluster
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.shape.hull import TOLERANCE, HullWork, hull_volume, hull_work, qhull
 from steelyard.shape.inside import inside
-from steelyard.shape.mesh import Integers, TriangleMesh
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import body_of
 from steelyard.shape.pairs import joined
 from steelyard.shape.tets import TetMesh

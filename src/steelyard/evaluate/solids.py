@@ -7,9 +7,9 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.datasets.known_object import KnownObject
-from steelyard.shape.mesh import Integers, TriangleMesh, part_moments
+from steelyard.shape.mesh import TriangleMesh, part_moments
 from steelyard.shape.tets import TetMesh
 
 SAMPLES = 150_000

@@ -7,11 +7,10 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.parts.light import Light, light_on
 from steelyard.parts.skin import OPPOSITE, Skin
 from steelyard.shape.eight_bits import Colours
-from steelyard.shape.mesh import Integers
 from steelyard.spatial import summed, unit_vectors
 
 NEIGHBOURS = 8

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from steelyard.check import Integers
 from steelyard.findings import Finding
 from steelyard.parts.description import Cuts
 from steelyard.parts.hierarchy import Hierarchy
-from steelyard.shape.mesh import Integers
 
 SURE = 0.4  # share of the chosen number below which it is the true one in a seventh of the cases
 _NAMED = 3  # numbers of parts in the message

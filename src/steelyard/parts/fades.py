@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.parts.colours import ColourModes
 from steelyard.parts.prints import patches
 from steelyard.parts.skin import Skin
-from steelyard.shape.mesh import Integers
 
 FADES = 0.2  # share of the points within two steps of a border that lie on the way, neither here nor there
 SPREAD = 0.1  # of those on the way that lie in each third of it

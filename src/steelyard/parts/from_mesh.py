@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.parts.interior import Interior
 from steelyard.parts.parts import Parts
-from steelyard.shape.mesh import Integers, TriangleMesh
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import Solids, solids_of
 
 

@@ -9,9 +9,8 @@ from functools import cached_property
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Integers
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,10 +14,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.parts.skin import Skin
 from steelyard.shape.cells.cut_cells import crossing_edges, cut_cells
-from steelyard.shape.mesh import Integers
 from steelyard.shape.pairs import distinct_pairs, joined
 from steelyard.shape.tets import TetMesh
 

@@ -14,8 +14,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 
 _TURNED = 0.15  # between the normals of a pair, for it to tell of the light
 _LIGHT_SEEN = 0.1  # weaker shading is below the difference of two colours

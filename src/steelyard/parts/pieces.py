@@ -7,10 +7,9 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.parts.groups import root
 from steelyard.parts.skin import Skin
-from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
 PIECE = 1 / 200  # of the volume: a tenth of the finest part that is looked for

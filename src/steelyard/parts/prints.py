@@ -8,8 +8,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from steelyard.check import Integers
 from steelyard.parts.skin import Skin
-from steelyard.shape.mesh import Integers
 from steelyard.shape.pairs import joined
 from steelyard.spatial import summed
 

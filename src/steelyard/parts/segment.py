@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.parts.colours import colour_modes
@@ -31,7 +31,6 @@ from steelyard.parts.seams import seam_tree
 from steelyard.parts.skin import Skin, skin_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
-from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import area_vectors, summed
 

@@ -7,8 +7,7 @@ from functools import cached_property
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import area_vectors, summed, unit_vectors

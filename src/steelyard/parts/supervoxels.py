@@ -13,11 +13,10 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.parts.groups import root
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Integers
 from steelyard.shape.sides.tangent_planes import plane_normals
 from steelyard.shape.tets import TetMesh
 

@@ -12,13 +12,12 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.identify.estimate import Estimate
 from steelyard.report.contents import Report
 from steelyard.report.palette import density_colours, hexadecimal, part_colour
 from steelyard.report.scene import Body, Scene
 from steelyard.report.surfaces import corner_normals
-from steelyard.shape.mesh import Integers
 from steelyard.tables.numbers import fixed, mass_unit, principal, round_step
 from steelyard.team.estimate import TeamEstimate
 

@@ -8,11 +8,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.logs.runs import runs
 from steelyard.report.contents import Residuals
 from steelyard.report.markup import Html, tag
-from steelyard.shape.mesh import Integers
 from steelyard.tables.numbers import general, round_step
 
 COLUMNS = 420

@@ -9,12 +9,12 @@ import numpy as np
 from scipy.spatial import cKDTree
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.report.surfaces import compact, evened, part_skins, thinned
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
-from steelyard.shape.mesh import Integers, TriangleMesh
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import Pose, Rotation
 

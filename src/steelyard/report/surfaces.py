@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 from steelyard.shape.points.thinning import cubes
 from steelyard.shape.tets import FACES, TetMesh
 from steelyard.spatial import area_vectors, summed, unit_vectors

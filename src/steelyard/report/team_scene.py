@@ -7,10 +7,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.report.drawing import PAYLOAD, UNSEEN
 from steelyard.report.scene import Body, Scene
-from steelyard.shape.mesh import Integers
 from steelyard.spatial import Pose
 from steelyard.team.estimate import TeamEstimate
 

@@ -15,9 +15,8 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import FACES
 from steelyard.spatial import area_vectors, unit_vectors
 

@@ -4,8 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 from steelyard.spatial import Pose, Rotation
 
 

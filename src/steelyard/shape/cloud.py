@@ -9,11 +9,10 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.eight_bits import Colours, eight_bits
 from steelyard.shape.known_space import Kept
-from steelyard.shape.mesh import Integers
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.spatial import Pose
 

@@ -18,7 +18,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.shape.hulls.borrowed import borrowed, integer
 from steelyard.shape.hulls.hull_faces import (
     FAR,
@@ -35,7 +35,6 @@ from steelyard.shape.hulls.hull_faces import (
     start,
     total,
 )  # fmt: skip
-from steelyard.shape.mesh import Integers
 
 __all__ = ["TOLERANCE", "HullWork", "hull_volume", "hull_work", "qhull"]
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numba
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers, TriangleMesh
+from steelyard.check import Array, Integers
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.spatial import cross
 
 

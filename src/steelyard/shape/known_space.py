@@ -13,10 +13,9 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
-from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import area_vectors
 

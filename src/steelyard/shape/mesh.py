@@ -7,8 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
-from steelyard.check import Integers as Integers
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.shape.eight_bits import Colours, eight_bits

@@ -8,10 +8,10 @@ from itertools import combinations
 import manifold3d
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
-from steelyard.shape.mesh import Integers, TriangleMesh, part_moments, require_closed
+from steelyard.shape.mesh import TriangleMesh, part_moments, require_closed
 
 TOUCHING = 0.02  # of the smaller solid: rounded, faceted surfaces that touch share up to this much
 TOO_MUCH = 0.1  # of the whole: mass counted twice beyond this is no longer a detail

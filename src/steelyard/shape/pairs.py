@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.shape.mesh import Integers
+from steelyard.check import Integers
 
 
 def distinct_pairs(first: Integers, second: Integers, count: int) -> Integers:

@@ -14,11 +14,10 @@ import numpy as np
 from scipy.ndimage import binary_dilation, label, map_coordinates
 from scipy.spatial import Delaunay
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.shape.ball_pivoting import ball_pivoting
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Integers
 from steelyard.shape.pairs import joined
 from steelyard.shape.sides.tangent_planes import tangent_normals
 from steelyard.shape.tets import TetMesh

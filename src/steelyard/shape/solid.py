@@ -6,11 +6,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.filling import Filled
-from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import Oriented
 from steelyard.shape.tets import TetMesh
 from steelyard.shape.working_cloud import WorkingCloud

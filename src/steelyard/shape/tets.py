@@ -9,9 +9,9 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Integers, tetrahedra_moments
+from steelyard.shape.mesh import tetrahedra_moments
 from steelyard.spatial import Pose, cross
 
 # The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.

@@ -7,11 +7,10 @@ from typing import NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.findings import Finding
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Integers
 from steelyard.shape.pairs import joined
 from steelyard.shape.points.known_sides import settled_along
 from steelyard.shape.points.left_table import left_table

@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Integers, TriangleMesh
+from steelyard.shape.mesh import TriangleMesh
 from steelyard.shape.nesting import body_of
 from steelyard.spatial import area_vectors
 from steelyard.workshop.finish import finished

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.datasets.known_object import KnownObject
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.identify.masses.shape_error import ShapeError
@@ -17,7 +17,6 @@ from steelyard.parts.segment import nearest_cell
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.pipelines.shape_in_parts import shape_of
 from steelyard.shape.cloud import Cloud
-from steelyard.shape.mesh import Integers
 from steelyard.shape.published_surface import published_surface
 from steelyard.shape.tets import TetMesh
 

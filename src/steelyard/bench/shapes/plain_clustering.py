@@ -8,11 +8,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.merging import GRAIN
 from steelyard.shape.hull import qhull
-from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 
 Edge = tuple[int, int]

@@ -15,13 +15,12 @@ from typing import Any
 import numpy as np
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadFile, BadValue
 from steelyard.io.contents import in_file
 from steelyard.io.tables.array_table import npz, read_arrays
 from steelyard.parts.hierarchy import Hierarchy
 from steelyard.parts.parts import Parts
-from steelyard.shape.mesh import Integers
 from steelyard.shape.tets import TetMesh
 from steelyard.whole_files import write_bytes
 

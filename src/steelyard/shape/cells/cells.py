@@ -7,8 +7,7 @@ import math
 import numba
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 
 _FLAT = 1e-4  # volume of a cell, over that of a box of its edges, below which it is a flat leftover
 

@@ -7,9 +7,8 @@ from dataclasses import dataclass
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.shape.cells.delaunay import tetrahedra, thinly
-from steelyard.shape.mesh import Integers
 from steelyard.spatial import area_vectors
 
 _NUDGE = 1e-7  # of the diagonal

@@ -13,9 +13,8 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.shape.hulls.borrowed import borrowed, integer
-from steelyard.shape.mesh import Integers
 
 Table = Any  # uint32
 

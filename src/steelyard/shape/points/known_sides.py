@@ -11,8 +11,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array, Mask
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.shape.points.spacing import evenly
 
 # Noise over spacing below which it does little harm. Normals that were fitted to neighbours feign up to 0.22 on points

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 from steelyard.shape.points.spacing import evenly
 
 _REACHES = (1.0, 1.4, 2.0, 2.8)  # of neighbourhoods, in spacings of the points that will be kept

@@ -6,8 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 
 COUNT = 24  # neighbours looked at
 _CLOSE = 12  # neighbours that give the spacing

@@ -7,8 +7,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 
 _ROUNDS = 12
 _LEAP = 2.0  # on a regular grid nothing goes at first, then half at once

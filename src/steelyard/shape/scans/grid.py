@@ -6,8 +6,7 @@ from typing import NamedTuple
 
 import numpy as np
 
-from steelyard.check import Array, Mask
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers, Mask
 
 Cells = tuple[Integers, Integers]  # rows (N,) and columns (N,), as they index a map (I, J)
 

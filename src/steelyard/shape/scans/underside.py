@@ -17,8 +17,7 @@ from scipy import ndimage, sparse
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.scene import WINDOW, Scene

@@ -13,7 +13,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.shape.mesh import Integers
+from steelyard.check import Integers
 from steelyard.shape.sides.tree import Tree, single, sums
 from steelyard.shape.sides.winding import FOUR_PI, ONE, Sight, View, gathered, seen_of
 

@@ -13,8 +13,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from steelyard.check import Array, Mask
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.shape.points.plane_axis import least_axis
 from steelyard.shape.points.spacing import evenly
 

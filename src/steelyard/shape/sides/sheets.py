@@ -7,8 +7,7 @@ import math
 import numba
 import numpy as np
 
-from steelyard.check import Array
-from steelyard.shape.mesh import Integers
+from steelyard.check import Array, Integers
 from steelyard.shape.points.plane_axis import least_axis
 
 _SLOPE = 0.12  # of the line between neighbours on one sheet against its planes, at which their link has fallen to 1/e

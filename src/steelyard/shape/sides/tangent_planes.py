@@ -12,9 +12,8 @@ from scipy.sparse.csgraph import breadth_first_order, minimum_spanning_tree
 from scipy.spatial import cKDTree
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
-from steelyard.shape.mesh import Integers
 
 NEIGHBOURS = 10
 _ALIKE = 1e-6  # added to a cost that may be zero: a sparse matrix holds no zero

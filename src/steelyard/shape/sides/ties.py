@@ -8,9 +8,8 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers
 from steelyard.shape.cells.complex import Complex
-from steelyard.shape.mesh import Integers
 
 STEEP = 0.35  # cosine between an edge and a normal, at both ends, above which the edge leaves the surface there
 _SEEN = 0.3  # cosine between a point's plane and a facet of the hull above which the facet shows its outer side

@@ -10,7 +10,7 @@ from typing import Any
 import numba
 import numpy as np
 
-from steelyard.shape.mesh import Integers
+from steelyard.check import Integers
 
 Array = Any  # single precision here, double at the border
 

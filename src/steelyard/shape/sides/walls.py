@@ -10,9 +10,8 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from steelyard.check import Array, Mask
+from steelyard.check import Array, Integers, Mask
 from steelyard.shape.cells.complex import Complex
-from steelyard.shape.mesh import Integers
 from steelyard.shape.sides.ties import STEEP
 
 _PARALLEL = 0.8  # cosine between planes whose distance counts

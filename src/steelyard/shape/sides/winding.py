@@ -15,7 +15,7 @@ from typing import Any, NamedTuple
 import numba
 import numpy as np
 
-from steelyard.shape.mesh import Integers
+from steelyard.check import Integers
 from steelyard.shape.sides.tree import LEAF, Tree, single, sums
 
 Array = Any  # single precision here, double at the border
