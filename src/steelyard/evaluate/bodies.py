@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from steelyard import check
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.inertia import InertialParameters, forms
 
 
@@ -91,7 +91,7 @@ def inertia_pct(found: InertialParameters, true: InertialParameters, edges: Arra
     return np.asarray(100 * np.mean(np.abs((found.vector[..., 4:] - true.vector[..., 4:]) / scale), axis=-1))
 
 
-def consistent(found: InertialParameters) -> np.ndarray[tuple[int, ...], np.dtype[np.bool_]]:
+def consistent(found: InertialParameters) -> Mask:
     """Return whether the pseudo-inertia is positive definite."""
     return np.asarray(np.linalg.eigvalsh(found.pseudo_inertia)[..., 0] > 0)
 

@@ -15,7 +15,7 @@ import numpy as np
 from scipy.spatial import Delaunay, QhullError, cKDTree
 
 from steelyard import check
-from steelyard.check import Array, Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.tets import FACES
 from steelyard.spatial import area_vectors, unit_vectors
@@ -63,7 +63,7 @@ def _faces(xyz: Array, normals: Array) -> tuple[Integers, Array, Array]:
     return corners[good], (a + way)[good], radius[good]
 
 
-def _rests(xyz: Array, corners: Integers, centre: Array, radius: Array, ball: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:  # fmt: skip  # noqa: E501
+def _rests(xyz: Array, corners: Integers, centre: Array, radius: Array, ball: float) -> Mask:
     """Return whether a ball of this radius rests on each face, on its front side, with no point inside."""
     rests = radius < ball
     front = unit_vectors(area_vectors(xyz[corners[rests]]))

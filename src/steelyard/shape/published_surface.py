@@ -14,7 +14,7 @@ import numpy as np
 from scipy.ndimage import binary_dilation, label, map_coordinates
 from scipy.spatial import Delaunay
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.ball_pivoting import ball_pivoting
 from steelyard.shape.cloud import Cloud
@@ -125,7 +125,7 @@ def _tetrahedra(field: _Field, diagonal: float) -> TetMesh:
     return solid.chosen(~_crumbs(solid))
 
 
-def _crumbs(solid: TetMesh) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _crumbs(solid: TetMesh) -> Mask:
     """Return which cells belong to pieces so small that they are chips of the surface."""
     piece = joined(solid.dual, len(solid))
     volume = np.bincount(piece, solid.volumes)

@@ -11,7 +11,7 @@ from typing import Protocol
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Integers, Mask
 from steelyard.spatial import Rotation
 
 
@@ -36,9 +36,9 @@ class Kinematics:
     acceleration: Array
     angular_velocity: Array
     angular_acceleration: Array
-    pose: np.ndarray[tuple[int], np.dtype[np.int64]]
+    pose: Integers
 
-    def at_rest(self, speed: float, angular_speed: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+    def at_rest(self, speed: float, angular_speed: float) -> Mask:
         """Return rows (N,) whose true speeds are below `speed` [m/s] and `angular_speed` [rad/s]."""
         slow = np.linalg.norm(self.velocity, axis=1) < speed
         return np.asarray(slow & (np.linalg.norm(self.angular_velocity, axis=1) < angular_speed))
@@ -89,7 +89,7 @@ def _kinematics(
     time: Array,
     angles: tuple[Array, Array, Array],
     position: tuple[Array, Array, Array],
-    pose: np.ndarray[tuple[int], np.dtype[np.int64]],
+    pose: Integers,
 ) -> Kinematics:
     """Assemble kinematics from angles and position (value, first and second derivative; W axes)."""
     rotation = Rotation.from_rpy(angles[0])

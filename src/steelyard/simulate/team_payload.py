@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
-from steelyard.logs.log import Mask, MotionLog
+from steelyard.logs.log import MotionLog
 from steelyard.simulate.motions import Kinematics, minimum_jerk
 from steelyard.simulate.team_cases import GRAVITY, MASS, MOMENTS, RING, RING_CENTRE, Slip
 from steelyard.spatial import Pose, Rotation, cross, cross_matrix

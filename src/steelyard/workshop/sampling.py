@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import TriangleMesh
@@ -57,7 +57,7 @@ def spread_evenly(mesh: TriangleMesh, rng: np.random.Generator, points: int) -> 
     return xyz, vectors[face] / area[face, None], face.astype(np.int64)
 
 
-def _visible(body: Solid, xyz: Array, normal: Array, reach: float) -> np.ndarray[tuple[int], np.dtype[np.bool_]]:
+def _visible(body: Solid, xyz: Array, normal: Array, reach: float) -> Mask:
     """Return which points (N,) some camera sees."""
     cameras = _cameras()
     facing = normal @ cameras.T

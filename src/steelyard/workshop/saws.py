@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from steelyard.spatial import unit_vectors
 from steelyard.workshop.draw import Draw
 from steelyard.workshop.materials import ALUMINIUM, BRASS, CARBON_STEEL, FOAM_RUBBER, MAGNESIUM, RUBBER, STAINLESS_STEEL
 from steelyard.workshop.solids import Solid, block, chain, limb, rod, union
@@ -61,11 +62,7 @@ def hacksaw(draw: Draw) -> Tool:
 def _bar(path: list[tuple[float, float]], high: float, wide: float, ends: float = 0.0) -> Solid:
     """Return a bar of rectangular section along a path in x, y, its ends drawn in by `ends`."""
     points = np.array(path, float)
-    points[0] += ends * _unit(points[1] - points[0])
-    points[-1] += ends * _unit(points[-2] - points[-1])
+    points[0] += ends * unit_vectors(points[1] - points[0])
+    points[-1] += ends * unit_vectors(points[-2] - points[-1])
     a, b = high / 2, wide / 2
     return chain([rod(a, -b, b, facets=20).translate([x, y, 0]) for x, y in points])
-
-
-def _unit(step: np.ndarray[tuple[int], np.dtype[np.float64]]) -> np.ndarray[tuple[int], np.dtype[np.float64]]:
-    return np.asarray(step / np.linalg.norm(step))
