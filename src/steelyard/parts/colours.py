@@ -11,6 +11,7 @@ from steelyard.check import Array, Integers
 from steelyard.parts.light import Light, light_on
 from steelyard.parts.skin import OPPOSITE, Skin
 from steelyard.shape.eight_bits import Colours
+from steelyard.shape.points.spacing import nearest
 from steelyard.spatial import summed, unit_vectors
 
 NEIGHBOURS = 8
@@ -98,10 +99,8 @@ def _lent(colour: Array, xyz: Array, seen: Any) -> Array:
     """Return colours (V, 3) where points that nobody saw have that of the nearest that was seen."""
     if seen.all():
         return colour
-    from scipy.spatial import cKDTree
-
     lent = colour.copy()
-    lent[~seen] = colour[seen][cKDTree(xyz[seen]).query(xyz[~seen])[1]]
+    lent[~seen] = colour[seen][nearest(xyz[seen], xyz[~seen])]
     return lent
 
 

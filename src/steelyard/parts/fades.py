@@ -8,10 +8,11 @@ from __future__ import annotations
 
 import numpy as np
 
-from steelyard.check import Array, Integers
+from steelyard.check import Integers
 from steelyard.parts.colours import ColourModes
 from steelyard.parts.prints import patches
 from steelyard.parts.skin import Skin
+from steelyard.shape.points.spacing import nearest
 
 FADES = 0.2  # share of the points within two steps of a border that lie on the way, neither here nor there
 SPREAD = 0.1  # of those on the way that lie in each third of it
@@ -37,15 +38,9 @@ def without_fades(colours: ColourModes, skin: Skin) -> Integers:
         goals = [large for large in into[small] if kept[large]]
         kept[small] = not goals
         if goals:
-            mine = np.flatnonzero(patch == small)
-            label[mine] = _nearest_label(mine, np.flatnonzero(np.isin(patch, goals)), colours.label, skin.vertices)
+            mine, among = patch == small, np.isin(patch, goals)
+            label[mine] = colours.label[among][nearest(skin.vertices[among], skin.vertices[mine])]
     return label
-
-
-def _nearest_label(mine: Integers, among: Integers, label: Integers, xyz: Array) -> Integers:
-    from scipy.spatial import cKDTree
-
-    return np.asarray(label[among[cKDTree(xyz[among]).query(xyz[mine])[1]]])
 
 
 def _fading(colours: ColourModes, patch: Integers, size: Integers, skin: Skin) -> list[tuple[int, int]]:

@@ -18,6 +18,7 @@ from steelyard.check import Array, Integers
 from steelyard.parts.skin import Skin
 from steelyard.shape.cells.cut_cells import crossing_edges, cut_cells
 from steelyard.shape.pairs import distinct_pairs, joined
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.tets import TetMesh
 
 _LONG = 3.0  # median edges of the surface: cells with shorter ones draw the border themselves
@@ -105,8 +106,8 @@ def _patches(skin: Skin, part: Integers) -> Integers:
     outer[skin.triangles] = True
     inside = np.flatnonzero(~outer)
     alike = part[skin.near[inside]] == part[inside][:, None]
-    nearest = np.take_along_axis(skin.near[inside], alike.argmax(1)[:, None], 1)
-    links = np.concatenate([skin.edges, np.column_stack([inside, nearest])])
+    own = np.take_along_axis(skin.near[inside], alike.argmax(1)[:, None], 1)
+    links = np.concatenate([skin.edges, np.column_stack([inside, own])])
     one, two = part[links].T
     return joined(links[one == two], len(part))
 
@@ -165,12 +166,10 @@ def _cut_at(now: _Cells, edges: Integers, share: Array, beyond: Any, patches: tu
 
 def _nearest(vertices: Array, patch: Integers, places: Array, wanted: Integers) -> Integers:
     """Return the vertex (K,) of the patch that is wanted (K,) nearest to each place (K, 3)."""
-    from scipy.spatial import cKDTree
-
     out = np.empty(len(places), np.int64)
     for k in np.unique(wanted):
         mine, asked = np.flatnonzero(patch == k), wanted == k
-        out[asked] = mine[cKDTree(vertices[mine]).query(places[asked])[1]]
+        out[asked] = mine[nearest(vertices[mine], places[asked])]
     return out
 
 

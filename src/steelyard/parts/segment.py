@@ -31,6 +31,7 @@ from steelyard.parts.seams import seam_tree
 from steelyard.parts.skin import Skin, skin_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.tets import TetMesh
 from steelyard.spatial import area_vectors, summed
 
@@ -89,9 +90,7 @@ class Segmentation:
     @property
     def _vertex_part(self) -> Integers:
         """The part (V,) of every vertex: that of the nearest point."""
-        from scipy.spatial import cKDTree
-
-        return np.asarray(self.point_part[cKDTree(self.cloud.xyz).query(self.mesh.vertices)[1]])
+        return np.asarray(self.point_part[nearest(self.cloud.xyz, self.mesh.vertices)])
 
     @property
     def sureness(self) -> Array:
@@ -194,11 +193,9 @@ def segment(cloud: Cloud, solid: Any, *, parts: int | None = None) -> Segmentati
 def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     """Return the small pieces that parts are put together from: the first half of `segment`."""
     mesh: TetMesh = solid if isinstance(solid, TetMesh) else solid.mesh
-    from scipy.spatial import cKDTree
-
-    nearest = nearest_cell(cloud.xyz, mesh.centroids)
+    cell = nearest_cell(cloud.xyz, mesh.centroids)
     same = _same(cloud, mesh)
-    owner = np.arange(len(cloud)) if same else cKDTree(mesh.vertices).query(cloud.xyz)[1]
+    owner = np.arange(len(cloud)) if same else nearest(mesh.vertices, cloud.xyz)
     skin = skin_of(mesh, cloud.near if same else None)
     colour = np.zeros(len(mesh.vertices), dtype=np.int64)
     if cloud.rgb is not None:
@@ -209,9 +206,9 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
     pairs, corners = mesh.dual, mesh.inner_faces
     areas = np.linalg.norm(area_vectors(mesh.vertices[corners]), axis=1)
     piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)
-    nearest = _cell_of_its_colour(cloud.xyz, mesh.centroids, nearest, colour[owner], of_piece[piece])
-    piece, of_piece = with_points(mesh, piece, of_piece, pairs, areas, nearest)
-    return Pieces(cloud, mesh, skin, piece, of_piece, pairs, corners, nearest)
+    cell = _cell_of_its_colour(cloud.xyz, mesh.centroids, cell, colour[owner], of_piece[piece])
+    piece, of_piece = with_points(mesh, piece, of_piece, pairs, areas, cell)
+    return Pieces(cloud, mesh, skin, piece, of_piece, pairs, corners, cell)
 
 
 def parts_of_pieces(pieces: Pieces, parts: int | None = None) -> Segmentation:
@@ -242,12 +239,12 @@ def _with_borders(made: Segmentation, skin: Skin) -> Segmentation:
     tree = tree.of_cells(np.where(kept, old, tree.piece[made.nearest[cut.vertex]]), cut.mesh.volumes)
     # Every cut cell keeps its part somewhere: there its points go on.
     staying = np.flatnonzero(kept)[::-1]
-    nearest = np.empty(len(made.mesh), np.int64)
-    nearest[cut.cell[staying]] = staying
+    goes_on = np.empty(len(made.mesh), np.int64)
+    goes_on[cut.cell[staying]] = staying
     labels = np.where(kept, made.labels[cut.cell], made.point_part[cut.vertex])
     inner = len(cut.mesh.vertices) - len(made.mesh.vertices)
     cuts = None if made.cuts is None else replace(made.cuts, hierarchy=tree)
-    drawn = replace(made, mesh=cut.mesh, hierarchy=tree, cuts=cuts, nearest=nearest[made.nearest], inner=inner)
+    drawn = replace(made, mesh=cut.mesh, hierarchy=tree, cuts=cuts, nearest=goes_on[made.nearest], inner=inner)
     return drawn._labelled(labels)
 
 
@@ -258,34 +255,35 @@ def nearest_cell(points: Array, centroids: Array) -> Integers:
     """
     from scipy.spatial import cKDTree
 
-    gap, nearest = cKDTree(centroids, balanced_tree=False, compact_nodes=False).query(points)
+    gap, found = cKDTree(centroids, balanced_tree=False, compact_nodes=False).query(points)
     far, size = float(np.median(gap)), float(np.linalg.norm(centroids.max(0) - centroids.min(0)))
     if far > size > 0:
         raise BadValue(
             f"half of the points lie more than {far:.3g} m from a solid {size:.3g} m large. "
             "Give the cloud and the solid in one frame and unit."
         )
-    return np.asarray(nearest, dtype=np.int64)
+    return np.asarray(found, dtype=np.int64)
 
 
 def _cell_of_its_colour(
-    points: Array, centroids: Array, nearest: Integers, colour: Integers, of_cell: Integers
+    points: Array, centroids: Array, cell: Integers, colour: Integers, of_cell: Integers
 ) -> Integers:
     """Return the cell (N,) of every point: of the nearest few the first of its colour, the nearest where none is.
 
+    cell    (N,) the nearest
     colour  (N,) of the points, of_cell (T,) of the cells
 
     Cells reach through thin walls and layers to what is behind; the nearest is often of another colour than the point.
     """
     from scipy.spatial import cKDTree
 
-    torn = np.flatnonzero(of_cell[nearest] != colour)
+    torn = np.flatnonzero(of_cell[cell] != colour)
     if not len(torn):
-        return nearest
+        return cell
     near = cKDTree(centroids).query(points[torn], min(AROUND, len(centroids)))[1].reshape(len(torn), -1)
     alike = of_cell[near] == colour[torn, None]
-    found = nearest.copy()
-    found[torn] = np.where(alike.any(1), near[np.arange(len(torn)), alike.argmax(1)], nearest[torn])
+    found = cell.copy()
+    found[torn] = np.where(alike.any(1), near[np.arange(len(torn)), alike.argmax(1)], cell[torn])
     return found
 
 
@@ -307,12 +305,10 @@ def _vertex_colours(rgb: Colours, points: Array, vertices: Array, owner: Integer
 
     owner  (N,) the vertex nearest to each point
     """
-    from scipy.spatial import cKDTree
-
     count = np.bincount(owner, minlength=len(vertices))
     colours = summed(owner, rgb, len(vertices)) / np.maximum(count, 1)[:, None]
     empty = count == 0
-    colours[empty] = rgb[cKDTree(points).query(vertices[empty])[1]]
+    colours[empty] = rgb[nearest(points, vertices[empty])]
     return np.asarray(colours)
 
 

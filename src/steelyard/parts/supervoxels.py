@@ -17,6 +17,7 @@ from steelyard.check import Array, Integers
 from steelyard.errors import BadValue
 from steelyard.parts.groups import root
 from steelyard.shape.cloud import Cloud
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.sides.tangent_planes import plane_normals
 from steelyard.shape.tets import TetMesh
 
@@ -50,9 +51,7 @@ def supervoxels(cloud: Cloud, count: int = COUNT) -> Integers:
 
 def pieces_of_points(mesh: TetMesh, cloud: Cloud, labels: Any) -> Integers:
     """Return the label (T,) of every tet: that of the point nearest to its centroid."""
-    from scipy.spatial import cKDTree
-
-    return np.asarray(np.asarray(labels, dtype=np.int64)[cKDTree(cloud.xyz).query(mesh.centroids)[1]])
+    return np.asarray(np.asarray(labels, dtype=np.int64)[nearest(cloud.xyz, mesh.centroids)])
 
 
 @numba.njit(cache=True, nogil=True)

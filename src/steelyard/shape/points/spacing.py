@@ -46,6 +46,13 @@ class Neighbours:
         return float(np.median(self.distance[:, k - 1] * np.sqrt(np.pi / k)))
 
 
+def nearest(among: Array, places: Array) -> Integers:
+    """Return which of the points `among` (N, 3) is nearest to each of `places` (M, 3)."""
+    from scipy.spatial import cKDTree
+
+    return np.asarray(cKDTree(among).query(places)[1])
+
+
 def evenly(count: int, most: int) -> Integers:
     """Return the numbers of up to `most` of `count` points, evenly along their order."""
     return np.linspace(0, count - 1, min(most, count)).astype(np.int64)

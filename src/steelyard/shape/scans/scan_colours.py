@@ -5,9 +5,9 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
-from scipy.spatial import cKDTree
 
 from steelyard.check import Array
+from steelyard.shape.points.spacing import nearest
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.scene import WINDOW, Scene
 
@@ -32,7 +32,7 @@ def colours_of(scene: Scene, xyz: Array, normal: Array, seen: int) -> tuple[Any,
     if not shown.any():
         return rgb, None
     if not shown.all():
-        rgb[~shown] = rgb[shown][cKDTree(xyz[shown]).query(xyz[~shown])[1]]
+        rgb[~shown] = rgb[shown][nearest(xyz[shown], xyz[~shown])]
     return rgb, shown
 
 
