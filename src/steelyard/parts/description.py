@@ -21,12 +21,12 @@ class Cuts:
     """The best cut of a tree into every number of parts.
 
     length  (K,) description length with 1..K parts: per_part each, and the seams that stay inside parts
+    taken   (2 N - 1, K + 1) how many of so many parts the first child of each node takes
     """
 
     hierarchy: Hierarchy
     per_part: float
     length: Array
-    best: Any
     taken: Any
 
     @property
@@ -71,7 +71,7 @@ def cuts_of(hierarchy: Hierarchy, seam: Array, per_part: float) -> Cuts:
     most = min(MOST, len(hierarchy))
     best, taken = _best_cuts(hierarchy.merges, np.asarray(seam, dtype=np.float64), most)
     length = best[-1, 1:] + per_part * np.arange(1, most + 1)
-    return Cuts(hierarchy, per_part, length, best, taken)
+    return Cuts(hierarchy, per_part, length, taken)
 
 
 @numba.njit(cache=True, nogil=True)

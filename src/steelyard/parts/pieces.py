@@ -47,20 +47,17 @@ def _cell_colours(vertices: Array, tets: Any, centroids: Array, label: Any) -> A
     return found
 
 
-def pieces_of(
-    mesh: TetMesh, skin: Skin, colour: Integers, pairs: Integers, corners: Integers, areas: Array
-) -> tuple[Integers, Integers]:
+def pieces_of(mesh: TetMesh, skin: Skin, colour: Integers) -> tuple[Integers, Integers]:
     """Return the piece (T,) of every tet, numbered from 0, and the colour (N,) of every piece.
 
     Small clusters of one colour join the neighbour with which they share the most face, faces between creases counting
     little; then what is left too small to be seen joins a neighbour of another colour.
 
-    colour         (T,) of every tet
-    pairs, corners `mesh.dual` and `mesh.inner_faces`; areas (I,) of the faces [m^2]
+    colour  (T,) of every tet
     """
-    crease = np.zeros(len(mesh.vertices))
+    pairs, areas, crease = mesh.dual, mesh.inner_areas, np.zeros(len(mesh.vertices))
     np.maximum.at(crease, skin.edges.ravel(), np.repeat(skin.turning, 2))
-    pull = areas * (1 + _UNCREASED - np.clip(crease[corners].mean(1) / _CREASE, 0, 1))
+    pull = areas * (1 + _UNCREASED - np.clip(crease[mesh.inner_faces].mean(1) / _CREASE, 0, 1))
     one_colour = colour[pairs[:, 0]] == colour[pairs[:, 1]]
     piece = np.arange(len(mesh))
     piece = _absorbed(piece, mesh.volumes, pairs[one_colour], pull[one_colour], mesh.volume * PIECE)
@@ -80,9 +77,7 @@ def _main_colours(piece: Integers, colour: Integers, volumes: Array) -> Integers
     return np.asarray(volume.argmax(1))
 
 
-def with_points(
-    mesh: TetMesh, piece: Integers, colour: Integers, pairs: Integers, areas: Array, nearest: Integers
-) -> tuple[Integers, Integers]:
+def with_points(mesh: TetMesh, piece: Integers, colour: Integers, nearest: Integers) -> tuple[Integers, Integers]:
     """Return pieces (T,) and their colours with those that hold no point joined to a neighbour, rather of their colour.
 
     Nothing is known of a piece that nobody sees: it is no part of its own.
@@ -94,8 +89,9 @@ def with_points(
     seen = np.bincount(piece, points) > 0
     if seen.all():
         return piece, colour
-    alike = colour[piece[pairs[:, 0]]] == colour[piece[pairs[:, 1]]]
-    whole = _absorbed(piece, points, pairs, np.where(alike, 1, _OTHER_COLOUR) * areas, 1.0)
+    one, other = colour[piece[mesh.dual]].T
+    pull = np.where(one == other, 1, _OTHER_COLOUR) * mesh.inner_areas
+    whole = _absorbed(piece, points, mesh.dual, pull, 1.0)
     whole = _specks_to_nearest(mesh, whole, points)
     known = seen[piece]
     return whole, _main_colours(whole[known], colour[piece[known]], mesh.volumes[known])

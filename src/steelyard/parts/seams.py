@@ -43,16 +43,14 @@ class SeamTree:
     seam: Array
 
 
-def seam_tree(
-    mesh: TetMesh, skin: Skin, piece: Integers, colour: Integers, pairs: Integers, corners: Integers
-) -> SeamTree:
-    """Return the tree of pieces (T,) with colours (N,); pairs and corners are `mesh.dual` and its `inner_faces`."""
+def seam_tree(mesh: TetMesh, skin: Skin, piece: Integers, colour: Integers) -> SeamTree:
+    """Return the tree of pieces (T,) with colours (N,)."""
     count = len(colour)
     corner = np.zeros((count, len(mesh.vertices)), dtype=bool)  # which vertices each piece has
     corner[np.repeat(piece, 4), mesh.tets.ravel()] = True
     middle, scale = mesh.vertices[corner.any(0)].mean(0), mesh.volume ** (1 / 3)
     xyz = np.ascontiguousarray((mesh.vertices - middle) / scale)
-    contact = _contacts(xyz, skin, piece, count, pairs, corners, scale)
+    contact = _contacts(mesh, skin, piece, count, xyz, scale)
     touch = contact[:, :, AREA] > 0
     _join_by_corners(corner, touch)
     owner, member = np.nonzero(corner)
@@ -68,19 +66,19 @@ def seam_tree(
     return SeamTree(Hierarchy(piece, merges, cost, node_volume * whole, hull * whole), seam)
 
 
-def _contacts(
-    xyz: Array, skin: Skin, piece: Integers, count: int, pairs: Integers, corners: Integers, scale: float
-) -> Array:
+def _contacts(mesh: TetMesh, skin: Skin, piece: Integers, count: int, xyz: Array, scale: float) -> Array:
     """Return for every two pieces (N, N, 22): contact area, its vector sum, and sums along their common border.
 
     The border's sums are of edge length l over d d^T, of l times the turn and of l times the turn of the other side of
     a thin wall, d the unit vector across: with them, the mean turns along any direction are known, for any union of
     pieces.
+
+    xyz, scale  (V, 3) the vertices, over the scale [m]
     """
     table = np.zeros((count, count, WIDTH))
-    ends = piece[pairs]
+    ends = piece[mesh.dual]
     apart = ends[:, 0] != ends[:, 1]
-    vector = area_vectors(xyz[corners[apart]])
+    vector = area_vectors(xyz[mesh.inner_faces[apart]])
     area = np.linalg.norm(vector, axis=1)
     i, j = ends[apart].T
     np.add.at(table, (i, j, AREA), area)

@@ -33,7 +33,7 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.eight_bits import Colours
 from steelyard.shape.points.spacing import nearest
 from steelyard.shape.tets import TetMesh
-from steelyard.spatial import area_vectors, summed
+from steelyard.spatial import summed
 
 PER_PART = 0.08  # worth of a part: a hollow of a twelfth of the volume at a full seam, or 0.8 % of the surface
 
@@ -166,7 +166,6 @@ class Pieces:
     skin     its boundary
     piece    (T,) the piece of every tet
     colour   (N,) the colour of every piece
-    pairs    (I, 2) tets that share a face, corners (I, 3) of the faces
     nearest  (points,) the tet of its colour nearest to every point of the cloud
     """
 
@@ -175,8 +174,6 @@ class Pieces:
     skin: Skin
     piece: Integers
     colour: Integers
-    pairs: Integers
-    corners: Integers
     nearest: Integers
 
 
@@ -203,17 +200,15 @@ def coloured_pieces(cloud: Cloud, solid: Any) -> Pieces:
         rgb = cloud.rgb if same else _vertex_colours(cloud.rgb, cloud.xyz, mesh.vertices, owner)
         colours = colour_modes(rgb, skin, *told)
         colour = without_prints(without_fades(colours, skin), skin)
-    pairs, corners = mesh.dual, mesh.inner_faces
-    areas = np.linalg.norm(area_vectors(mesh.vertices[corners]), axis=1)
-    piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour), pairs, corners, areas)
+    piece, of_piece = pieces_of(mesh, skin, cell_colours(mesh, colour))
     cell = _cell_of_its_colour(cloud.xyz, mesh.centroids, cell, colour[owner], of_piece[piece])
-    piece, of_piece = with_points(mesh, piece, of_piece, pairs, areas, cell)
-    return Pieces(cloud, mesh, skin, piece, of_piece, pairs, corners, cell)
+    piece, of_piece = with_points(mesh, piece, of_piece, cell)
+    return Pieces(cloud, mesh, skin, piece, of_piece, cell)
 
 
 def parts_of_pieces(pieces: Pieces, parts: int | None = None) -> Segmentation:
     """Return the parts put together from small pieces: the second half of `segment`."""
-    tree = seam_tree(pieces.mesh, pieces.skin, pieces.piece, pieces.colour, pieces.pairs, pieces.corners)
+    tree = seam_tree(pieces.mesh, pieces.skin, pieces.piece, pieces.colour)
     cuts = cuts_of(tree.hierarchy, tree.seam, PER_PART)
     one = np.zeros(len(pieces.mesh), dtype=np.int64)
     whole = Segmentation(

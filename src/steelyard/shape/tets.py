@@ -12,7 +12,7 @@ from steelyard import check
 from steelyard.check import Array, Integers, Mask
 from steelyard.errors import BadValue
 from steelyard.shape.mesh import tetrahedra_moments
-from steelyard.spatial import Pose, cross
+from steelyard.spatial import Pose, area_vectors, cross
 
 # The faces of a tetrahedron, each opposite the corner of the same number, outward for positive volume.
 FACES = ((1, 2, 3), (0, 3, 2), (0, 1, 3), (0, 2, 1))
@@ -89,10 +89,15 @@ class TetMesh:
         cell, other = np.repeat(np.arange(len(self)), 4), self.neighbours.ravel()
         return np.stack([cell, other], axis=1)[self._once]
 
-    @property
+    @cached_property
     def inner_faces(self) -> Integers:
         """Corners (E, 3) of the faces between the cells of `dual`, counter-clockwise seen from the second."""
         return self.tets[:, FACES].reshape(-1, 3)[self._once]
+
+    @cached_property
+    def inner_areas(self) -> Array:
+        """Area (E,) of the faces between the cells of `dual` [m^2]."""
+        return np.asarray(np.linalg.norm(area_vectors(self.vertices[self.inner_faces]), axis=1))
 
     @property
     def _once(self) -> Mask:
