@@ -11,7 +11,8 @@ from steelyard.check import Array
 from steelyard.io.shapes.parts_files import SavedParts, read_parts, write_parts
 from steelyard.parts.inner_borders import cut_at_borders, over_half
 from steelyard.parts.pieces import cell_colours
-from steelyard.parts.segment import Segmentation, segment
+from steelyard.parts.segment import segment
+from steelyard.parts.segmentation import Segmentation
 from steelyard.parts.skin import skin_of
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.tets import TetMesh

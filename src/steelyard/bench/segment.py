@@ -19,7 +19,8 @@ from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.evaluate.solids import score, true_solid, winding_of
 from steelyard.io.object_folders import object_folders, read_object
 from steelyard.parts.clustering import cluster
-from steelyard.parts.segment import Segmentation, coloured_pieces, nearest_cell, parts_of_pieces
+from steelyard.parts.segment import coloured_pieces, nearest_cell, parts_of_pieces
+from steelyard.parts.segmentation import Segmentation
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.orient import oriented

@@ -15,7 +15,8 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError
 from steelyard.parts.parts import Parts
-from steelyard.parts.segment import Segmentation, segment
+from steelyard.parts.segment import segment
+from steelyard.parts.segmentation import Segmentation
 from steelyard.shape import carving
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import Kept, KeptSpace
