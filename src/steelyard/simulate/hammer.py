@@ -13,11 +13,10 @@ import numpy as np
 
 from steelyard.check import Array, frozen
 from steelyard.inertia import InertialParameters
-from steelyard.logs.log import MotionLog
 from steelyard.logs.recording import KNOWN_PLACE, Recording, Stream
 from steelyard.shape.inside import inside
 from steelyard.shape.views import Views
-from steelyard.simulate.motions import Kinematics, Step, StopAndGo
+from steelyard.simulate.motions import Step, StopAndGo, needed
 from steelyard.simulate.scanning import scan_mesh
 from steelyard.spatial import Pose, Rotation
 from steelyard.workshop import catalogue
@@ -66,7 +65,7 @@ def recording(seed: int = 0) -> Example:
     truth = body()
     time = np.arange(int(DURATION * WRENCH_HZ)) / WRENCH_HZ
     noise = rng.standard_normal((len(time), 6)) * np.repeat([TORQUE_STD, FORCE_STD], 3)
-    wrench = -_exact(motion().at(time)).predicted(truth.vector) + BIAS + noise
+    wrench = -needed(truth, motion().at(time), GRAVITY) + BIAS + noise
     poses = motion().at(np.arange(int(DURATION * POSE_HZ)) / POSE_HZ)
     turned = poses.rotation @ Rotation.exp(ENCODER_RAD * rng.standard_normal((len(poses.time), 3)))
     position = poses.position + ENCODER_M * rng.standard_normal((len(poses.time), 3))
@@ -108,14 +107,3 @@ def scanned(seed: int = 0, views: int = VIEWS) -> Seen:
     X_SW = made.tool.X_OS.inverse() @ scan.X_WO.inverse()
     placed = replace(made.recording, object_pose=X_SW)
     return Seen(placed, made.truth, made.tool, scan.views, X_SW, scan.X_WO)
-
-
-def _exact(seen: Kinematics) -> MotionLog:
-    """Return the exact motion as a log with a wrench still to come."""
-    return MotionLog(
-        np.zeros((len(seen.time), 6)),
-        seen.rotation.inverse().apply(GRAVITY),
-        seen.acceleration,
-        seen.angular_velocity,
-        seen.angular_acceleration,
-    )

@@ -20,10 +20,10 @@ from steelyard import check
 from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
-from steelyard.logs.log import MotionLog, Noise
+from steelyard.logs.log import MotionLog
 from steelyard.simulate import logs
 from steelyard.simulate.motions import Kinematics, Motion, Step, StopAndGo
-from steelyard.simulate.noise import Spectrum, unit_noise
+from steelyard.simulate.noise import Spectrum
 from steelyard.spatial import Rotation
 
 Variant = Literal["paper", "slow", "static"]
@@ -176,17 +176,8 @@ def with_noise(
     rng: np.random.Generator,
     spectrum: Spectrum = "white",
 ) -> MotionLog:
-    """Return a noise-free log with noise on both accelerations and the wrench, declared where it is above zero."""
-    std = noise_std(noise)
-    angular, linear, force, torque = std
-    drawn = unit_noise(rng, len(log), 12, spectrum, RATE_HZ) * np.repeat([angular, linear, torque, force], 3)
-    return replace(
-        log,
-        wrench=log.wrench + drawn[:, 6:],
-        acceleration=log.acceleration + drawn[:, 3:6],
-        angular_acceleration=log.angular_acceleration + drawn[:, :3],
-        noise=(Noise.of_std(*std),) if all(std) else None,
-    )
+    """Return a noise-free log at 100 Hz with noise of a scenario, or of four deviations; see `logs.with_noise`."""
+    return logs.with_noise(log, noise_std(noise), rng, spectrum, RATE_HZ)
 
 
 def noise_std(noise: str | tuple[float, float, float, float]) -> tuple[float, float, float, float]:

@@ -87,21 +87,9 @@ def log_of(
     seen = motion.at(np.arange(samples) / rate)
     still_below = scenarios.STILL_SPEED, scenarios.STILL_ANGULAR_SPEED
     exact = exact_log(seen, body, check.vectors("gravity", gravity), still_below)
-    rows = samples * repeats
-    angular, linear, force, torque = std
-    noise = unit_noise(rng, rows, 12, spectrum, rate) * np.repeat([angular, linear, torque, force], 3)
-    offset = np.zeros(6) if bias is None else check.vectors("bias", bias, 6)
-    return MotionLog(
-        wrench=np.tile(exact.wrench, (repeats, 1)) + noise[:, 6:] + offset,
-        gravity=np.tile(exact.gravity, (repeats, 1)),
-        acceleration=np.tile(exact.acceleration, (repeats, 1)) + noise[:, 3:6],
-        angular_velocity=np.tile(exact.angular_velocity, (repeats, 1)),
-        angular_acceleration=np.tile(exact.angular_acceleration, (repeats, 1)) + noise[:, :3],
-        time=np.arange(rows) / rate,
-        still=None if exact.still is None else np.tile(exact.still, repeats),
-        pose=None if exact.pose is None else np.tile(exact.pose, repeats),
-        noise=(Noise.of_std(*std),) if all(std) else None,
-    )
+    again = replace(exact.rows(np.tile(np.arange(samples), repeats)), time=np.arange(samples * repeats) / rate)
+    log = with_noise(again, std, rng, spectrum, rate)
+    return log if bias is None else replace(log, wrench=log.wrench + check.vectors("bias", bias, 6))
 
 
 def exact_log(
@@ -124,6 +112,29 @@ def exact_log(
         pose=np.where(still, seen.pose, -1),
     )
     return log if body is None else replace(log, wrench=log.predicted(body.vector))
+
+
+def with_noise(
+    log: MotionLog,
+    std: tuple[float, float, float, float],
+    rng: np.random.Generator,
+    spectrum: Spectrum,
+    rate: float,
+) -> MotionLog:
+    """Return a noise-free log with noise on both accelerations and the wrench, declared where it is above zero.
+
+    std   of angular acceleration, acceleration, force, torque (rad/s^2, m/s^2, N, N m), independent per axis
+    rate  of the rows [Hz]
+    """
+    angular, linear, force, torque = std
+    drawn = unit_noise(rng, len(log), 12, spectrum, rate) * np.repeat([angular, linear, torque, force], 3)
+    return replace(
+        log,
+        wrench=log.wrench + drawn[:, 6:],
+        acceleration=log.acceleration + drawn[:, 3:6],
+        angular_acceleration=log.angular_acceleration + drawn[:, :3],
+        noise=(Noise.of_std(*std),) if all(std) else None,
+    )
 
 
 def _shuffled(log: MotionLog, rng: np.random.Generator) -> MotionLog:

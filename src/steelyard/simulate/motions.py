@@ -12,6 +12,8 @@ from typing import Protocol
 import numpy as np
 
 from steelyard.check import Array, Integers, Mask
+from steelyard.inertia import InertialParameters
+from steelyard.inertia.regressor import newton_euler
 from steelyard.spatial import Rotation
 
 
@@ -83,6 +85,15 @@ def euler_rates(q: Array, dq: Array, ddq: Array) -> tuple[Array, Array]:
     omega = np.einsum("nij,nj->ni", turned, dq)
     alpha = np.einsum("nij,nj->ni", turned, ddq) + change
     return omega, alpha
+
+
+def needed(body: InertialParameters, motion: Kinematics, gravity: Array) -> Array:
+    """Return the wrench (N, 6) [tau, f] that `body`, in the frame that moves, needs at that frame's origin.
+
+    gravity  (3,) [m/s^2] in W
+    """
+    felt = motion.acceleration - motion.rotation.inverse().apply(gravity)
+    return newton_euler(body.vector, felt, motion.angular_velocity, motion.angular_acceleration)
 
 
 def _kinematics(

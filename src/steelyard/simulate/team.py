@@ -14,7 +14,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import Kind, TeamLog, TeamRecording, TeamRobot
 from steelyard.robots import Omnid
 from steelyard.simulate.motions import Motion
-from steelyard.simulate.team_cases import GRAVITY, RATE_HZ, ROTATION_MAX, TRANSLATION_MAX, TeamScene
+from steelyard.simulate.team_cases import DOWN, RATE_HZ, ROTATION_MAX, TRANSLATION_MAX, TeamScene
 from steelyard.simulate.team_motions import Held, SineMotion, draw_motion
 from steelyard.simulate.team_payload import Squeeze, TeamPayload
 from steelyard.simulate.team_recording import JointRecord, Plan, View, load_of, presence, record
@@ -97,7 +97,7 @@ def simulate_team(scene: TeamScene, seed: int, reference: int = 0) -> TeamTrial:
 
 
 def _robots(scene: TeamScene) -> tuple[TeamRobot, ...]:
-    down = None if scene.bases_move else np.array([0.0, 0.0, -GRAVITY])
+    down = None if scene.bases_move else DOWN
     base: Any = "moving" if scene.bases_move else "still"
     return tuple(TeamRobot(f"robot{i}", down, base) for i in range(scene.robots))
 

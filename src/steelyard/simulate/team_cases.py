@@ -13,12 +13,13 @@ from typing import Literal
 
 import numpy as np
 
-from steelyard.check import Array
+from steelyard.check import Array, frozen
 from steelyard.simulate.noise import Spectrum
 from steelyard.simulate.team_motions import Freedom
 
 Sensing = Literal["joints", "poses", "twists"]
 GRAVITY = 9.81
+DOWN = frozen([0.0, 0.0, -GRAVITY])  # gravity in W [m/s^2]
 RATE_HZ = 100.0
 ROTATION_MAX, TRANSLATION_MAX = float(np.deg2rad(8.0)), 0.03
 STILL_TURNS = ((0.1, 0.0, 0.0), (-0.06, 0.08, 0.0), (0.0, -0.1, 0.1), (-0.07, -0.07, 0.0))

@@ -6,10 +6,10 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.inertia import InertialParameters
-from steelyard.simulate.motions import Kinematics
-from steelyard.simulate.team_cases import Hinge
-from steelyard.simulate.team_payload import Load, TeamPayload, grasp_load, grasp_map, needed
-from steelyard.spatial import Pose, Rotation, cross
+from steelyard.simulate.motions import Kinematics, needed
+from steelyard.simulate.team_cases import DOWN, Hinge
+from steelyard.simulate.team_payload import Load, TeamPayload, grasp_load, grasp_map
+from steelyard.spatial import Pose, Rotation, cross, lever_acceleration
 
 
 def hinged_load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], hinge: Hinge, swing: Array) -> Load:
@@ -23,7 +23,7 @@ def hinged_load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], h
     axis, point = hinge.axis / np.linalg.norm(hinge.axis), hinge.point
     turn = Rotation.exp(angle[:, None] * axis)
     second = InertialParameters.from_com(hinge.mass, hinge.centre, np.diag(hinge.moments))
-    wrench = needed(second, _second_motion(motion, turn, axis, point, rate, change))
+    wrench = needed(second, _second_motion(motion, turn, axis, point, rate, change), DOWN)
     back = Pose(turn, point - turn.apply(point))  # the second body's frame seen from C
     force = turn.apply(wrench[:, 3:])
     moment = turn.apply(wrench[:, :3]) + cross(back.position, force)
@@ -55,14 +55,13 @@ def _second_motion(
 ) -> Kinematics:
     """Return the motion of the second body's frame, which is C when the hinge is at zero."""
     into = turn.inverse()
-    here = np.broadcast_to(point, motion.position.shape)
     omega = into.apply(motion.angular_velocity)
     spin = rate[:, None] * axis
     turning = omega + spin
     growing = into.apply(motion.angular_acceleration) + change[:, None] * axis + cross(omega, spin)
-    w, a = motion.angular_velocity, motion.angular_acceleration
-    at_hinge = into.apply(motion.acceleration + cross(a, here) + cross(w, cross(w, here)))
-    acceleration = at_hinge - cross(growing, here) - cross(turning, cross(turning, here))
+    lever = lever_acceleration(motion.angular_velocity, motion.angular_acceleration, point)
+    at_hinge = into.apply(motion.acceleration + lever)
+    acceleration = at_hinge - lever_acceleration(turning, growing, point)
     return Kinematics(
         motion.time, motion.rotation @ turn, motion.position, motion.velocity, acceleration, turning, growing,
         motion.pose,

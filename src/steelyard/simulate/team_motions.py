@@ -12,7 +12,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.simulate.motions import Kinematics
-from steelyard.spatial import Rotation, cross
+from steelyard.spatial import Rotation, cross, lever_acceleration
 
 _SMALL = 0.05  # [rad] below it three terms of a series are exact to the last digits
 SINES = 5
@@ -60,7 +60,7 @@ class SineMotion:
             lever = -self.freedom.pivot
             position = self.freedom.pivot + rotation.apply(lever)
             velocity = cross(omega, lever)
-            acceleration = cross(alpha, np.broadcast_to(lever, alpha.shape)) + cross(omega, velocity)
+            acceleration = lever_acceleration(omega, alpha, lever)
         else:
             moved = [x @ self.freedom.translation.T for x in sines(self.translation, time)]
             position = moved[0]

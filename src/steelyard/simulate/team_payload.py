@@ -13,9 +13,8 @@ import numpy as np
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
-from steelyard.logs.log import MotionLog
-from steelyard.simulate.motions import Kinematics, minimum_jerk
-from steelyard.simulate.team_cases import GRAVITY, MASS, MOMENTS, RING, RING_CENTRE, Slip
+from steelyard.simulate.motions import Kinematics, minimum_jerk, needed
+from steelyard.simulate.team_cases import DOWN, MASS, MOMENTS, RING, RING_CENTRE, Slip
 from steelyard.spatial import Pose, Rotation, cross, cross_matrix
 
 _UNBORNE = 1e-8  # of the wrench asked for: more is not rounding
@@ -110,15 +109,7 @@ def grasp_load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], sl
     velocity = motion.velocity[:, None] + cross(omega, np.broadcast_to(position, omega.shape)) + drift
     twist = np.concatenate([omega, velocity], -1)
     maps = grasp_map(position, six_axis)
-    return Load(payload.grasps.rotation.matrix[None], position, twist, maps, needed(payload.body, motion))
-
-
-def needed(body: InertialParameters, motion: Kinematics) -> Array:
-    """Return the wrench (T, 6) that `body`, in the frame that moves, needs at that frame's origin."""
-    down = motion.rotation.inverse().apply(np.array([0.0, 0.0, -GRAVITY]))
-    zero = np.zeros((len(motion.time), 6))
-    log = MotionLog(zero, down, motion.acceleration, motion.angular_velocity, motion.angular_acceleration)
-    return log.predicted(body.vector)
+    return Load(payload.grasps.rotation.matrix[None], position, twist, maps, needed(payload.body, motion, DOWN))
 
 
 def carry(
@@ -150,7 +141,7 @@ def carry(
     placed = motion.position[:, None] + np.einsum(
         "tij,tnj->tni", motion.rotation.matrix, _full(loaded.position, motion)
     )
-    down = np.swapaxes(turned, -1, -2) @ np.array([0.0, 0.0, -GRAVITY])
+    down = np.swapaxes(turned, -1, -2) @ DOWN
     parts = (turned, placed, _turned(into, loaded.twist), _turned(into, wrench), down)
     return Carried(*(np.ascontiguousarray(np.swapaxes(part, 0, 1)) for part in parts))
 

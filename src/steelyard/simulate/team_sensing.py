@@ -8,8 +8,8 @@ from scipy import signal
 from steelyard.check import Array
 from steelyard.simulate.motions import Kinematics
 from steelyard.simulate.noise import unit_noise
-from steelyard.simulate.team_cases import GRAVITY, RATE_HZ, TeamNoise
-from steelyard.spatial import Pose, Rotation, cross
+from steelyard.simulate.team_cases import DOWN, RATE_HZ, TeamNoise
+from steelyard.spatial import Pose, Rotation, lever_acceleration
 
 _CORNER_HZ = 2.0
 
@@ -47,13 +47,12 @@ def read_twist(rng: np.random.Generator, twist: Array, noise: TeamNoise) -> Arra
 
 def read_imu(rng: np.random.Generator, motion: Kinematics, grasp: Pose, noise: TeamNoise) -> tuple[Array, Array]:
     """Return angular velocity and specific force a - g (T, 3) in the axes of a grasp X_CG of the moving frame C."""
-    place = np.broadcast_to(grasp.position, motion.position.shape)
     omega, alpha = motion.angular_velocity, motion.angular_acceleration
-    acceleration = motion.acceleration + cross(alpha, place) + cross(omega, cross(omega, place))
-    up = motion.rotation.inverse().apply(np.array([0.0, 0.0, GRAVITY]))
+    felt = motion.acceleration + lever_acceleration(omega, alpha, grasp.position)
+    felt = felt - motion.rotation.inverse().apply(DOWN)
     into = grasp.rotation.inverse()
-    white = rng.standard_normal((len(place), 6)) * np.repeat([noise.imu_rad_s, noise.imu_m_s2], 3)
-    return into.apply(omega) + white[:, :3], into.apply(acceleration + up) + white[:, 3:]
+    white = rng.standard_normal((len(omega), 6)) * np.repeat([noise.imu_rad_s, noise.imu_m_s2], 3)
+    return into.apply(omega) + white[:, :3], into.apply(felt) + white[:, 3:]
 
 
 def draw_calibration(rng: np.random.Generator, noise: TeamNoise) -> tuple[Array, Array]:
