@@ -22,7 +22,7 @@ from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.simulate import logs
-from steelyard.simulate.motions import Kinematics, Motion, Step, StopAndGo
+from steelyard.simulate.motions import Held, Kinematics, Motion, Step, StopAndGo
 from steelyard.simulate.noise import Spectrum
 from steelyard.spatial import Rotation
 
@@ -73,20 +73,6 @@ class Disturbance:
 NOTHING = Disturbance()
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """Rest at one pose after another: Euler keys (K, 3) [rad], each for `interval` [s], the ways between left out."""
-
-    keys: Array
-    interval: float
-
-    def at(self, time: Array) -> Kinematics:
-        """Return the kinematics at `time` (N,) [s]."""
-        pose = np.clip(np.floor(time / self.interval), 0, len(self.keys) - 1).astype(np.int64)
-        zero = np.zeros((len(time), 3))
-        return Kinematics(time, Rotation.from_rpy(self.keys[pose]), zero, zero, zero, zero, zero, pose)
-
-
 def handling_motion(variant: str = "paper", reach: float = REACH) -> tuple[Motion, float]:
     """Return the motion of S and how long it lasts [s].
 
@@ -95,7 +81,7 @@ def handling_motion(variant: str = "paper", reach: float = REACH) -> tuple[Motio
     if variant not in VARIANTS:
         raise BadValue(f"variant must be one of {', '.join(VARIANTS)}; got {variant!r}.")
     if variant == "static":
-        return Held(np.radians(_POSES), _HOLD), _HOLD * len(_POSES)
+        return Held(Rotation.from_rpy(np.radians(_POSES)), _HOLD), _HOLD * len(_POSES)
     if variant == "paper":
         return _stop_and_go(_TURN, _STOP), (_TURN + _STOP) * len(_TURNS)
     turn = _slow_turn(check.positive("reach", reach))

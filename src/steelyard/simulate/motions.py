@@ -1,4 +1,4 @@
-"""Motions of S in W with exact derivatives: stop-and-go between Euler keys, and finite Fourier series.
+"""Motions of S in W with exact derivatives: rest, stop-and-go between Euler keys, and finite Fourier series.
 
 Rotations are extrinsic xyz Euler angles q = (roll, pitch, yaw), R_WS = Rz(yaw) Ry(pitch) Rx(roll). Every
 derivative is in closed form; nothing is differenced.
@@ -116,6 +116,21 @@ def _kinematics(
         angular_acceleration=alpha,
         pose=pose,
     )
+
+
+@dataclass(frozen=True, eq=False)
+class Held:
+    """Rest at one rotation (K,) after another, each for `interval` [s]; the ways between are left out."""
+
+    rotation: Rotation
+    interval: float = np.inf
+
+    def at(self, time: Array) -> Kinematics:
+        """Return the kinematics at `time` (N,) [s]."""
+        last = len(self.rotation.matrix) - 1
+        pose = np.clip(np.floor(time / self.interval), 0, last).astype(np.int64)
+        zero = np.zeros((len(time), 3))
+        return Kinematics(time, self.rotation[pose], zero, zero, zero, zero, zero, pose)
 
 
 @dataclass(frozen=True, eq=False)

@@ -13,9 +13,9 @@ from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.logs.team_log import Kind, TeamLog, TeamRecording, TeamRobot
 from steelyard.robots import Omnid
-from steelyard.simulate.motions import Motion
+from steelyard.simulate.motions import Held, Motion
 from steelyard.simulate.team_cases import DOWN, RATE_HZ, ROTATION_MAX, TRANSLATION_MAX, TeamScene
-from steelyard.simulate.team_motions import Held, SineMotion, draw_motion
+from steelyard.simulate.team_motions import SineMotion, draw_motion
 from steelyard.simulate.team_payload import Squeeze, TeamPayload
 from steelyard.simulate.team_recording import JointRecord, Plan, View, load_of, presence, record
 from steelyard.simulate.team_sensing import draw_calibration
@@ -80,7 +80,7 @@ def simulate_team(scene: TeamScene, seed: int, reference: int = 0) -> TeamTrial:
             holds = present
         if scene.bias_per == "recording" and number:
             session = [draw_calibration(noisy, scene.noise) for _ in range(scene.robots)]
-        view = View(scene, plan, payload, squeeze, {})
+        view = View(scene, plan, payload, squeeze)
         away = [e.robot for e in scene.presence if e.new and plan.kind != "motion"]
         made = {
             f"robot{i}": record(noisy, view, homes[i], i, session[i], start)
@@ -125,10 +125,10 @@ def _plans(rng: np.random.Generator, scene: TeamScene, payload: TeamPayload, hom
         if kind == "still":
             time = np.arange(scene.still_samples) / RATE_HZ
             for turn in scene.still_turns:
-                held = np.array(turn)
-                while not _fits(scene, payload, homes, Held(held), time, None):
+                held = np.array([turn])
+                while not _fits(scene, payload, homes, rest := Held(Rotation.exp(held)), time, None):
                     held = held * SHRINK
-                plans.append(Plan(kind, time, Held(held), None))
+                plans.append(Plan(kind, time, rest, None))
             continue
         samples = scene.grasp_samples if kind == "grasp" else scene.motion_samples
         band = scene.grasp_band_hz if kind == "grasp" else scene.motion_band_hz

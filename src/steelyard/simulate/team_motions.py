@@ -68,19 +68,6 @@ class SineMotion:
         return Kinematics(time, rotation, position, velocity, acceleration, omega, alpha, np.zeros(len(time), np.int64))
 
 
-@dataclass(frozen=True, eq=False)
-class Held:
-    """A payload at rest, turned by `turn` (3,) [rad]."""
-
-    turn: Array
-
-    def at(self, time: Array) -> Kinematics:
-        """Return the payload's kinematics at `time` (T,) [s]."""
-        zero = np.zeros((len(time), 3))
-        rotation = Rotation.exp(np.broadcast_to(self.turn, zero.shape))
-        return Kinematics(time, rotation, zero, zero, zero, zero, zero, np.zeros(len(time), np.int64))
-
-
 def draw_motion(
     rng: np.random.Generator,
     time: Array,

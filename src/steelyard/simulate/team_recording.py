@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -78,22 +78,22 @@ class View:
     plan: Plan
     payload: TeamPayload
     squeeze: Squeeze
-    known: dict[bytes, Carried]
+    known: dict[bytes, Carried] = field(default_factory=dict)
 
     def at(self, time: Array) -> Carried:
         """Return what happens at all grasps at the true times (T,)."""
         key = time.tobytes()
         if key not in self.known:
-            self.known[key] = _seen(self.scene, self.plan, self.payload, self.squeeze, time)
+            self.known[key] = self._carried(time)
         return self.known[key]
 
-
-def _seen(scene: TeamScene, plan: Plan, payload: TeamPayload, squeeze: Squeeze, time: Array) -> Carried:
-    motion = plan.motion.at(time)
-    slip = scene.slip if scene.slip is not None and scene.slip.kind == plan.kind else None
-    loaded = load_of(scene, payload, motion, plan.swing, slip)
-    holds = presence(scene, replace(plan, time=time))
-    return carry(loaded, motion, time, squeeze, holds, sorted(scene.six_axis))
+    def _carried(self, time: Array) -> Carried:
+        scene, plan = self.scene, self.plan
+        motion = plan.motion.at(time)
+        slip = scene.slip if scene.slip is not None and scene.slip.kind == plan.kind else None
+        loaded = load_of(scene, self.payload, motion, plan.swing, slip)
+        holds = presence(scene, replace(plan, time=time))
+        return carry(loaded, motion, time, self.squeeze, holds, sorted(scene.six_axis))
 
 
 def load_of(scene: TeamScene, payload: TeamPayload, motion: Kinematics, swing: Array | None, slip: Slip | None) -> Load:
