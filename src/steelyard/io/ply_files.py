@@ -184,12 +184,11 @@ def read_mesh_noting(path: Path | str) -> tuple[TriangleMesh, tuple[str, ...]]:
 def write_mesh(mesh: TriangleMesh, path: Path | str) -> None:
     """Write a mesh as PLY with double coordinates and part, red, green, blue per face; raises BadFile."""
     path = Path(path)
-    rgb = mesh.rgb if mesh.rgb is not None else np.full((len(mesh), 3), 128, np.uint8)
     vertex = np.zeros(len(mesh.vertices), [(axis, "<f8") for axis in "xyz"])
     for k, axis in enumerate("xyz"):
         vertex[axis] = mesh.vertices[:, k]
     face = np.zeros(len(mesh), [("n", "u1"), ("v", "<i4", 3), ("rgb", "u1", 3), ("part", "<i4")])
-    face["n"], face["v"], face["rgb"], face["part"] = 3, mesh.triangles, rgb, mesh.part
+    face["n"], face["v"], face["rgb"], face["part"] = 3, mesh.triangles, mesh.colours, mesh.part
     colours = (f"uchar {name}" for name in ("red", "green", "blue"))
     places, faces = [f"double {axis}" for axis in "xyz"], ["list uchar int vertex_indices", *colours, "int part"]
     write_bytes(path, ply({"vertex": (places, vertex), "face": (faces, face)}))

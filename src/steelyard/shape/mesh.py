@@ -66,6 +66,11 @@ class TriangleMesh:
         return np.asarray(self.vertices[self.triangles])
 
     @property
+    def colours(self) -> Colours:
+        """Colour (F, 3) of every triangle, grey where it is not known."""
+        return np.full((len(self), 3), 128, np.uint8) if self.rgb is None else self.rgb
+
+    @property
     def bounds(self) -> Array:
         """Lower and upper corner (2, 3) of the box around all triangles [m]."""
         used = self.vertices[self.triangles.ravel()]

@@ -146,8 +146,7 @@ def _shaded(mesh: TriangleMesh) -> Colours:
     """Return the colours (F, 3) of triangles under one lamp and much ambient light."""
     normal = unit_vectors(area_vectors(mesh.corners))
     light = _AMBIENT + (1 - _AMBIENT) * np.maximum(normal @ _LAMP, 0)
-    rgb = mesh.rgb if mesh.rgb is not None else np.full((len(mesh), 3), 128, np.uint8)
-    return np.asarray(np.clip(rgb * light[:, None], 0, 255), np.uint8)
+    return np.asarray(np.clip(mesh.colours * light[:, None], 0, 255), np.uint8)
 
 
 def render(mesh: TriangleMesh, rgb: Colours, intrinsics: Intrinsics, X_WC: Pose) -> tuple[Array, Array, Colours]:

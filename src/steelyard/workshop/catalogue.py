@@ -56,8 +56,7 @@ def build(name: str, seed: int | Sequence[int] | None = None) -> Tool:
     Raises BadValue where there is no such family.
     """
     require(name)
-    rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(name.encode())])
-    return FAMILIES[name](Draw(rng))
+    return FAMILIES[name](_draw(name, seed))
 
 
 def build_graded(name: str, seed: int | Sequence[int] | None = None) -> Tool:
@@ -66,6 +65,10 @@ def build_graded(name: str, seed: int | Sequence[int] | None = None) -> Tool:
     Surfaces, labels and colours are those of the even tool. Raises BadValue where the family has no graded form.
     """
     require(name, graded=True)
-    rng = None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(f"graded-{name}".encode())])
-    tool = build(name, seed)
-    return replace(graded(tool, GRADED[name](Draw(rng))), name=f"graded-{name}")
+    own = f"graded-{name}"
+    return replace(graded(build(name, seed), GRADED[name](_draw(own, seed))), name=own)
+
+
+def _draw(name: str, seed: int | Sequence[int] | None) -> Draw:
+    """Return where sizes and materials come from: each name has its own for a seed."""
+    return Draw(None if seed is None else np.random.default_rng([*np.atleast_1d(seed), zlib.crc32(name.encode())]))

@@ -19,9 +19,9 @@ _WAVES, _FINEST = 12, 0.012  # waves of the scuff pattern, and the shortest of t
 
 def painted(tool: Tool) -> TriangleMesh:
     """Return the tool's mesh with its finish on every triangle."""
-    corners = tool.mesh.corners
-    flat = tool.mesh.rgb if tool.mesh.rgb is not None else np.full((len(corners), 3), 128, np.uint8)
-    return replace(tool.mesh, rgb=finished(tool.finish, corners.mean(1), unit_vectors(area_vectors(corners)), flat))
+    mesh, corners = tool.mesh, tool.mesh.corners
+    normals = unit_vectors(area_vectors(corners))
+    return replace(mesh, rgb=finished(tool.finish, corners.mean(1), normals, mesh.colours))
 
 
 def finished(finish: Finish, xyz: Array, normal: Array, rgb: Colours) -> Colours:

@@ -40,8 +40,7 @@ def surface_cloud(tool: Tool, seed: int = 0, points: int = POINTS) -> Cloud:
     else:
         raise BadValue(f"{tool.name}: hardly any of its surface can be seen from outside.")
     xyz, normal, face = xyz[:points], normal[:points], face[:points]
-    flat = mesh.rgb[face] if mesh.rgb is not None else np.full((points, 3), 128, np.uint8)
-    return Cloud(xyz, finished(tool.finish, xyz, normal, flat), mesh.part[face])
+    return Cloud(xyz, finished(tool.finish, xyz, normal, mesh.colours[face]), mesh.part[face])
 
 
 def spread_evenly(mesh: TriangleMesh, rng: np.random.Generator, points: int) -> tuple[Array, Array, Integers]:
