@@ -16,8 +16,9 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.parts.edge_heap import Heap, empty_heap, remove, settle
-from steelyard.parts.hulls import Hulls, both, five_faces, four_faces, hulls_of, keep, keep_in_place, six_volumes
+from steelyard.parts.hulls import Hulls, both, hulls_of, keep, keep_in_place
 from steelyard.parts.reach import MOST, Room, reach, room
+from steelyard.parts.small_hulls import five_faces, five_volume, four_faces
 from steelyard.shape.hull import HullWork, hull_volume, hull_work
 from steelyard.shape.hulls.borrowed import borrowed, integer
 
@@ -75,20 +76,6 @@ class Tree(NamedTuple):
 
     merges: Any
     cost: Any
-
-
-@numba.njit(cache=True, nogil=True)
-def _five_points(xyz: Array, rows: Any) -> float:
-    """Return the volume of the hull of five points: the positive of the tets that leave one out fill it, and so do the
-    negative, half the sum of all.
-    """
-    total, last = 0.0, 0.0
-    for k in range(4):
-        i, j, h = rows[0 if k != 0 else 3], rows[1 if k != 1 else 3], rows[2 if k != 2 else 3]
-        d = six_volumes(xyz, rows[4], j, h, i)
-        total += abs(d)
-        last += d if k == 3 else -d
-    return (total + abs(last)) / 12
 
 
 @numba.njit(cache=True, nogil=True)
@@ -206,7 +193,7 @@ def _grow(xyz: Array, clusters: Clusters, hulls: Hulls, edges: Edges, e: int, sp
     count = both(hulls, big, small)
     if count == 5:
         both(hulls, a, b)
-        edges.known[e], edges.stage[e] = _five_points(xyz, hulls.rows), _EXACT
+        edges.known[e], edges.stage[e] = five_volume(xyz, hulls.rows), _EXACT
         return stamp
     edges.stage[e] = _GROWN
     if count <= MOST:
