@@ -87,15 +87,7 @@ def fuse(views: Views, points: int = POINTS) -> Scan:
     clock, mistake = _Clock(), cache(lambda: likely_mistake(views))
     scene = scene_of(views)
     try:
-        level, off = _levelled(scene, mistake), 0.0
-        if level.lens:
-            read = scene_of(replace(scene.views, intrinsics=level.lens))
-            again = levelled(read)
-            # A lens with which the views have the table no more alike, or with which they see none, explains nothing.
-            better = again is not None and again < level.off
-            scene, level = (read, level) if better else (scene, replace(level, lens=None))
-            off = again or 0.0
-        off = off if level.lens else level.off
+        scene, level, off = _read_right(scene, _levelled(scene, mistake))
         said, unsure = put_on_stand(scene)
         clock.lap("table")
         found = _surface(scene, points, off, clock)
@@ -137,6 +129,19 @@ def _levelled(scene: Scene, mistake: Callable[[], str]) -> Level:
     if off > TABLE_OFF and mistake():
         raise CannotAnswer(f"no table was found that the views share: they have it {1e3 * off:.2g} mm (rms) apart.")
     return Level(off, given, lens_by_table(scene) if off else None)
+
+
+def _read_right(scene: Scene, level: Level) -> tuple[Scene, Level, float]:
+    """Return the scene as the lens that explains its tables reads it, and how far off they are then, rms [m].
+
+    A lens with which the views have the table no more alike, or with which they see none, explains nothing.
+    """
+    if level.lens:
+        read = scene_of(replace(scene.views, intrinsics=level.lens))
+        again = levelled(read)
+        if again is not None and again < level.off:
+            return read, level, again
+    return scene, replace(level, lens=None), level.off
 
 
 def _surface(scene: Scene, points: int, off: float, clock: _Clock) -> Surface:

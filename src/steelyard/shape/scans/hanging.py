@@ -35,7 +35,7 @@ def hanging(scene: Scene, bottom: Underside, xyz: Array, normal: Array) -> tuple
 
     xyz, normal  (N, 3) the seen surface, in the table's frame
     """
-    under, grid = np.isfinite(bottom.height), bottom.grid
+    under, grid = bottom.under, bottom.grid
     height, free = bottom.height[under], _free_to(bottom, xyz, normal, _OFF_TABLE * scene.sigma)[under]
     tall = np.maximum(bottom.top[under] - height, 0)
     level = height[:, None] + tall[:, None] * (np.arange(_LEVELS) + 0.5) / _LEVELS
@@ -52,7 +52,7 @@ def _free_to(bottom: Underside, xyz: Array, normal: Array, off_table: float) -> 
 
     off_table  height over the table from which on something does not stand on it, for all that depth tells [m]
     """
-    under = np.isfinite(bottom.height)
+    under = bottom.under
     cells, _ = bottom.grid.cells_under(xyz)
     rim = rim_of(under)
     side = normal[:, 2] < _SIDE

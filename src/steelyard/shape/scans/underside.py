@@ -17,7 +17,7 @@ from scipy import ndimage, sparse
 from scipy.sparse.linalg import splu
 from scipy.spatial import cKDTree
 
-from steelyard.check import Array, Integers
+from steelyard.check import Array, Integers, Mask
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.grid import Grid
 from steelyard.shape.scans.scene import WINDOW, Scene
@@ -47,11 +47,15 @@ class Underside:
     top: Array
     empty: Array
 
+    @property
+    def under(self) -> Mask:
+        """Over which cells (I, J) there is an object."""
+        return np.isfinite(self.height)
+
     def points(self) -> tuple[Array, Array]:
         """Return points (N, 3) that close the underside, in the table's frame, and their normals (N, 3)."""
-        under = np.isfinite(self.height)
-        open_ = under & ~self.seen
-        filled = np.where(under, self.height, np.nan)
+        open_ = self.under & ~self.seen
+        filled = np.where(self.under, self.height, np.nan)
         slope = np.stack([_slope(filled, 0)[open_], _slope(filled, 1)[open_]]) / self.grid.pitch
         normal = unit_vectors(np.stack([slope[0], slope[1], -np.ones(slope.shape[1])], axis=1))
         return self.grid.spots(open_, self.height[open_]), normal

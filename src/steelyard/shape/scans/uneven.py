@@ -26,5 +26,5 @@ def uneven(scene: Scene, bottom: Underside, disagree: float) -> tuple[tuple[Find
         f"{1e3 * scene.sigma * disagree:.2g} mm about the object. The underside is closed on that plane, some of the "
         "roughness too high or too low, which the standard deviation of the volume holds."
     )
-    foot = float(np.isfinite(bottom.height).sum()) * bottom.grid.pitch**2
+    foot = float(bottom.under.sum()) * bottom.grid.pitch**2
     return (Finding.of("table-uneven", text),), _CREST * rough * foot
