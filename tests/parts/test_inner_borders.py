@@ -9,7 +9,8 @@ import pytest
 
 from steelyard.check import Array
 from steelyard.io.shapes.parts_files import SavedParts, read_parts, write_parts
-from steelyard.parts.inner_borders import cut_at_borders, over_half
+from steelyard.parts.inner_borders import cut_at_borders
+from steelyard.parts.patch_winding import over_half
 from steelyard.parts.pieces import cell_colours
 from steelyard.parts.segment import segment
 from steelyard.parts.segmentation import Segmentation
