@@ -12,7 +12,7 @@ from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.points.medians import middle_mean, quantile
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.depth_images import Images, pixel_of
-from steelyard.shape.scans.table_plane import table_planes
+from steelyard.shape.scans.view_planes import table_planes
 from steelyard.shape.volume import enclose
 
 CAMERA = np.array([60.0, 60.0, 32.0, 24.0])

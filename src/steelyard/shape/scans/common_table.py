@@ -14,7 +14,8 @@ from scipy import ndimage
 
 from steelyard.check import Array
 from steelyard.shape.scans.scene import Scene
-from steelyard.shape.scans.table_plane import lowest_planes, noise_of, table_frame, table_planes
+from steelyard.shape.scans.table_plane import table_frame
+from steelyard.shape.scans.view_planes import lowest_planes, noise_of, table_planes
 from steelyard.shape.views import TablePlane
 from steelyard.spatial import Rotation
 

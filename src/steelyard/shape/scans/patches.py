@@ -9,8 +9,7 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.points.medians import middle_half_std
 from steelyard.shape.points.thinning import in_cubes, spread_to
-from steelyard.shape.scans import depth_images as images
-from steelyard.shape.scans import sight_lines
+from steelyard.shape.scans import sight_lines, surfel_pass
 from steelyard.shape.scans.region import REACHES, STRIDE, Region, heights
 from steelyard.shape.scans.scene import WINDOW, Scene
 
@@ -29,7 +28,7 @@ def surfels(scene: Scene, region: Region) -> Array:
     # Where few images hold an end of it, all of their pixels are needed.
     stride = 1 if region.cut else STRIDE
     where = region.mask, region.grid.low, region.grid.pitch
-    found = images.surfels(scene.images, stride, _NORMAL_STEP, *where, cell, floor, layers, scene.noise)
+    found = surfel_pass.surfels(scene.images, stride, _NORMAL_STEP, *where, cell, floor, layers, scene.noise)
     found = np.asarray(found[found[:, 7] >= scene.enough])
     if not len(found):
         raise no_surface()

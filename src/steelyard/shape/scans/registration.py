@@ -18,8 +18,8 @@ from steelyard.shape.scans.patches import no_surface, settled, settled_patches, 
 from steelyard.shape.scans.pose_errors import PoseErrors
 from steelyard.shape.scans.region import Region, object_on_table
 from steelyard.shape.scans.scene import WINDOW, Scene
-from steelyard.shape.scans.table_plane import INCIDENCE
 from steelyard.shape.scans.unsure_volume import unsure_volume
+from steelyard.shape.scans.view_planes import INCIDENCE
 from steelyard.shape.scans.view_steps import Sights, moved, moved_together
 
 _REPORTED = np.radians(2.0), 0.01  # how far poses may be off before anything was seen of it, per axis [rad], [m]

@@ -11,8 +11,9 @@ from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.depth_images import Images, held, sampled, stride_of
-from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_noise, table_of
+from steelyard.shape.scans.table_plane import leveller, looked_at, table_frame, table_of
 from steelyard.shape.scans.view_mistakes import advice
+from steelyard.shape.scans.view_planes import table_noise
 from steelyard.shape.views import TablePlane, Views
 from steelyard.spatial import Pose
 

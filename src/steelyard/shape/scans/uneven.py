@@ -6,8 +6,8 @@ import numpy as np
 
 from steelyard.findings import Finding
 from steelyard.shape.scans.scene import Scene
-from steelyard.shape.scans.table_plane import INCIDENCE
 from steelyard.shape.scans.underside import Underside
+from steelyard.shape.scans.view_planes import INCIDENCE
 
 _UNEVEN = 0.725  # times the depth noise: views that spread less have a table that is rougher than their noise
 _CREST = 3.0  # times the roughness: what the underside is off by. Of four bodies on six cloths 2 to 4, of a mug up to 7
