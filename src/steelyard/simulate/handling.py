@@ -23,7 +23,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog
 from steelyard.simulate import logs
 from steelyard.simulate.motions import Held, Kinematics, Motion, Step, StopAndGo
-from steelyard.simulate.noise import Spectrum
+from steelyard.simulate.noise import Spectrum, Std
 from steelyard.spatial import Rotation
 
 Variant = Literal["paper", "slow", "static"]
@@ -37,7 +37,7 @@ TIP_SPEED = 0.25
 REACH = 0.35
 # Standard deviations of angular acceleration, acceleration, force, torque (rad/s^2, m/s^2, N, N m).
 # "high" is Table III, "high-code" what the published code draws.
-NOISE: Mapping[str, tuple[float, float, float, float]] = MappingProxyType({
+NOISE: Mapping[str, Std] = MappingProxyType({
     "none": (0.0, 0.0, 0.0, 0.0),
     "low": (0.25, 0.025, 0.05, 0.0025),
     "moderate": (0.5, 0.05, 0.1, 0.005),
@@ -136,7 +136,7 @@ def exact_log(seen: Kinematics, body: InertialParameters | None) -> MotionLog:
 def handling_log(
     body: InertialParameters,
     variant: str = "paper",
-    noise: str | tuple[float, float, float, float] = "high",
+    noise: str | Std = "high",
     seed: int = 0,
     *,
     disturbance: Disturbance = NOTHING,
@@ -158,7 +158,7 @@ def handling_log(
 
 def with_noise(
     log: MotionLog,
-    noise: str | tuple[float, float, float, float],
+    noise: str | Std,
     rng: np.random.Generator,
     spectrum: Spectrum = "white",
 ) -> MotionLog:
@@ -166,7 +166,7 @@ def with_noise(
     return logs.with_noise(log, noise_std(noise), rng, spectrum, RATE_HZ)
 
 
-def noise_std(noise: str | tuple[float, float, float, float]) -> tuple[float, float, float, float]:
+def noise_std(noise: str | Std) -> Std:
     """Return the standard deviations of angular acceleration, acceleration, force, torque in SI units."""
     if not isinstance(noise, str):
         return noise

@@ -13,7 +13,7 @@ from steelyard.inertia import InertialParameters
 from steelyard.logs.log import MotionLog, Noise
 from steelyard.simulate import scenarios
 from steelyard.simulate.motions import Kinematics, Motion
-from steelyard.simulate.noise import Spectrum, unit_noise
+from steelyard.simulate.noise import Spectrum, Std, unit_noise
 
 
 def bounds(object_name: str) -> Array:
@@ -68,7 +68,7 @@ def simulate_log(
 def log_of(
     body: InertialParameters,
     motion: Motion,
-    std: tuple[float, float, float, float],
+    std: Std,
     rng: np.random.Generator,
     *,
     samples: int = 1000,
@@ -116,7 +116,7 @@ def exact_log(
 
 def with_noise(
     log: MotionLog,
-    std: tuple[float, float, float, float],
+    std: Std,
     rng: np.random.Generator,
     spectrum: Spectrum,
     rate: float,

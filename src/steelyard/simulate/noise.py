@@ -12,6 +12,8 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 
 Spectrum = Literal["white", "2hz"]
+# Standard deviations of angular acceleration, acceleration, force, torque [rad/s^2, m/s^2, N, N m].
+Std = tuple[float, float, float, float]
 SPECTRA: tuple[Spectrum, ...] = ("white", "2hz")
 CUTOFF_HZ = 2.0
 _SETTLE_S = 5.0

@@ -16,6 +16,7 @@ from steelyard.check import Array
 from steelyard.errors import BadValue
 from steelyard.simulate.bodies import BoxUnion
 from steelyard.simulate.motions import Fourier, Motion, Step, StopAndGo
+from steelyard.simulate.noise import Std
 
 STILL_SPEED = 0.005
 STILL_ANGULAR_SPEED = 0.01
@@ -89,7 +90,7 @@ def _fourier(entry: dict[str, Any]) -> Fourier:
     )
 
 
-def noise_std(name: str) -> tuple[float, float, float, float]:
+def noise_std(name: str) -> Std:
     """Return standard deviations of angular acceleration, acceleration, force, torque in SI units."""
     angular, linear, force, torque = (float(v) for v in _named("noise_std", name))
     return angular, linear, force, torque
