@@ -9,7 +9,7 @@ from __future__ import annotations
 import numpy as np
 
 from steelyard.check import Integers
-from steelyard.parts.colours import ColourModes
+from steelyard.parts.colours import NEIGHBOURS, ColourModes
 from steelyard.parts.prints import patches
 from steelyard.parts.skin import Skin
 from steelyard.shape.points.spacing import nearest
@@ -19,7 +19,6 @@ SPREAD = 0.1  # of those on the way that lie in each third of it
 END, NEAREST_END, BESIDE = 0.15, 0.3, 0.2  # of the way: an end at least, at most for this to tell; off the way
 _NOISES = 1.5  # an end is as wide as so many median steps between neighbours, three deviations along the way
 _FEW = 16  # points that tell nothing
-_NEIGHBOURS = 8
 
 
 def without_fades(colours: ColourModes, skin: Skin) -> Integers:
@@ -45,7 +44,7 @@ def without_fades(colours: ColourModes, skin: Skin) -> Integers:
 
 def _fading(colours: ColourModes, patch: Integers, size: Integers, skin: Skin) -> list[tuple[int, int]]:
     """Return pairs of patches, the larger first, across whose border the colour fades."""
-    near = skin.near[:, :_NEIGHBOURS]
+    near = skin.near[:, :NEIGHBOURS]
     ends = np.stack([np.repeat(np.arange(len(patch)), near.shape[1]), near.ravel()], axis=1)
     ends = ends[(patch[ends[:, 0]] != patch[ends[:, 1]]) & (size[patch[ends]].min(1) >= _FEW // 2)]
     pairs, pair = np.unique(np.sort(patch[ends], axis=1), axis=0, return_inverse=True)

@@ -45,7 +45,8 @@ def supervoxels(cloud: Cloud, count: int = COUNT) -> Integers:
     colour = np.zeros_like(xyz) if cloud.rgb is None else cloud.rgb[order] / 255
     feature = np.hstack([WEIGHTS[0] * xyz, WEIGHTS[1] * colour, normals])
     labels = np.empty(len(xyz), dtype=np.int64)
-    labels[order] = _grow(feature, WEIGHTS[2], near, count)
+    fused = _fuse(feature, near, count, _first_threshold(feature, near))
+    labels[order] = _exchange(feature, near, fused)
     return np.unique(labels, return_inverse=True)[1]
 
 
@@ -55,37 +56,30 @@ def pieces_of_points(mesh: TetMesh, cloud: Cloud, labels: Any) -> Integers:
 
 
 @numba.njit(cache=True, nogil=True)
-def _distance(feature: Array, normal: float, i: int, j: int) -> float:
+def _distance(feature: Array, i: int, j: int) -> float:
     """Return eq. 9 of two points."""
     place = colour = along = 0.0
     for k in range(3):
         place += (feature[i, k] - feature[j, k]) ** 2
         colour += (feature[i, 3 + k] - feature[j, 3 + k]) ** 2
         along += feature[i, 6 + k] * feature[j, 6 + k]
-    return float(np.sqrt(place) + np.sqrt(colour) + normal * (1 - abs(along)))
+    return float(np.sqrt(place) + np.sqrt(colour) + WEIGHTS[2] * (1 - abs(along)))
 
 
 @numba.njit(cache=True, nogil=True)
-def _first_threshold(feature: Array, normal: float, near: Any) -> float:
+def _first_threshold(feature: Array, near: Any) -> float:
     """Return the median over points of the least dissimilarity to a neighbour, above zero."""
     least = np.empty(len(near))
     for i in range(len(near)):
         least[i] = np.inf
         for j in near[i]:
             if j != i:
-                least[i] = min(least[i], _distance(feature, normal, i, j))
+                least[i] = min(least[i], _distance(feature, i, j))
     return float(max(np.median(least), 1e-9))
 
 
 @numba.njit(cache=True, nogil=True)
-def _grow(feature: Array, normal: float, near: Any, count: int) -> Any:
-    """Return the representative (N,) of every point: fusion, then exchange at the boundaries."""
-    threshold = _first_threshold(feature, normal, near)
-    return _exchange(feature, normal, near, _fuse(feature, normal, near, count, threshold))
-
-
-@numba.njit(cache=True, nogil=True)
-def _fuse(feature: Array, normal: float, near: Any, count: int, threshold: float) -> Any:
+def _fuse(feature: Array, near: Any, count: int, threshold: float) -> Any:
     """Return the representative of every point: in every sweep each absorbs those near whose loss is below a threshold.
 
     The loss of absorbing j is its size times its dissimilarity; the threshold doubles. Separate bodies stay so.
@@ -109,7 +103,7 @@ def _fuse(feature: Array, normal: float, near: Any, count: int, threshold: float
                     if met[j] == visit:
                         continue
                     met[j] = visit
-                    if size[j] * _distance(feature, normal, i, j) < threshold:
+                    if size[j] * _distance(feature, i, j) < threshold:
                         parent[j] = i
                         size[i] += size[j]
                         following[last[i]], last[i] = j, last[j]
@@ -125,7 +119,7 @@ def _fuse(feature: Array, normal: float, near: Any, count: int, threshold: float
 
 
 @numba.njit(cache=True, nogil=True)
-def _exchange(feature: Array, normal: float, near: Any, label: Any) -> Any:
+def _exchange(feature: Array, near: Any, label: Any) -> Any:
     """Return the labels after points moved to the supervoxel next to them whose representative is more like them."""
     n = len(near)
     queue, queued = np.empty(n, np.int64), np.zeros(n, np.bool_)
@@ -141,10 +135,10 @@ def _exchange(feature: Array, normal: float, near: Any, label: Any) -> Any:
         head = (head + 1) % n
         waiting -= 1
         queued[i] = False
-        own, least = label[i], _distance(feature, normal, i, label[i])
+        own, least = label[i], _distance(feature, i, label[i])
         for j in near[i]:
             if label[j] != label[i]:
-                other = _distance(feature, normal, i, label[j])
+                other = _distance(feature, i, label[j])
                 if other < least:
                     label[i], least = label[j], other
         if label[i] != own:
