@@ -19,7 +19,7 @@ from steelyard.spatial import axial_vector, cross, cross_matrix, lever_accelerat
 
 
 def _motion_map(phi: Array) -> Array:
-    """Return L(phi) (6, 12)."""
+    """Return L(phi) (6, 12) as it is written above: what the basis is made of."""
     m, h, inertia = phi[0], phi[1:4], forms.inertia_matrix(phi)
     out = np.zeros((6, 12))
     out[:3, :3], out[:3, 3:6] = inertia, cross_matrix(h)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -89,7 +89,7 @@ class TriangleMesh:
 
     def in_frame(self, X_AB: Pose) -> TriangleMesh:
         """Return the same mesh, given in B, seen from frame A."""
-        return TriangleMesh(X_AB.apply(self.vertices), self.triangles, self.part, self.rgb)
+        return replace(self, vertices=X_AB.apply(self.vertices))
 
 
 def part_moments(mesh: TriangleMesh) -> Array:

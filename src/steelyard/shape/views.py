@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -127,11 +127,11 @@ class Views:
     def chosen(self, rows: Sequence[int] | Any) -> Views:
         """Return some of the views, numbers or a mask."""
         rgb = None if self.rgb is None else self.rgb[rows]
-        return Views(self.depth[rows], rgb, self.intrinsics, self.X_WC[rows], self.depth_unit, self.table)
+        return replace(self, depth=self.depth[rows], rgb=rgb, X_WC=self.X_WC[rows])
 
     def posed(self, X_WC: Pose) -> Views:
         """Return the same images at other poses."""
-        return Views(self.depth, self.rgb, self.intrinsics, X_WC, self.depth_unit, self.table)
+        return replace(self, X_WC=X_WC)
 
 
 def _require_depth(depth: Depths, unit: float) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -58,40 +58,36 @@ def findings_of(
 
     mistake  what is likely wrong with all views alike, in words; it is asked only where they do not agree
     """
-    found, disagree, shift = [], surface.disagree, surface.shift
+    return tuple(_found(scene, surface, level, placed, mistake))
+
+
+def _found(
+    scene: Scene, surface: Surface, level: Level, placed: Placement | None, mistake: Callable[[], str]
+) -> Iterator[Finding]:
+    disagree, shift = surface.disagree, surface.shift
     if others := surface.others:
-        found.append(
-            Finding.of(
-                "several-objects",
-                f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept.",
-            )
-        )
+        text = f"{others + 1} separate objects stand on the table where the cameras look; the largest was kept."
+        yield Finding.of("several-objects", text)
     far = shift is not None and (shift > _FAR or level.off > TABLE_OFF)
     why = " " + said if (disagree > _WRONG or far) and (said := mistake()) else ""
     if disagree > _WRONG:
-        found.append(
-            Finding.of(
-                "views-disagree",
-                f"The views of one surface spread {disagree:.1f} times as far as the depth noise of "
-                f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}."
-                f"{why}",
-            )
+        text = (
+            f"The views of one surface spread {disagree:.1f} times as far as the depth noise of "
+            f"{1e3 * scene.sigma:.2g} mm, even where moving the cameras was tried; expected below {_WRONG:g}."
         )
+        yield Finding.of("views-disagree", text + why)
     if far or level.lens or (placed and placed.at_wrist):
-        found.append(Finding.of("views-disagree", _said_of(level, shift, placed) + why))
+        yield Finding.of("views-disagree", _said_of(level, shift, placed) + why)
     if cut := cut_off(scene, surface.xyz, surface.normal):
-        found.append(cut)
+        yield cut
     # What is cut off has no surface for that reason.
     elif (lost := surface.lost) > _LOST:
-        found.append(
-            Finding.of(
-                "surface-open",
-                f"Of where the object stands on the table {100 * lost:.0f} % has no surface in the cloud: it is too "
-                f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer, and check "
-                "fx, fy, cx, cy in camera.json.",
-            )
+        text = (
+            f"Of where the object stands on the table {100 * lost:.0f} % has no surface in the cloud: it is too "
+            f"low, or too narrow for pixels {1e3 * scene.pixel:.2g} mm wide. Bring the camera nearer, and check "
+            "fx, fy, cx, cy in camera.json."
         )
-    return tuple(found)
+        yield Finding.of("surface-open", text)
 
 
 def few_seen(share: float, views: int, enough: int) -> tuple[Finding, ...]:

@@ -113,7 +113,7 @@ def likely_mistake(views: Views) -> str:
     least = max(_MOST, before + _MORE)
     if said := _explained(views, given, _MISTAKES, before, least):
         return said
-    inverted = replace(views, X_WC=views.X_WC.inverse())
+    inverted = views.posed(views.X_WC.inverse())
     scales = ((pose_scale(views), _of_scale), (pose_scale(inverted), _inverted_and_of_scale))
     mistakes = [mistake(scale) for scale, mistake in scales if scale]
     return _explained(views, given, mistakes, before, least) if mistakes else ""
