@@ -167,10 +167,7 @@ def _fits(
         return True
     for late in {0.0, *scene.late_s.values()}:
         seen = motion.at(time - late)
-        loaded = load_of(scene, payload, seen, swing, scene.slip)
-        placed = seen.position[:, None] + np.einsum(
-            "tij,tnj->tni", seen.rotation.matrix, np.broadcast_to(loaded.position, (len(time), scene.robots, 3))
-        )
+        placed = load_of(scene, payload, seen, swing, scene.slip).placed(seen)
         home = homes.inverse()
         for i in range(scene.robots):
             if not Omnid().reaches(home[i].apply(placed[:, i])).all():

@@ -15,7 +15,7 @@ from steelyard.errors import BadValue
 from steelyard.inertia import InertialParameters
 from steelyard.simulate.motions import Kinematics, minimum_jerk, needed
 from steelyard.simulate.team_cases import DOWN, MASS, MOMENTS, RING, RING_CENTRE, Slip
-from steelyard.spatial import Pose, Rotation, cross, cross_matrix
+from steelyard.spatial import Pose, Rotation, Wrench, cross, cross_matrix
 
 _UNBORNE = 1e-8  # of the wrench asked for: more is not rounding
 
@@ -59,12 +59,10 @@ class Carried:
 
         stiffness  [N/m] and [N m/rad], the same along all axes of the grasp
         """
-        wrench = self.wrench[robot]
-        off = Pose(Rotation.exp(wrench[:, :3] / stiffness[1]), wrench[:, 3:] / stiffness[0])
-        into = off.rotation.inverse()
-        moment = into.apply(wrench[:, :3] - cross(off.position, wrench[:, 3:]))
+        wrench = Wrench.from_array(self.wrench[robot])
+        off = Pose(Rotation.exp(wrench.torque / stiffness[1]), wrench.force / stiffness[0])
         pose = Pose(Rotation(self.rotation[robot]), self.position[robot]) @ off
-        return pose, np.concatenate([moment, into.apply(wrench[:, 3:])], axis=1)
+        return pose, (off.inverse() @ wrench).array()
 
 
 @dataclass(frozen=True, eq=False)
@@ -100,6 +98,11 @@ class Load:
     twist: Array
     maps: Array
     demand: Array
+
+    def placed(self, motion: Kinematics) -> Array:
+        """Return the places (T, N, 3) of the grasps in W [m], where C moves by `motion` (T,)."""
+        position = np.broadcast_to(self.position, (len(motion.time), *self.position.shape[1:]))
+        return np.asarray(motion.position[:, None] + np.einsum("tij,tnj->tni", motion.rotation.matrix, position))
 
 
 def grasp_load(payload: TeamPayload, motion: Kinematics, six_axis: list[int], slip: Slip | None = None) -> Load:
@@ -138,9 +141,7 @@ def carry(
     wrench[:, six_axis, :3] = forces[:, 3 * robots :].reshape(len(forces), len(six_axis), 3)
     into = np.swapaxes(loaded.rotation, -1, -2)
     turned = motion.rotation.matrix[:, None] @ loaded.rotation
-    placed = motion.position[:, None] + np.einsum(
-        "tij,tnj->tni", motion.rotation.matrix, _full(loaded.position, motion)
-    )
+    placed = loaded.placed(motion)
     down = np.swapaxes(turned, -1, -2) @ DOWN
     parts = (turned, placed, _turned(into, loaded.twist), _turned(into, wrench), down)
     return Carried(*(np.ascontiguousarray(np.swapaxes(part, 0, 1)) for part in parts))
@@ -189,10 +190,6 @@ def grasp_map(position: Array, six_axis: list[int]) -> Array:
     maps[:, 3:, : 3 * robots] = np.tile(np.eye(3), robots)
     maps[:, :3, 3 * robots :] = np.tile(np.eye(3), len(six_axis))
     return maps
-
-
-def _full(values: Array, motion: Kinematics) -> Array:
-    return np.asarray(np.broadcast_to(values, (len(motion.time), *values.shape[1:])))
 
 
 def _turned(into: Array, six: Array) -> Array:
