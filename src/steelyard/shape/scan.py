@@ -17,7 +17,6 @@ from steelyard.shape.cloud import Cloud
 from steelyard.shape.known_space import SeenSpace
 from steelyard.shape.points.spacing import Neighbours
 from steelyard.shape.points.thinning import in_cubes, spread, spread_to
-from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.common_table import levelled
 from steelyard.shape.scans.hanging import hanging
 from steelyard.shape.scans.lens_error import lens_by_table
@@ -207,7 +206,7 @@ def _guessed(scene: Scene) -> Callable[[Array, Array], float]:
         clear = at[:, 2] > _OFF_TABLE * scene.sigma
         clear &= back.rotation.apply(areas)[:, 2] > DOWNWARD * size
         at, size = at[clear], size[clear]
-        bare = sight_lines.sights(scene.images, at, scene.noise)[:, 1] < 1
+        bare = scene.sights(at)[:, 1] < 1
         return float(size[bare].sum() / size.sum()) if len(at) else 0.0
 
     return guessed

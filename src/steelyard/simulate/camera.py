@@ -8,7 +8,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.shape.views import Intrinsics
-from steelyard.spatial import Pose, Rotation
+from steelyard.spatial import Pose, Rotation, unit_vectors
 
 # Depth aligned to colour at 640 x 480, as the D435's own calibration gives it, rounded.
 D435 = Intrinsics(640, 480, 615.0, 615.0, 320.0, 240.0)
@@ -70,10 +70,9 @@ def wrist_arc(
 
 def looking(eye: Array, target: Array) -> Pose:
     """Return the poses (V,) of cameras at `eye` (V, 3) that look at `target` (3,), the top of the image upward."""
-    forward = target - eye
-    forward = forward / np.linalg.norm(forward, axis=1, keepdims=True)
-    right = np.cross(forward, np.where(np.abs(forward[:, 2:]) > 0.999, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]))
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    forward = unit_vectors(target - eye)
+    up = np.where(np.abs(forward[:, 2:]) > 0.999, [0.0, 1.0, 0.0], [0.0, 0.0, 1.0])
+    right = unit_vectors(np.cross(forward, up))
     return Pose(Rotation.nearest(np.stack([right, np.cross(forward, right), forward], axis=2)), eye)
 
 

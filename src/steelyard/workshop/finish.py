@@ -46,6 +46,5 @@ def _pattern(xyz: Array) -> Array:
     direction = rng.normal(size=(_WAVES, 3))
     wave = 2 * np.pi / (_FINEST * rng.uniform(1, 4, _WAVES))
     phase = rng.uniform(0, 2 * np.pi, _WAVES)
-    unit = direction / np.linalg.norm(direction, axis=1, keepdims=True)
-    value = np.sin(xyz @ (unit * wave[:, None]).T + phase).sum(1) / np.sqrt(_WAVES / 2)
+    value = np.sin(xyz @ (unit_vectors(direction) * wave[:, None]).T + phase).sum(1) / np.sqrt(_WAVES / 2)
     return np.asarray(np.clip(1.6 * (value - 0.75), 0, 1))

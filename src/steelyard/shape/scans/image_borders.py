@@ -7,8 +7,8 @@ from scipy.spatial import cKDTree
 
 from steelyard.check import Array
 from steelyard.findings import Finding
-from steelyard.shape.scans import sight_lines
 from steelyard.shape.scans.scene import Scene
+from steelyard.spatial import unit_vectors
 
 # A spot that fewer images hold than this may be the last that enough views see: one view in four sees a given spot, and
 # three must. Of few views three fifths, of many a quarter is little for an arc around the object.
@@ -46,7 +46,7 @@ def _open(scene: Scene, xyz: Array, ends: Array, normal: Array) -> Array:
     spots = _around(ends, normal, way)
     found = spots[..., 2] > 3 * scene.sigma
     found[found] = tree.query(spots[found])[0] > _COVERED * way
-    past, on = sight_lines.sights(scene.images, spots[found], scene.noise).T
+    past, on = scene.sights(spots[found]).T
     held, least = scene.held(spots[found])[:, 0], scene.enough
     found[found] = (past < least) & ((on > past) | (held < least))
     return np.asarray(found.any(1))
@@ -54,7 +54,6 @@ def _open(scene: Scene, xyz: Array, ends: Array, normal: Array) -> Array:
 
 def _around(xyz: Array, normal: Array, way: float) -> Array:
     """Return spots (N, K, 3) all around points (N, 3), as far along the surface with normals (N, 3)."""
-    aside = np.cross(normal, np.eye(3)[np.abs(normal).argmin(1)])
-    aside /= np.linalg.norm(aside, axis=1, keepdims=True)
+    aside = unit_vectors(np.cross(normal, np.eye(3)[np.abs(normal).argmin(1)]))
     angle = 2 * np.pi * np.arange(_WAYS)[:, None, None] / _WAYS
     return np.asarray((xyz + way * (np.cos(angle) * aside + np.sin(angle) * np.cross(normal, aside))).swapaxes(0, 1))

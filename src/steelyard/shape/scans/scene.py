@@ -91,6 +91,10 @@ class Scene:
         """Return past which of points (N, 3) enough views see."""
         return sight_lines.seen_past(self.images, points, 0.0, self.noise, LEAST_VIEWS) >= self.enough
 
+    def sights(self, points: Array) -> Array:
+        """Return how many views see past each of points (N, 3), and how many measure something there: (N, 2)."""
+        return np.asarray(sight_lines.sights(self.images, points, self.noise))
+
     def held(self, points: Array) -> Array:
         """Return how many images hold each of points (N, 3), and how densely their pixels lie there [1/m^2]: (N, 2)."""
         return np.asarray(held(self.images, points))
