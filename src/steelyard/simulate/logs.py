@@ -86,9 +86,10 @@ def log_of(
     """
     seen = motion.at(np.arange(samples) / rate)
     still_below = scenarios.STILL_SPEED, scenarios.STILL_ANGULAR_SPEED
-    exact = exact_log(seen, body, check.vectors("gravity", gravity), still_below)
-    again = replace(exact.rows(np.tile(np.arange(samples), repeats)), time=np.arange(samples * repeats) / rate)
-    log = with_noise(again, std, rng, spectrum, rate)
+    log = exact_log(seen, body, check.vectors("gravity", gravity), still_below)
+    if repeats > 1:
+        log = replace(log.rows(np.tile(np.arange(samples), repeats)), time=np.arange(samples * repeats) / rate)
+    log = with_noise(log, std, rng, spectrum, rate)
     return log if bias is None else replace(log, wrench=log.wrench + check.vectors("bias", bias, 6))
 
 
