@@ -261,8 +261,7 @@ class PartMasses:
         if not self.shape_error.movable:
             return body, spread + error, spread @ data.left_by(error) if blurred else spread
         placed = (followed if self.shape_error.doubtful else recentred)(data, body, error)
-        covariance = placed.left_of(data, spread) + placed.error
-        return placed.body, covariance, placed.following(data, spread @ data.left_by(error))
+        return placed.known(data, spread, error)
 
     def _built(
         self, problem: Problem, data: Effective, masses: Masses, body: InertialParameters, covariance: Array,
