@@ -58,12 +58,6 @@ def material_masses(data: Effective, parts: Parts, materials: Sequence[Material]
     return Masses(mean, covariance, choices)
 
 
-def mixture(weight: Array, means: Sequence[Array], covariances: Sequence[Array]) -> tuple[Array, Array]:
-    """Return mean (n,) and covariance (n, n) of a mixture with weights (K,), the spread between its means included."""
-    mean = weight @ np.stack(means)
-    return mean, density_priors.spread_of(weight, np.stack(means) - mean, np.stack(covariances))
-
-
 def _in_masses(data: Effective, parts: Parts) -> tuple[Array, Array]:
     """Return A (P, P) and b (P,): the data as m^T A m / 2 - b^T m."""
     B = parts.per_mass

@@ -12,8 +12,9 @@ from steelyard.findings import Finding
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.masses.findings import misfit_limit
 from steelyard.identify.masses.gradients import Freed, Search, freed, total
-from steelyard.identify.masses.models import Masses, mixture
+from steelyard.identify.masses.models import Masses
 from steelyard.identify.masses.profiles import Profile
+from steelyard.identify.mixture import mixture
 from steelyard.parts.parts import Parts
 
 # Worth a look: a chi-square that right, homogeneous parts exceed once in so many logs.
