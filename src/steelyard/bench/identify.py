@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard import evaluate
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
 from steelyard.bench.logs import long_log
 from steelyard.bench.logs.methods import Method, choose, own_methods
 from steelyard.bench.logs.peers import peer_methods
@@ -99,7 +99,7 @@ def _rows(
     objects, motions, noises = names
     cases = [(o, m, n, s) for m in motions for n in noises for o in objects for s in seeds]
     rows: list[Row] = []
-    for done, (name, motion, noise, seed) in enumerate(cases, start=1):
+    for name, motion, noise, seed in told(cases, len(cases), progress):
         log, true = simulate_log(name, motion, noise, seed)
         head = {"object": name, "motion": motion, "noise": noise, "seed": int(seed)}
         for method in methods.values():
@@ -107,8 +107,6 @@ def _rows(
             if seed == seeds[0] and "failure" not in row:
                 row |= _times(method, log, name == objects[0], repeats)
             rows.append(head | row)
-        if progress is not None:
-            progress(done, len(cases))
     return rows
 
 

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
 from steelyard.evaluate import score
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
@@ -51,11 +51,9 @@ def run(
 ) -> dict[str, Any]:
     """Return rows per tool, how many volumes are within bounds, and the median time of each stage."""
     names = tuple(tools) or tuple(FAMILIES)
-    rows = []
-    for done, name in enumerate(names, start=1):
-        rows.append(_row(name, seed, count, pose_std, warm=done == 1))
-        if progress:
-            progress(done, len(names))
+    rows: list[dict[str, Any]] = []
+    for name in told(names, len(names), progress):
+        rows.append(_row(name, seed, count, pose_std, warm=not rows))
     ratios = np.array([row["volume_ratio"] for row in rows])
     stages = {stage: float(np.median([row["cpu_s"][stage] for row in rows])) for stage in rows[0]["cpu_s"]}
     answers = {

@@ -11,13 +11,13 @@ from typing import Any
 import numpy as np
 from scipy.spatial import cKDTree
 
-from steelyard.bench.asked import Progress
+from steelyard.bench.asked import Progress, told
+from steelyard.bench.objects.folders import chosen_folders
 from steelyard.check import Array
 from steelyard.datasets.known_object import KnownObject
-from steelyard.errors import BadValue
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.evaluate.solids import score, true_solid, winding_of
-from steelyard.io.object_folders import object_folders, read_object
+from steelyard.io.object_folders import read_object
 from steelyard.parts.clustering import cluster
 from steelyard.parts.segment import Segmentation, coloured_pieces, nearest_cell, parts_of_pieces
 from steelyard.parts.supervoxels import pieces_of_points, supervoxels
@@ -84,19 +84,15 @@ def run(
     noise_mm      standard deviation added to every coordinate [mm]
     colour_noise  the same of every colour channel, 0..255
     """
-    folders = [folder for folder in object_folders(data) if not objects or folder.name in objects]
-    if not folders:
-        raise BadValue(f"no object folders to bench in {data}; asked for {list(objects) or 'all'}.")
+    folders = chosen_folders(data, objects)
     result: dict[str, Any] = {name: {} for name in ("objects", "htc_cold", "htc_warm")}
-    for done, folder in enumerate(folders, start=1):
+    for folder in told(folders, len(folders), progress):
         known = read_object(folder)
         cloud = _noisy(known.cloud, noise_mm, colour_noise)
-        row, solid = _ours(known, cloud, warm=done == 1)
+        row, solid = _ours(known, cloud, warm=not result["objects"])
         result["objects"][folder.name] = row
         for name in ("htc_cold", "htc_warm"):
             result[name][folder.name] = _published(known, solid, warm=name == "htc_warm")
-        if progress is not None:
-            progress(done, len(folders))
     return {
         **result,
         "mean": {name: _mean(result[name]) for name in ("objects", "htc_cold", "htc_warm")},

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from steelyard.bench.asked import Progress, require_known, require_one
+from steelyard.bench.asked import Progress, require_known, require_one, told
 from steelyard.bench.pool import spread
 from steelyard.bench.timing import thread_ms
 from steelyard.errors import SteelyardError
@@ -96,11 +96,7 @@ def run(
     require_known("method", methods, METHODS)
     chosen, wanted = tuple(cases) or tuple(CASES), tuple(methods) or tuple(METHODS)
     jobs = [(name, FIRST_SEED + k, wanted) for name in chosen for k in range(trials)]
-    rows: list[dict[str, Any]] = []
-    for done, found in enumerate(spread(trial, jobs, workers), start=1):
-        rows += found
-        if progress is not None:
-            progress(done, len(jobs))
+    rows = [row for found in told(spread(trial, jobs, workers), len(jobs), progress) for row in found]
     return {
         "bench": "team",
         "rules": RULES,
