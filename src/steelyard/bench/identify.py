@@ -13,6 +13,7 @@ from steelyard.bench.asked import Progress, told
 from steelyard.bench.logs import long_log
 from steelyard.bench.logs.methods import Method, choose, own_methods
 from steelyard.bench.logs.peers import peer_methods
+from steelyard.bench.middles import middle_of
 from steelyard.bench.timing import REPEATS, thread_ms
 from steelyard.check import Array
 from steelyard.errors import SteelyardError
@@ -139,17 +140,12 @@ def medians(rows: Sequence[Row]) -> dict[str, dict[str, dict[str, Row]]]:
     out: dict[str, dict[str, dict[str, Row]]] = {}
     for (motion, noise, method), group in groups.items():
         out.setdefault(motion, {}).setdefault(noise, {})[method] = {
-            **{key: _median(group, key) for key in (*SCORES, *TIMES)},
+            **{key: middle_of([row[key] for row in group], np.median) for key in (*SCORES, *TIMES)},
             "consistent_pct": 100 * sum(row["consistent"] for row in group) / len(group),
             "failures": sum("failure" in row for row in group),
             "runs": len(group),
         }
     return out
-
-
-def _median(rows: Sequence[Row], key: str) -> float | None:
-    values = [row[key] for row in rows if row[key] is not None]
-    return float(np.median(values)) if values else None
 
 
 def speed(median: dict[str, dict[str, dict[str, Row]]]) -> dict[str, float]:

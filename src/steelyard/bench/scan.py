@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from steelyard.bench.asked import Progress, told
+from steelyard.bench.middles import middle_of
 from steelyard.evaluate import score
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.noise_aware import NoiseAware
@@ -57,7 +58,8 @@ def run(
     ratios = np.array([row["volume_ratio"] for row in rows])
     stages = {stage: float(np.median([row["cpu_s"][stage] for row in rows])) for stage in rows[0]["cpu_s"]}
     answers = {
-        key: {name: _mean([row[key][name] for row in rows]) for name in SCORES} for key in ("answer", "without_shape")
+        key: {name: middle_of([row[key][name] for row in rows]) for name in SCORES}
+        for key in ("answer", "without_shape")
     }
     return {
         "objects": rows,
@@ -67,12 +69,6 @@ def run(
         "stages": stages,
         "rules": RULES,
     }
-
-
-def _mean(values: list[float | None]) -> float | None:
-    """Return the mean of those that are numbers, None where there are none."""
-    known = [value for value in values if value is not None]
-    return float(np.mean(known)) if known else None
 
 
 def _row(name: str, seed: int, count: int, pose_std: tuple[float, float], warm: bool) -> dict[str, Any]:
