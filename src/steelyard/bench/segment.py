@@ -13,14 +13,13 @@ from scipy.spatial import cKDTree
 
 from steelyard.bench.asked import Progress, told
 from steelyard.bench.objects.folders import chosen_folders
+from steelyard.bench.shapes.paper_parts import paper_parts, scores_of
 from steelyard.check import Array
 from steelyard.datasets.known_object import KnownObject
 from steelyard.evaluate.segments import hausdorff_mm, score_segments
 from steelyard.evaluate.solids import score, true_solid, winding_of
 from steelyard.io.object_folders import read_object
-from steelyard.parts.clustering import cluster
-from steelyard.parts.segment import Segmentation, coloured_pieces, nearest_cell, parts_of_pieces
-from steelyard.parts.supervoxels import pieces_of_points, supervoxels
+from steelyard.parts.segment import Segmentation, coloured_pieces, parts_of_pieces
 from steelyard.shape.cloud import Cloud
 from steelyard.shape.mesh import Integers
 from steelyard.shape.orient import oriented
@@ -29,7 +28,6 @@ from steelyard.shape.volume import enclose
 from steelyard.spatial import Pose, Rotation, area_vectors
 
 REPEATS = 3
-DEPTH = 2  # of the tree: where the paper cuts it, four parts
 SURFACE_POINTS = 20_000
 OUTSIDE_POINTS = 300_000  # dense enough to give points of a cloud the normal where they lie
 TURNED_SEED = 11
@@ -200,14 +198,10 @@ def _turned(true: Integers, cloud: Cloud) -> dict[str, float]:
 def _published(known: KnownObject, mesh: TetMesh, warm: bool) -> dict[str, Any]:
     """Return the row of the paper's clustering on our solid: four parts, from supervoxels or from single tets."""
     for _ in range(2):  # the first time compiles
-        start, piece = time.thread_time(), None
-        if warm:
-            cloud = Cloud(known.cloud.xyz, known.cloud.rgb)
-            piece = pieces_of_points(mesh, cloud, supervoxels(cloud))
-        tree = cluster(mesh, piece)
-        labels = tree.cut_at(tree.nodes_at_depth(DEPTH))
+        start = time.thread_time()
+        labels = paper_parts(mesh, Cloud(known.cloud.xyz, known.cloud.rgb) if warm else None)
         spent = time.thread_time() - start
-    scores = score_segments(known.cloud.labels, labels[nearest_cell(known.cloud.xyz, mesh.centroids)])
+    scores = scores_of(known, mesh, labels)
     return {
         "impurity": scores.impurity,
         "gce": scores.gce,
