@@ -13,6 +13,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.identify.cost import noise_cost
+from steelyard.identify.cost.left_out import jackknife
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
@@ -51,8 +52,8 @@ def leave_one_out(problem: Problem, solution: Solution, H: Array, response: Arra
         "holdout_force_N": force,
         "holdout_torque_Nm": torque,
         "blocks": len(numbers),
-        "jackknife": _jackknife(phi),
-        "jackknife_people": _jackknife(forms.people(phi)),
+        "jackknife": _spread(phi),
+        "jackknife_people": _spread(forms.people(phi)),
     }
 
 
@@ -78,7 +79,6 @@ def _without(
     return moved, np.einsum("ij,jk,ik->i", K, scatter.sum(0), K)
 
 
-def _jackknife(refits: Array) -> Array:
+def _spread(refits: Array) -> Array:
     """Return the jackknife standard deviation (10,) of leave-one-out refits (B, 10)."""
-    blocks = len(refits)
-    return np.asarray(np.sqrt((blocks - 1) / blocks * ((refits - refits.mean(0)) ** 2).sum(0)))
+    return np.sqrt(np.diag(jackknife(refits - refits.mean(0))))
