@@ -16,7 +16,6 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.evidence import PartMass
 from steelyard.findings import Finding
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.bars.effective import Effective
@@ -25,7 +24,7 @@ from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses
 from steelyard.identify.masses.loosened import loosened
-from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses
+from steelyard.identify.masses.models import Masses, averaged_masses, free_masses, material_masses, weighed
 from steelyard.identify.masses.placement import consistent, misplaced, with_mass
 from steelyard.identify.masses.recentred import apart, followed, recentred
 from steelyard.identify.masses.shape_error import MEASURED, ShapeError, misdrawn
@@ -274,20 +273,14 @@ class PartMasses:
         solution = Solution.unconstrained(self._loaded(data.linear_at(body.vector)))
         if self.tool is not None:
             solution = replace(solution, known=self.tool.parameters.vector)
+        names = named_materials(len(self.parts), masses.choices, self.materials)
         estimate = conclude(problem, solution, "part-masses", response=data.response(follows))
         found = replace(
             estimate,
             parameters=body,
             covariance=0.5 * (covariance + covariance.T),
             part_covariance=masses.covariance,
-            parts=self._found(masses),
+            parts=weighed(self.parts, masses.mean, masses.covariance, names),
             identified=np.ones(10, np.bool_),
         )
         return widened(found)
-
-    def _found(self, masses: Masses) -> tuple[PartMass, ...]:
-        """Return the parts with their masses and materials."""
-        parts, std = self.parts, np.sqrt(np.maximum(np.diag(masses.covariance), 0))
-        names = named_materials(len(parts), masses.choices, self.materials)
-        rows = zip(parts.label, masses.mean, std, parts.volume, parts.centroid, names, strict=True)
-        return tuple(PartMass(int(k), float(m), float(s), float(v), c, name) for k, m, s, v, c, name in rows)

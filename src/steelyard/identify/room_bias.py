@@ -78,10 +78,9 @@ def _told(log: MotionLog, problem: Problem, solution: Solution, taken: Array, we
     """
     own = len(solution.linear)
     wide = replace(solution, linear=np.concatenate([solution.linear, np.zeros(6)]))
-    data = problem.scatter, problem.acceleration, problem.wrench
     H, extra, plain = problem.information(wide.linear)
     H = problem.plus_bias_prior(nonnegative(H, plain))
-    _, gradient, _ = noise_cost.derivatives(problem.residual_map(wide.linear), problem.T, *data)
+    _, gradient, _ = noise_cost.derivatives(problem.residual_map(wide.linear), *problem.rows)
     variance = score_in_time(log, problem, wide).variance
     V = nonnegative(H + extra, plain) if variance is None else variance
     # How the body follows the bias: the search has set its own part of the gradient to zero.

@@ -15,6 +15,7 @@ from steelyard.check import Array
 from steelyard.identify.cost import noise_cost
 from steelyard.identify.cost.left_out import jackknife
 from steelyard.identify.cost.linear import inverse_scaled, normal_equations
+from steelyard.identify.cost.newton import Rows
 from steelyard.identify.problem import Problem
 from steelyard.identify.solution import Solution
 from steelyard.inertia import forms
@@ -68,9 +69,9 @@ def _without(
     scatter = problem.blocks[chosen]
     if solution.weights is None:
         K = problem.residual_map(solution.linear)
-        data = (K, problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
-        _, gradient, _ = noise_cost.derivatives(*data)
-        _, _, plain = noise_cost.information(*data)
+        rows = Rows(problem.T, scatter, problem.acceleration[classes], problem.wrench[classes])
+        _, gradient, _ = noise_cost.derivatives(K, *rows)
+        _, _, plain = noise_cost.information(K, *rows)
     else:
         plain, g = normal_equations(problem.T, scatter, solution.weights[classes])
         gradient = 2 * (plain @ solution.linear - g)
