@@ -30,10 +30,16 @@ def huber(scaled: Array) -> Array:
     return np.asarray(np.minimum(1.0, FAR / np.maximum(np.sqrt((scaled**2).mean(1)), 1e-12)))
 
 
-def block_sums(scores: Array, blocks: int) -> Array:
-    """Return the sums (blocks, P) of scores (N, P) over as many even stretches of rows."""
+def block_covariance(H: Array, scores: Array, prior: Array, blocks: int) -> Array:
+    """Return the covariance (P, P) of a fit by the scores (N, P) of its rows, summed over even stretches of them.
+
+    H  (P, P) normal matrix, in it the `prior` (P,), which counts as data of its own strength
+    This sandwich sees residuals that are correlated within a stretch.
+    """
     block = stretches(len(scores), blocks)
-    return np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
+    sums = np.stack([np.bincount(block, column, blocks) for column in scores.T], 1)
+    back = np.linalg.inv(H)
+    return np.asarray(back @ (sums.T @ sums * blocks / (blocks - 1) + np.diag(prior)) @ back)
 
 
 def rounding(wrench: Array) -> Array:
