@@ -16,7 +16,7 @@ import numpy as np
 
 from steelyard.check import Array
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding
+from steelyard.findings import Finding, other_than
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.bars.effective import Effective
 from steelyard.identify.conclude import conclude, widened
@@ -187,7 +187,7 @@ class PartMasses:
             found = uneven(seen, self.parts)
             if found is not None:
                 # Masses have changed: which are zero is asked anew.
-                others = (f for f in findings if f.code not in ("part-not-homogeneous", "part-zero-mass"))
+                others = other_than(findings, "part-not-homogeneous", "part-zero-mass")
                 text = " ".join(filter(None, (misplaced(seen, self.parts), found.message)))
                 uneven_part = Finding.of("part-not-homogeneous", text)
                 freed = self._with_freed(problem, data, found)
@@ -199,8 +199,7 @@ class PartMasses:
         if not any(f.code == "part-not-homogeneous" for f in findings):
             return first.with_findings(*findings)
         # Masses of parts that cannot be right say nothing of which is zero.
-        said = [f for f in findings if f.code != "part-zero-mass"]
-        return self._loosened(problem, data).with_findings(*said)
+        return self._loosened(problem, data).with_findings(*other_than(findings, "part-zero-mass"))
 
     def _with_freed(self, problem: Problem, data: Effective, found: Uneven) -> Estimate:
         """Return the Estimate with densities freed within parts."""

@@ -16,6 +16,7 @@ from steelyard.identify.noise_levels import DEAF, EVERYDAY
 from steelyard.inertia.regressor import design
 from steelyard.logs.log import Integers, Mask, MotionLog, Noise
 from steelyard.logs.moments import Moments, features
+from steelyard.logs.noise import mean_heard
 
 # Row counts below this cannot fix four numbers and a bias whatever they hold.
 FEWEST_ROWS = 2
@@ -71,8 +72,7 @@ class Problem:
 
     def rms(self, square: Array) -> tuple[float, float]:
         """Return the rms [N m] and [N] per axis that measures, from mean squares (6,) of the channels."""
-        both = np.where(self.heard, square, 0.0).reshape(2, 3).sum(1) / np.maximum(self.heard.reshape(2, 3).sum(1), 1)
-        torque, force = np.sqrt(np.maximum(both, 0.0))
+        torque, force = np.sqrt(np.maximum(mean_heard(square, self.heard), 0.0))
         return float(torque), float(force)
 
     @classmethod

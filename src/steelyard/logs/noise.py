@@ -25,6 +25,11 @@ def robust_std(values: Array) -> Array:
     return np.asarray(1.4826 * np.median(np.abs(values), axis=0))
 
 
+def mean_heard(values: Array, heard: Mask) -> Array:
+    """Return the means (2,) of values (6,) over the three torques and the three forces, of channels that measure."""
+    return np.asarray((values * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1))
+
+
 def huber(scaled: Array) -> Array:
     """Return how much (N,) each row of residuals (N, k) over their spread counts: less from an rms of FAR on."""
     return np.asarray(np.minimum(1.0, FAR / np.maximum(np.sqrt((scaled**2).mean(1)), 1e-12)))

@@ -13,7 +13,7 @@ import numpy as np
 
 from steelyard.check import Array, Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import Finding, codes
+from steelyard.findings import Finding, codes, other_than
 from steelyard.identify.fit import Bias
 from steelyard.identify.noise_levels import with_declared, without_dead
 from steelyard.logs.alignment import Aligned, align
@@ -248,7 +248,7 @@ def rows_as_given(
     if "base-tilted" not in codes(before):
         return recording, before, rows
     level = replace(recording, gravity=gravity)
-    others = tuple(f for f in before if f.code != "base-tilted")
+    others = other_than(before, "base-tilted")
     again = Reading(level, others, options).rows_to_fit()
     return (recording, before, rows) if again.room is None else (level, others, again)
 

@@ -18,7 +18,7 @@ import numpy as np
 
 from steelyard.check import Mask
 from steelyard.errors import BadValue, CannotAnswer
-from steelyard.findings import UNEXPLAINED, Finding, counted
+from steelyard.findings import UNEXPLAINED, Finding, counted, other_than
 from steelyard.identify.fit import within_numbers
 from steelyard.identify.scale import allow_scale
 from steelyard.logs.recording import STANDARD_GRAVITY
@@ -86,7 +86,7 @@ def _with_clocks(found: TeamEstimate, apart: ClockErrors, log: TeamLog) -> TeamE
     if not apart:
         return found
     found = clocked(found, apart.first(log))
-    others = (finding for finding in found.findings if finding.code != "clock-offset")
+    others = other_than(found.findings, "clock-offset")
     said = (*apart.findings(log), *late_clocks(found.clock_offsets_s, found.clock_offset_std_s), *others)
     return replace(found, findings=tuple(sorted(said, key=lambda finding: finding.code != "robot-excluded")))
 

@@ -45,7 +45,7 @@ def suspicious(data: Effective, vector: Array, parts: Parts) -> bool:
 
 def uneven(data: Effective, parts: Parts) -> Uneven | None:
     """Return the answer averaged over freed parts, None where homogeneous ones are likely enough or nothing fits."""
-    search = Search.of(data, parts)
+    search = Search(data, parts)
     homogeneous = search.even()
     fits = freed(search, homogeneous, misfit_limit(data, len(parts), SUSPICIOUS))
     if not fits or total(fits) - total(homogeneous) < np.log(ODDS):

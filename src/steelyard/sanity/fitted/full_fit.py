@@ -17,7 +17,7 @@ from steelyard.identify.cost.linear import inverse_scaled
 from steelyard.inertia.regressor import design, motion_map
 from steelyard.logs.log import MotionLog
 from steelyard.logs.moments import features
-from steelyard.logs.noise import robust_std
+from steelyard.logs.noise import mean_heard, robust_std
 from steelyard.logs.runs import picked
 from steelyard.spatial import cross_matrix
 
@@ -197,8 +197,7 @@ def _weights(rows: Rows, solution: Array) -> Array:
     for kind in np.unique(rows.log.noise_class):
         at = rows.log.noise_class == kind
         variance = robust_std(miss[at]) ** 2 + 0.01 * miss[at].var(0)
-        mean = (variance * heard).reshape(2, 3).sum(1) / np.maximum(heard.reshape(2, 3).sum(1), 1)
-        out[at] = heard / np.maximum(np.repeat(mean, 3), _SMALLEST**2)
+        out[at] = heard / np.maximum(np.repeat(mean_heard(variance, heard), 3), _SMALLEST**2)
     return out
 
 
