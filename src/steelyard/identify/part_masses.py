@@ -19,7 +19,8 @@ from steelyard.errors import BadValue, CannotAnswer
 from steelyard.findings import Finding, other_than
 from steelyard.identify.bars.correlated import score_in_time
 from steelyard.identify.bars.effective import Effective
-from steelyard.identify.conclude import conclude, widened
+from steelyard.identify.bars.widened import widened
+from steelyard.identify.conclude import conclude
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.fit import Bias, prepared, problem_of
 from steelyard.identify.masses.findings import elsewhere, named_materials, part_findings, zero_masses

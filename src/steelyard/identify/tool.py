@@ -10,9 +10,9 @@ from scipy.special import gammaincc
 from steelyard.check import Array
 from steelyard.errors import CannotAnswer
 from steelyard.findings import Finding, other_than
-from steelyard.identify.conclude import identified, natural_sizes
 from steelyard.identify.estimate import Estimate
 from steelyard.identify.problem import BiasPrior
+from steelyard.identify.sight import identified, natural_sizes
 from steelyard.inertia import InertialParameters
 from steelyard.inertia.people import ENTRIES
 from steelyard.logs.log import Mask
